@@ -1,0 +1,3 @@
+//! The haptic-guidance steering controller.
+#![no_std]
+#![forbid(unsafe_code)]

@@ -1,0 +1,1 @@
+//! The world around the controller, and the workbench that studies it.

@@ -1,0 +1,42 @@
+//! The arrows of docs/design.md, checked on the sources: who may import whom.
+
+use std::path::{Path, PathBuf};
+
+fn sources(dir: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(dir).unwrap_or_else(|e| panic!("{}: {e}", dir.display())) {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|x| x == "rs") {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Non-comment lines of the sources below `dir` that contain `needle`.
+fn mentions(dir: &str, needle: &str) -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut hits = Vec::new();
+    for path in sources(&root.join(dir)) {
+        for (n, line) in std::fs::read_to_string(&path).unwrap().lines().enumerate() {
+            let code = line.split("//").next().unwrap_or("");
+            if code.contains(needle) {
+                hits.push(format!("{}:{}: {}", path.display(), n + 1, line.trim()));
+            }
+        }
+    }
+    hits
+}
+
+#[test]
+fn the_core_knows_neither_host_nor_firmware() {
+    for needle in ["host_sim", "haptic_firmware", "std::", "extern crate alloc"] {
+        assert_eq!(
+            mentions("core/src", needle),
+            Vec::<String>::new(),
+            "core must not mention {needle}"
+        );
+    }
+}

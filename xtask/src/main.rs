@@ -1,0 +1,2 @@
+//! The one door for builds, tests, QEMU, sizes and benchmarks.
+fn main() {}
