@@ -1,1 +1,3 @@
 //! The world around the controller, and the workbench that studies it.
+
+pub mod trace;
