@@ -1,3 +1,27 @@
-//! The haptic-guidance steering controller.
+//! The haptic-guidance steering controller: the only place that decides a torque.
+//!
+//! A driver and an automation hold one steering wheel; the automation guides with a torque that the
+//! driver can always override. The way of a sample, the same on a desktop, in QEMU and on a board:
+//!
+//! ```text
+//! frame -> bus (length, CRC, counter, range) -> inputs with ages -> law (9) -> envelope -> torque frame
+//! ```
+//!
+//! [`ecu::Ecu`] is that whole way; [`controller::Controller`] is the part between the decoded inputs and
+//! the command. The law, the envelope and the bus do not know each other: only the controller and the ECU
+//! see them all.
+//!
+//! No allocation, no `unsafe`; and from `Ecu::receive` and `Ecu::step` no float and no panic is reachable,
+//! which is proved on the linked image (`cargo xtask gate`). SI values as `f64` exist for parameters, for
+//! the host and for tests, and cross into fixed point in [`quantity`] alone.
+
 #![no_std]
 #![forbid(unsafe_code)]
+
+pub mod bus;
+pub mod controller;
+pub mod ecu;
+pub mod envelope;
+pub mod law;
+pub mod params;
+pub mod quantity;

@@ -1,0 +1,184 @@
+//! Physical quantities in fixed point, one type each; the one file where SI values become bits.
+//!
+//! All signed quantities share one format, I8F24: 24 fractional bits, LSB 2^-24 (6e-8), range
+//! -128..+127.99999994 in the SI unit. That holds +-4 m of lateral error, +-20 rad of wheel angle and
+//! +-32 N.m of driver torque with a resolution far below any sensor's, and a product of two of them fits
+//! an `i64`. Conversions from SI round to nearest and saturate at the ends of the range (NaN becomes 0):
+//! an extreme input must stay extreme, never wrap.
+//!
+//! Not here: ranges that make sense for a signal. Those belong to the bus messages and the parameters.
+
+use fixed::types::I8F24;
+
+macro_rules! quantity {
+    ($(#[$doc:meta])* $name:ident, $from:ident, $get:ident, $unit:literal) => {
+        $(#[$doc])*
+        /// Format I8F24: LSB 2^-24, range -128 to 128 (exclusive).
+        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $name(I8F24);
+
+        impl $name {
+            /// Zero.
+            pub const ZERO: Self = Self(I8F24::ZERO);
+
+            #[doc = concat!("From ", $unit, ": rounds to nearest, saturates at the ends of the range.")]
+            #[must_use]
+            pub const fn $from(si: f64) -> Self {
+                Self::from_bits(round_to_bits(si))
+            }
+
+            #[doc = concat!("The value in ", $unit, " (exact).")]
+            #[must_use]
+            pub const fn $get(self) -> f64 {
+                self.0.to_bits() as f64 / ONE as f64
+            }
+
+            pub(crate) const fn from_bits(bits: i32) -> Self {
+                Self(I8F24::from_bits(bits))
+            }
+
+            /// From a count of 2^-24, saturating.
+            pub(crate) const fn from_wide(bits: i64) -> Self {
+                Self::from_bits(saturate(bits))
+            }
+
+            pub(crate) const fn bits(self) -> i32 {
+                self.0.to_bits()
+            }
+        }
+    };
+}
+
+/// Fractional bits of every signed quantity.
+pub(crate) const FRAC_BITS: u32 = 24;
+const ONE: i64 = 1 << FRAC_BITS;
+
+quantity!(
+    /// A length, m.
+    Metres, from_m, m, "metres"
+);
+quantity!(
+    /// An angle, rad.
+    Radians, from_rad, rad, "radians"
+);
+quantity!(
+    /// A torque on the steering column, N.m, positive turns left.
+    Torque, from_nm, nm, "newton metres"
+);
+
+impl Torque {
+    /// The magnitude. The most negative value saturates.
+    #[must_use]
+    pub const fn abs(self) -> Self {
+        Self(self.0.saturating_abs())
+    }
+
+    /// The torque of opposite direction. The most negative value saturates.
+    #[must_use]
+    pub const fn opposite(self) -> Self {
+        Self(self.0.saturating_neg())
+    }
+}
+
+/// A gain, in the units its name gives it. Format I8F24 like the quantities, range -128 to 128 (exclusive).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Gain(I8F24);
+
+impl Gain {
+    /// From SI: rounds to nearest, saturates.
+    #[must_use]
+    pub const fn from_si(si: f64) -> Self {
+        Self(I8F24::from_bits(round_to_bits(si)))
+    }
+
+    pub(crate) const fn bits(self) -> i32 {
+        self.0.to_bits()
+    }
+}
+
+/// A time span in microseconds, up to 71.6 minutes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Micros(u32);
+
+impl Micros {
+    /// From microseconds.
+    #[must_use]
+    pub const fn from_us(us: u32) -> Self {
+        Self(us)
+    }
+
+    /// From milliseconds, saturating.
+    #[must_use]
+    pub const fn from_ms(ms: u32) -> Self {
+        Self(ms.saturating_mul(1000))
+    }
+
+    /// In microseconds.
+    #[must_use]
+    pub const fn us(self) -> u32 {
+        self.0
+    }
+}
+
+/// An instant on the ECU's free-running microsecond clock, which wraps every 71.6 minutes.
+///
+/// Only the span between two instants has a meaning, and only if they are less than one wrap apart: whoever
+/// keeps an instant must drop it before that (the ECU drops an input as soon as it is stale).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Instant(u32);
+
+impl Instant {
+    /// From the clock's count.
+    #[must_use]
+    pub const fn from_us(us: u32) -> Self {
+        Self(us)
+    }
+
+    /// The clock's count.
+    #[must_use]
+    pub const fn us(self) -> u32 {
+        self.0
+    }
+
+    /// Time from `earlier` to `self`, across at most one wrap.
+    #[must_use]
+    pub const fn since(self, earlier: Self) -> Micros {
+        Micros(self.0.wrapping_sub(earlier.0))
+    }
+
+    /// The instant `span` before this one.
+    #[must_use]
+    pub const fn before(self, span: Micros) -> Self {
+        Self(self.0.wrapping_sub(span.0))
+    }
+
+    /// The instant `span` after this one.
+    #[must_use]
+    pub const fn after(self, span: Micros) -> Self {
+        Self(self.0.wrapping_add(span.0))
+    }
+}
+
+/// Nearest `i32`, saturating.
+pub(crate) const fn saturate(wide: i64) -> i32 {
+    if wide > i32::MAX as i64 {
+        i32::MAX
+    } else if wide < i32::MIN as i64 {
+        i32::MIN
+    } else {
+        wide as i32
+    }
+}
+
+/// `value / 2^shift`, rounded to nearest (ties away from minus infinity). `shift` is 1 to 62.
+pub(crate) const fn shift_round(value: i64, shift: u32) -> i64 {
+    value
+        .saturating_add(1_i64.wrapping_shl(shift.wrapping_sub(1)))
+        .wrapping_shr(shift)
+}
+
+const fn round_to_bits(si: f64) -> i32 {
+    let scaled = si * ONE as f64;
+    // `f64::round` is not in `core`; `as` truncates and saturates, and turns NaN into 0.
+    (if scaled >= 0.0 { scaled + 0.5 } else { scaled - 0.5 }) as i32
+}
