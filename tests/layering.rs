@@ -40,3 +40,28 @@ fn the_core_knows_neither_host_nor_firmware() {
         );
     }
 }
+
+/// Inside the core, only the controller's step and the ECU see the law, the envelope and the bus at once.
+#[test]
+fn the_blocks_of_the_core_do_not_know_each_other() {
+    let blocks = [("law.rs", "law"), ("envelope.rs", "envelope"), ("bus", "bus")];
+    for (place, _) in blocks {
+        for (other_place, other) in blocks {
+            // The bus carries a limit's reason, so it may name the envelope's codes.
+            if place == other_place || (place, other) == ("bus", "envelope") {
+                continue;
+            }
+            let needle = format!("crate::{other}");
+            let hits: Vec<_> = mentions("core/src", &needle)
+                .into_iter()
+                .filter(|hit| {
+                    hit.split(':')
+                        .next()
+                        .unwrap()
+                        .contains(&format!("core/src/{place}"))
+                })
+                .collect();
+            assert_eq!(hits, Vec::<String>::new(), "{place} must not use {needle}");
+        }
+    }
+}

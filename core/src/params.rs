@@ -7,7 +7,7 @@ use core::fmt;
 
 use crate::envelope::Envelope;
 use crate::law::Law;
-use crate::quantity::{Gain, Micros, Torque};
+use crate::quantity::{Gain, Torque};
 
 /// Parameters of the guidance controller, SI units. The default is the paper's table 8.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Params {
     pub a_3: f64,
     /// a4' on de_theta'/dt, s/rad, 0 to 100.
     pub a_4: f64,
-    /// Corner of the low-pass on both rates, Hz, 0.5 to 500.
+    /// Corner of the low-pass on both rates, Hz, 0.5 to 60 (half the camera's sample rate).
     pub rate_corner_hz: f64,
     /// L, absolute limit of the guidance torque, N.m, 0.1 to 5. Profiles in use: 5 (paper, section 3.2) and
     /// 3 (production units that fault above 3).
@@ -101,7 +101,7 @@ impl Config {
             ("a_2", p.a_2, 0.0, 100.0),
             ("a_3", p.a_3, 0.0, 100.0),
             ("a_4", p.a_4, 0.0, 100.0),
-            ("rate_corner_hz", p.rate_corner_hz, 0.5, 500.0),
+            ("rate_corner_hz", p.rate_corner_hz, 0.5, 60.0),
             ("torque_limit_nm", p.torque_limit_nm, 0.1, 5.0),
             ("k_1 * a_1", p.k_1 * p.a_1, 0.0, MAX_GAIN),
             ("k_1 * a_2", p.k_1 * p.a_2, 0.0, MAX_GAIN),
@@ -128,7 +128,7 @@ impl Config {
                 e_y_rate: Gain::from_si(p.k_1 * p.a_2),
                 e_theta: Gain::from_si(p.k_1 * p.a_3),
                 e_theta_rate: Gain::from_si(p.k_1 * p.a_4),
-                tau: Micros::from_us((1e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32),
+                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
             },
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),

@@ -1,0 +1,205 @@
+//! Encode and decode against the DBC file, through a DBC parser and a bit extractor that know nothing of the
+//! core's layout.
+
+use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
+use haptic_core::bus::Frame;
+use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::messages::{Column, Guidance, LanePreview, Message, SimTime};
+use haptic_core::envelope::LimitReason;
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Torque};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+fn dbc() -> Dbc {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/haptic.dbc");
+    Dbc::try_from(std::fs::read_to_string(path).unwrap().as_str()).unwrap()
+}
+
+/// Physical value of a signal, bit by bit, as the DBC file says.
+fn signal(dbc: &Dbc, frame: &Frame, name: &str) -> f64 {
+    let message = dbc
+        .messages
+        .iter()
+        .find(|m| m.id == MessageId::Standard(frame.id()))
+        .unwrap_or_else(|| panic!("{:#x} is not in the DBC file", frame.id()));
+    let signal = message
+        .signals
+        .iter()
+        .find(|s| s.name == format!("{}_{name}", message.name))
+        .unwrap();
+    assert_eq!(signal.byte_order, ByteOrder::LittleEndian);
+    assert_eq!(signal.multiplexer_indicator, MultiplexIndicator::Plain);
+    let mut raw: i64 = 0;
+    for i in 0..signal.size {
+        let bit = signal.start_bit + i;
+        let set = frame.data()[bit as usize / 8] >> (bit % 8) & 1;
+        raw |= i64::from(set) << i;
+    }
+    if signal.value_type == ValueType::Signed && raw >> (signal.size - 1) == 1 {
+        raw -= 1 << signal.size;
+    }
+    raw as f64 * signal.factor + signal.offset
+}
+
+/// The message back out of a frame, past a receiver that trusts its sender.
+fn decode<M: Message>(message: M) -> M {
+    let mut state = ReceiverState::NEW;
+    for counter in 0..2 {
+        let _ = M::decode(&mut state, &message.encode(counter));
+    }
+    M::decode(&mut state, &message.encode(2)).unwrap()
+}
+
+/// Half an LSB, and the 2^-24 of the core's own format.
+fn near(got: f64, wanted: f64, lsb: f64) {
+    assert!(
+        (got - wanted).abs() <= 0.5 * lsb + 1e-7,
+        "got {got}, wanted {wanted}"
+    );
+}
+
+#[test]
+fn lane_preview() {
+    let dbc = dbc();
+    let mut rng = SmallRng::seed_from_u64(1);
+    for i in 0..10_000 {
+        let (y, theta) = (rng.random_range(-4.0..=4.0), rng.random_range(-0.5..=0.5));
+        let (age_us, valid) = (rng.random_range(0..=51_100), rng.random());
+        let sent = LanePreview {
+            e_y: Metres::from_m(y),
+            e_theta: Radians::from_rad(theta),
+            age: Micros::from_us(age_us),
+            valid,
+        };
+        let frame = sent.encode(i as u8);
+        near(signal(&dbc, &frame, "LateralError"), y, 1.0 / 8192.0);
+        near(signal(&dbc, &frame, "YawError"), theta, 1.0 / 65536.0);
+        near(signal(&dbc, &frame, "Age"), f64::from(age_us) * 1e-3, 0.1);
+        assert_eq!(signal(&dbc, &frame, "Valid"), f64::from(u8::from(valid)));
+        assert_eq!(signal(&dbc, &frame, "Counter"), f64::from(i as u8 & 15));
+        let got = decode(sent);
+        assert_eq!(got.e_y.m(), signal(&dbc, &frame, "LateralError"));
+        assert_eq!(got.e_theta.rad(), signal(&dbc, &frame, "YawError"));
+        assert_eq!(got.valid, valid);
+        assert_eq!(
+            got.age.us(),
+            (signal(&dbc, &frame, "Age") * 1000.0).round() as u32
+        );
+    }
+}
+
+#[test]
+fn column() {
+    let dbc = dbc();
+    let mut rng = SmallRng::seed_from_u64(2);
+    for i in 0..10_000 {
+        let (torque, angle_deg) = (
+            rng.random_range(-20.0..=20.0),
+            rng.random_range(-720.0..=720.0_f64),
+        );
+        let sent = Column {
+            driver_torque: Torque::from_nm(torque),
+            wheel_angle: Radians::from_rad(angle_deg.to_radians()),
+        };
+        let frame = sent.encode(i as u8);
+        near(signal(&dbc, &frame, "DriverTorque"), torque, 1.0 / 4096.0);
+        near(signal(&dbc, &frame, "WheelAngle"), angle_deg, 0.01 + 1e-5);
+        let got = decode(sent);
+        assert_eq!(got.driver_torque.nm(), signal(&dbc, &frame, "DriverTorque"));
+        near(
+            got.wheel_angle.rad(),
+            signal(&dbc, &frame, "WheelAngle").to_radians(),
+            1e-7,
+        );
+    }
+}
+
+#[test]
+fn guidance() {
+    let dbc = dbc();
+    for raw in -20_480..=20_480 {
+        let torque = f64::from(raw) / 4096.0;
+        let sent = Guidance {
+            torque: Torque::from_nm(torque),
+            limit: LimitReason::NoLaneInput,
+        };
+        let frame = sent.encode(0);
+        assert_eq!(signal(&dbc, &frame, "Torque"), torque);
+        assert_eq!(signal(&dbc, &frame, "Limit"), 2.0);
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
+fn values_beyond_the_range_saturate_when_sent() {
+    let dbc = dbc();
+    let lane = LanePreview {
+        e_y: Metres::from_m(-100.0),
+        e_theta: Radians::from_rad(100.0),
+        age: Micros::from_ms(900),
+        valid: true,
+    }
+    .encode(0);
+    assert_eq!(signal(&dbc, &lane, "LateralError"), -4.0);
+    assert_eq!(signal(&dbc, &lane, "YawError"), 0.5);
+    near(signal(&dbc, &lane, "Age"), 51.1, 1e-9);
+}
+
+#[test]
+fn one_lsb_beyond_the_range_is_rejected_when_received() {
+    use haptic_core::bus::Reject::Range;
+    // Raw values written here by hand: 4 m + 1 LSB, 0.5 rad + 1 LSB, and the same to the right.
+    for (start, raw, beyond) in [(12, 32_768_i64, 32_769_i64), (29, 32_768, 32_769)] {
+        for sign in [1, -1] {
+            for (value, expected_ok) in [(raw, true), (beyond, false)] {
+                let word = (((sign * value) as u64) & 0x1_FFFF) << start;
+                let mut state = ReceiverState::NEW;
+                let mut last = None;
+                for counter in 0..3 {
+                    let mut data = word.to_le_bytes();
+                    LanePreview::PROTECTION.protect(&mut data, counter);
+                    last = Some(LanePreview::decode(
+                        &mut state,
+                        &Frame::new(0x100, &data).unwrap(),
+                    ));
+                }
+                let last = last.unwrap();
+                assert_eq!(last.is_ok(), expected_ok, "{start} {value} {last:?}");
+                assert!(expected_ok || last == Err(Range));
+            }
+        }
+    }
+}
+
+#[test]
+fn simulated_time() {
+    let frame = SimTime(Instant::from_us(0xFEDC_BA98)).encode();
+    assert_eq!(signal(&dbc(), &frame, "Time"), f64::from(0xFEDC_BA98_u32));
+    assert_eq!(
+        SimTime::decode(&frame),
+        Some(SimTime(Instant::from_us(0xFEDC_BA98)))
+    );
+    assert_eq!(SimTime::decode(&Frame::new(0x7F1, frame.data()).unwrap()), None);
+}
+
+#[test]
+fn the_dbc_file_names_every_limit_reason() {
+    let dbc = dbc();
+    let values = dbc.value_descriptions.iter().find_map(|v| match v {
+        can_dbc::ValueDescription::Signal {
+            name,
+            value_descriptions,
+            ..
+        } if name == "Guidance_Limit" => Some(value_descriptions),
+        _ => None,
+    });
+    let named: Vec<(i64, String)> = values
+        .unwrap()
+        .iter()
+        .map(|d| (d.id, d.description.clone()))
+        .collect();
+    let ours: Vec<(i64, String)> = (0..16)
+        .filter_map(|code| LimitReason::from_code(code).map(|reason| (code, format!("{reason:?}"))))
+        .collect();
+    assert_eq!(named, ours);
+}

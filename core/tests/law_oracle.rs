@@ -1,0 +1,187 @@
+//! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
+
+use haptic_core::controller::{Controller, ControllerState, Inputs};
+use haptic_core::law::LaneSample;
+use haptic_core::params::{Config, Params};
+use haptic_core::quantity::{Instant, Metres, Radians};
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+
+/// Largest difference that `law.rs` states, N.m. The requirement is ten times wider.
+const BOUND_NM: f64 = 1e-4;
+
+/// Equation (9) with the filter of `law.rs`, in f64.
+struct Oracle {
+    p: Params,
+    last: Option<(f64, f64, f64)>,
+    rates: (f64, f64),
+}
+
+impl Oracle {
+    fn new(p: Params) -> Self {
+        Self {
+            p,
+            last: None,
+            rates: (0.0, 0.0),
+        }
+    }
+
+    fn step(&mut self, t_s: f64, e_y: f64, e_theta: f64) -> f64 {
+        let tau = 1.0 / (2.0 * std::f64::consts::PI * self.p.rate_corner_hz);
+        self.rates = match self.last {
+            Some((t, y, theta)) if t_s - t <= 0.1 => {
+                let dt = t_s - t;
+                let rate = |r: f64, change: f64| ((tau * r + change) / (tau + dt)).clamp(-1000.0, 1000.0);
+                (rate(self.rates.0, e_y - y), rate(self.rates.1, e_theta - theta))
+            }
+            _ => (0.0, 0.0),
+        };
+        self.last = Some((t_s, e_y, e_theta));
+        let p = &self.p;
+        let wanted = p.k_1 * (p.a_1 * e_y + p.a_2 * self.rates.0 + p.a_3 * e_theta + p.a_4 * self.rates.1);
+        wanted.clamp(-p.torque_limit_nm, p.torque_limit_nm)
+    }
+}
+
+/// Both, fed with the same samples.
+struct Pair {
+    controller: Controller,
+    state: ControllerState,
+    oracle: Oracle,
+    t_us: u64,
+    worst_nm: f64,
+}
+
+impl Pair {
+    fn new(p: Params) -> Self {
+        Self {
+            controller: Controller::new(Config::new(&p).unwrap()),
+            state: ControllerState::NEW,
+            oracle: Oracle::new(p),
+            t_us: 0,
+            worst_nm: 0.0,
+        }
+    }
+
+    fn step(&mut self, dt_us: u64, e_y: f64, e_theta: f64) -> f64 {
+        self.t_us += dt_us;
+        // The clock wraps under the controller, not under the oracle.
+        let now = Instant::from_us(self.t_us as u32);
+        let lane = LaneSample {
+            e_y: Metres::from_m(e_y),
+            e_theta: Radians::from_rad(e_theta),
+            at: now,
+        };
+        let command = self
+            .controller
+            .step(&mut self.state, now, &Inputs { lane: Some(lane) });
+        let expected = self
+            .oracle
+            .step(self.t_us as f64 * 1e-6, lane.e_y.m(), lane.e_theta.rad());
+        self.worst_nm = self.worst_nm.max((command.torque.nm() - expected).abs());
+        command.torque.nm()
+    }
+}
+
+#[test]
+fn every_pair_of_samples_on_a_dense_grid() {
+    let e_y = || (-8..=8).map(|i| f64::from(i) * 0.5);
+    let e_theta = || (-10..=10).map(|i| f64::from(i) * 0.05);
+    let mut worst: f64 = 0.0;
+    for dt_us in [100, 1000, 8333, 25_000] {
+        for y0 in e_y() {
+            for theta0 in e_theta() {
+                for y1 in e_y() {
+                    for theta1 in e_theta() {
+                        let mut pair = Pair::new(Params::PAPER);
+                        pair.step(0, y0, theta0);
+                        pair.step(dt_us, y1, theta1);
+                        worst = worst.max(pair.worst_nm);
+                    }
+                }
+            }
+        }
+    }
+    println!("grid: worst difference {:.6} mN.m", worst * 1e3);
+    assert!(worst <= BOUND_NM, "worst difference {worst} N.m");
+}
+
+#[test]
+fn random_walks_with_jumps_and_uneven_samples() {
+    let mut rng = SmallRng::seed_from_u64(9);
+    let mut worst: f64 = 0.0;
+    let mut limited = 0;
+    for walk in 0..200 {
+        // Small steps near zero, where nothing is limited, to steps across the whole range.
+        let scale = 10f64.powf(rng.random_range(-5.0..0.5));
+        let mut pair = Pair::new(Params {
+            rate_corner_hz: [0.5, 3.0, 10.0, 30.0, 60.0][walk % 5],
+            k_1: rng.random_range(0.0..0.8),
+            a_4: rng.random_range(0.0..2.0),
+            ..Params::PAPER
+        });
+        // Start just before the microsecond clock wraps.
+        pair.t_us = u64::from(u32::MAX) - 1_000_000;
+        let (mut y, mut theta) = (0.0_f64, 0.0_f64);
+        for _ in 0..10_000 {
+            y = (y + scale * rng.random_range(-1.0..1.0)).clamp(-4.0, 4.0);
+            theta = (theta + 0.125 * scale * rng.random_range(-1.0..1.0)).clamp(-0.5, 0.5);
+            let torque = pair.step(rng.random_range(100..12_000), y, theta);
+            limited += usize::from(torque.abs() == 5.0);
+        }
+        worst = worst.max(pair.worst_nm);
+    }
+    println!(
+        "walks: worst difference {:.6} mN.m, {limited} of 2000000 steps at the limit",
+        worst * 1e3
+    );
+    assert!(worst <= BOUND_NM, "worst difference {worst} N.m");
+    assert!(
+        limited < 1_600_000,
+        "the walks must leave the limit to say anything: {limited}"
+    );
+}
+
+#[test]
+fn a_ramp_gives_its_slope_and_a_step_decays_with_tau() {
+    // By hand: de_theta/dt = 0.1 rad/s settles to K_1*a4'*0.1 = 0.025 N.m on top of the proportional part.
+    let only_rate = Params {
+        a_1: 0.0,
+        a_2: 0.0,
+        a_3: 0.0,
+        ..Params::PAPER
+    };
+    let mut pair = Pair::new(only_rate);
+    let mut torque = 0.0;
+    for k in 0..60 {
+        torque = pair.step(8333, 0.0, 0.1 * f64::from(k) * 8333e-6);
+    }
+    assert!((torque - 0.025).abs() < 1e-5, "{torque}");
+    // A step of 0.1 rad has an area of K_1*a4'*0.1 N.m.s under its rate, whatever the corner.
+    let mut pair = Pair::new(only_rate);
+    pair.step(0, 0.0, 0.0);
+    let area: f64 = (0..200).map(|_| pair.step(1000, 0.0, 0.1) * 1e-3).sum();
+    assert!((area - 0.025).abs() < 1e-5, "{area}");
+}
+
+#[test]
+fn extremes_saturate() {
+    let mut pair = Pair::new(Params {
+        k_1: 4.0,
+        a_1: 8.0,
+        a_3: 8.0,
+        a_2: 8.0,
+        a_4: 8.0,
+        ..Params::PAPER
+    });
+    let extremes = [f64::INFINITY, f64::NEG_INFINITY, 127.9, -128.0, 0.0];
+    for y in extremes {
+        for theta in extremes {
+            let torque = pair.step(1, y, theta);
+            assert!(torque.abs() <= 5.0);
+            if y > 0.0 && theta > 0.0 {
+                assert_eq!(pair.step(99_000, y, theta), 5.0);
+            }
+        }
+    }
+}
