@@ -1,3 +1,4 @@
 //! The world around the controller, and the workbench that studies it.
 
+pub mod metrics;
 pub mod trace;
