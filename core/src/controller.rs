@@ -1,68 +1,497 @@
-//! The controller's step: decoded inputs in, one torque command out. The only place that sees both the law
-//! and the envelope.
+//! The controller's step: decoded inputs in, one torque command out. The one place that sees the mode
+//! machine, the plausibility checks, the law, the envelope and the ramps together.
 
-use crate::envelope::LimitReason;
+use crate::envelope::{EnvelopeState, LimitReason, Situation};
+use crate::faults::{Fault, FaultSet};
 use crate::law::{LaneSample, LawState};
+use crate::modes::{Event, Mode};
 use crate::params::Config;
-use crate::quantity::{Instant, Micros, Torque};
+use crate::plausibility::{PlausibilityState, speeds_agree};
+use crate::quantity::{Gain, Instant, Micros, Radians, Speed, Torque, product};
+use crate::ramp::{HANDOVER, HISTORY, History, Ramp};
+use crate::vital::{Guarded, vital};
 
-/// Older lane errors than this are not acted on.
-pub const LANE_TIMEOUT: Micros = Micros::from_ms(30);
+/// Inputs must be valid for this long in Standby before a request can engage.
+pub const READY: Micros = Micros::from_ms(500);
+/// A planned fade, N.m/s.
+const FADE_RATE: Torque = Torque::from_nm(4.0);
+/// A step that comes later than this after the last one missed its deadline.
+const LATE: Micros = Micros::from_us(2_500);
+/// A step that comes this late is a fault by itself: the world has moved on by half a camera period.
+const LOST_TIME: Micros = Micros::from_ms(10);
+/// So many late steps in a row are tolerated.
+const LATE_STEPS: u32 = 1;
+/// A step that comes sooner than this was not asked for.
+const EARLY: Micros = Micros::from_us(500);
+/// So many early steps in a row are tolerated: they earn no rate limit, but a runaway timer is a fault.
+const EARLY_STEPS: u32 = 3;
+
+/// One input: the latest value that passed the bus's checks, and since when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Input<T> {
+    /// No usable value: never heard, stale, or refused for longer than the time-out.
+    Lost,
+    /// A value that is not older than the time-out.
+    Held(T),
+    /// A value that came since the last step.
+    New(T),
+}
+
+impl<T: Copy> Input<T> {
+    /// The value, new or held.
+    #[must_use]
+    pub const fn value(&self) -> Option<T> {
+        match self {
+            Self::Lost => None,
+            Self::Held(value) | Self::New(value) => Some(*value),
+        }
+    }
+}
+
+vital! {
+    /// Driver torque and wheel angle.
+    #[derive(Default)]
+    pub struct Column {
+        /// T_d on the wheel.
+        pub driver_torque: Torque,
+        /// phi.
+        pub wheel_angle: Radians,
+    }
+}
+
+vital! {
+    /// The host's wish.
+    pub struct Request {
+        /// 1: guidance is wanted. A rising edge engages, a low level ends.
+        pub engage: u32,
+        /// Share of the law's torque to apply, 0 to 1; saturates there.
+        pub authority: Gain,
+    }
+}
 
 /// What the controller reads every millisecond.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Inputs {
-    /// The latest lane errors that passed every check, if any.
-    pub lane: Option<LaneSample>,
+    /// Lane errors.
+    pub lane: Input<LaneSample>,
+    /// The column's sensors.
+    pub column: Input<Column>,
+    /// Two sources of the vehicle's speed.
+    pub speeds: Input<[Speed; 2]>,
+    /// The host's wish.
+    pub request: Input<Request>,
+    /// Faults found outside: on the bus, by the monitor, at the output.
+    pub faults: FaultSet,
 }
 
 /// What the controller decides every millisecond.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Command {
     /// T_h, the guidance torque to apply.
     pub torque: Torque,
     /// Which limit held it back.
     pub limit: LimitReason,
+    /// The mode it belongs to.
+    pub mode: Mode,
+    /// What is wrong.
+    pub faults: FaultSet,
+    /// The driver has to take over.
+    pub warning: bool,
 }
 
-/// The whole control law with its limits; immutable.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Controller {
-    config: Config,
+vital! {
+    /// Everything that a flipped bit must not change unseen.
+    struct Vitals {
+        /// A [`Mode`] code.
+        mode: u32,
+        /// 1 while the last request was high.
+        requested: u32,
+        /// How long the inputs have been valid in Standby.
+        ready: Micros,
+        /// Time since each input was last new: how far back its loss reaches.
+        silence: Silence,
+        /// [`Fault`] bits of inputs that were implausible when last new.
+        implausible: u32,
+        last_step: Instant,
+        /// Late and early steps in a row.
+        late: u32,
+        early: u32,
+        /// Class C faults stay until the next power-up.
+        latched: u32,
+        law: LawState,
+        envelope: EnvelopeState,
+        plausibility: PlausibilityState,
+        ramp: Ramp,
+    }
+}
+
+vital! {
+    struct Silence {
+        lane: Micros,
+        column: Micros,
+        speeds: Micros,
+        request: Micros,
+    }
+}
+
+impl Vitals {
+    const fn new(mode: Mode, now: Instant) -> Self {
+        const NONE: Micros = Micros::from_us(0);
+        Self {
+            mode: mode as u32,
+            // A request that is high from the start is no rising edge.
+            requested: 1,
+            ready: NONE,
+            silence: Silence {
+                lane: NONE,
+                column: NONE,
+                speeds: NONE,
+                request: NONE,
+            },
+            implausible: 0,
+            last_step: now,
+            late: 0,
+            early: 0,
+            latched: 0,
+            law: LawState::NEW,
+            envelope: EnvelopeState::new(now),
+            plausibility: PlausibilityState::NEW,
+            ramp: Ramp::NONE,
+        }
+    }
+
+    fn faults(&self) -> FaultSet {
+        FaultSet::from_bits((self.implausible | self.latched) as u16)
+    }
 }
 
 /// What the controller remembers from step to step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct ControllerState {
-    law: LawState,
+    vitals: Guarded<Vitals>,
+    history: History,
 }
 
 impl ControllerState {
-    /// Nothing seen yet.
-    pub const NEW: Self = Self { law: LawState::NEW };
+    /// At power-up: Boot.
+    #[must_use]
+    pub fn new(now: Instant) -> Self {
+        Self {
+            vitals: Guarded::new(Vitals::new(Mode::Boot, now)),
+            history: History::new(),
+        }
+    }
+
+    /// Guidance active from the start, as the paper's studies of driver models have it. Not for a vehicle.
+    #[must_use]
+    pub fn engaged(now: Instant) -> Self {
+        Self {
+            vitals: Guarded::new(Vitals::new(Mode::Active, now)),
+            history: History::new(),
+        }
+    }
+
+    /// The copies of a vital state differ: nothing of it can be used, and it stays so.
+    fn lose_memory(&mut self, now: Instant) -> Command {
+        let mut faults = FaultSet::NONE;
+        faults.insert(Fault::Memory);
+        let vitals = Vitals {
+            latched: u32::from(faults.bits()),
+            ..Vitals::new(Mode::Fault, now)
+        };
+        self.vitals.set(vitals);
+        Command {
+            torque: Torque::ZERO,
+            limit: LimitReason::Mode,
+            mode: Mode::Fault,
+            faults,
+            warning: true,
+        }
+    }
+}
+
+/// The whole control law with its limits; immutable.
+#[derive(Debug, Clone, Copy)]
+pub struct Controller {
+    config: Guarded<Config>,
 }
 
 impl Controller {
     /// A controller with checked parameters.
     #[must_use]
-    pub const fn new(config: Config) -> Self {
-        Self { config }
+    pub fn new(config: Config) -> Self {
+        Self {
+            config: Guarded::new(config),
+        }
     }
 
-    /// One step of the 1 kHz loop.
+    /// The configuration, if its copies agree.
     #[must_use]
-    pub fn step(&self, state: &mut ControllerState, now: Instant, inputs: &Inputs) -> Command {
-        let fresh = inputs.lane.filter(|sample| now.since(sample.at) <= LANE_TIMEOUT);
-        let Some(sample) = fresh else {
-            // An old sample must not meet a new one across a wrap of the clock.
-            state.law = LawState::NEW;
-            return Command {
-                torque: Torque::ZERO,
-                limit: LimitReason::NoLaneInput,
-            };
+    pub fn config(&self) -> Option<Config> {
+        self.config.get()
+    }
+
+    /// One step of the 1 kHz loop. `applied` is the torque that was really applied since the last one.
+    #[must_use]
+    pub fn step(
+        &self,
+        state: &mut ControllerState,
+        now: Instant,
+        applied: Torque,
+        inputs: &Inputs,
+    ) -> Command {
+        let (Some(config), Some(mut vitals)) = (self.config.get(), state.vitals.get()) else {
+            return state.lose_memory(now);
         };
-        let wanted = self.config.law.step(&mut state.law, sample);
-        let (torque, limit) = self.config.envelope.limit(wanted);
-        Command { torque, limit }
+        let step = Step {
+            config: &config,
+            now,
+            applied,
+            inputs,
+            elapsed: now.since(vitals.last_step),
+        };
+        let command = step.run(&mut vitals, &mut state.history);
+        vitals.last_step = now;
+        state.vitals.set(vitals);
+        state.history.push(now, command.torque);
+        command
+    }
+}
+
+/// One step, with what it must not change.
+struct Step<'a> {
+    config: &'a Config,
+    now: Instant,
+    applied: Torque,
+    inputs: &'a Inputs,
+    elapsed: Micros,
+}
+
+impl Step<'_> {
+    fn run(&self, v: &mut Vitals, history: &mut History) -> Command {
+        let lost = self.look(v);
+        let (late, early) = self.keep_time(v);
+        let mut faults = lost.union(v.faults()).union(self.inputs.faults);
+        faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
+        v.latched |= u32::from(faults.common(FaultSet::CRITICAL).bits());
+
+        let before = Mode::from_code(v.mode).unwrap_or(Mode::Fault);
+        let mode = self.next_mode(v, before, faults);
+        if mode != before {
+            self.enter(v, mode, faults, history);
+        }
+        let (torque, limit) = self.torque(v, mode);
+        let warning = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked);
+        Command {
+            torque,
+            limit,
+            mode,
+            faults,
+            warning,
+        }
+    }
+
+    /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
+    fn look(&self, v: &mut Vitals) -> FaultSet {
+        let Inputs {
+            lane,
+            column,
+            speeds,
+            request,
+            ..
+        } = self.inputs;
+        let checks = &self.config.plausibility;
+        let mut lost = FaultSet::NONE;
+        let mut implausible = FaultSet::from_bits(v.implausible as u16);
+
+        v.silence.speeds = self.silence(speeds, v.silence.speeds);
+        if let Input::New([a, b]) = speeds {
+            let agree = speeds_agree(*a, *b);
+            implausible.set(!agree, Fault::SpeedImplausible);
+            if agree {
+                checks.speed(&mut v.plausibility, *a);
+            }
+        }
+        if !self.is_fast_enough().unwrap_or(false) {
+            // Neither model holds at a walking pace, let alone at an unknown one.
+            v.plausibility.forget_lane();
+            v.plausibility.forget_column();
+        }
+        v.silence.column = self.silence(column, v.silence.column);
+        match column {
+            Input::New(c) => {
+                let plausible = checks.column(
+                    &mut v.plausibility,
+                    self.now,
+                    c.driver_torque,
+                    c.wheel_angle,
+                    self.applied,
+                );
+                implausible.set(!plausible, Fault::ColumnImplausible);
+            }
+            Input::Held(_) => {}
+            Input::Lost => {
+                v.plausibility.forget_column();
+                implausible.set(false, Fault::ColumnImplausible);
+            }
+        }
+        v.silence.lane = self.silence(lane, v.silence.lane);
+        match lane {
+            Input::New(sample) => {
+                let plausible = checks.lane(&mut v.plausibility, *sample);
+                implausible.set(!plausible, Fault::LaneImplausible);
+            }
+            Input::Held(_) => {}
+            Input::Lost => {
+                v.plausibility.forget_lane();
+                implausible.set(false, Fault::LaneImplausible);
+            }
+        }
+        v.silence.request = self.silence(request, v.silence.request);
+
+        lost.insert_if(lane.value().is_none(), Fault::LaneTimeout);
+        lost.insert_if(column.value().is_none(), Fault::ColumnTimeout);
+        lost.insert_if(speeds.value().is_none(), Fault::SpeedTimeout);
+        lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
+        v.implausible = u32::from(implausible.bits());
+        lost
+    }
+
+    fn silence<T>(&self, input: &Input<T>, so_far: Micros) -> Micros {
+        match input {
+            Input::New(_) => Micros::from_us(0),
+            _ => Micros::from_us(so_far.us().saturating_add(self.elapsed.us())),
+        }
+    }
+
+    /// Whether both speeds reach the slowest that is guided, if they are known.
+    fn is_fast_enough(&self) -> Option<bool> {
+        let least = self.config.least_speed;
+        self.inputs
+            .speeds
+            .value()
+            .map(|speeds| speeds.iter().all(|speed| *speed >= least))
+    }
+
+    /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
+    fn keep_time(&self, v: &mut Vitals) -> (u32, u32) {
+        v.late = match self.elapsed {
+            e if e > LOST_TIME => LATE_STEPS.saturating_add(1),
+            e if e > LATE => v.late.saturating_add(1),
+            _ => 0,
+        };
+        v.early = if self.elapsed < EARLY {
+            v.early.saturating_add(1)
+        } else {
+            0
+        };
+        (v.late, v.early)
+    }
+
+    /// The most urgent event that changes the mode decides.
+    fn next_mode(&self, v: &mut Vitals, mode: Mode, faults: FaultSet) -> Mode {
+        let inputs_ok = !faults.intersects(FaultSet::INPUT);
+        let request = self.inputs.request.value().map(|r| r.engage != 0);
+        let fast_enough = self.is_fast_enough();
+        let rising = request == Some(true) && v.requested == 0;
+        if let Some(high) = request {
+            v.requested = u32::from(high);
+        }
+        v.ready = if mode == Mode::Standby && inputs_ok && fast_enough == Some(true) {
+            Micros::from_us(v.ready.us().saturating_add(self.elapsed.us())).min(READY)
+        } else {
+            Micros::from_us(0)
+        };
+        let raised = |event: &&Event| match event {
+            Event::BootPassed => true,
+            Event::Engage => rising && v.ready >= READY,
+            Event::Faded => v.ramp.is_done(),
+            Event::Disengage => request == Some(false) || fast_enough == Some(false),
+            Event::InputLost => !inputs_ok,
+            Event::BootRejected => faults.intersects(FaultSet::LOCKING),
+            Event::Critical => faults.intersects(FaultSet::CRITICAL),
+        };
+        let change = Event::ALL
+            .iter()
+            .rev()
+            .filter(raised)
+            .map(|event| mode.after(*event));
+        change.into_iter().find(|next| *next != mode).unwrap_or(mode)
+    }
+
+    fn enter(&self, v: &mut Vitals, mode: Mode, faults: FaultSet, history: &History) {
+        v.mode = mode as u32;
+        match mode {
+            Mode::Active => v.law = LawState::NEW,
+            Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
+            Mode::Handover => {
+                let suspect = self.suspect_since(v, faults);
+                v.ramp = Ramp::over(history.handover_start(self.now, suspect, self.applied), HANDOVER);
+            }
+            _ => {}
+        }
+    }
+
+    /// How long ago the earliest sample came that must not be trusted.
+    fn suspect_since(&self, v: &Vitals, faults: FaultSet) -> Micros {
+        let silent = |fault, silence| {
+            if faults.contains(fault) {
+                silence
+            } else {
+                Micros::from_us(0)
+            }
+        };
+        if faults.intersects(FaultSet::IMPLAUSIBLE) {
+            return HISTORY;
+        }
+        silent(Fault::LaneTimeout, v.silence.lane)
+            .max(silent(Fault::ColumnTimeout, v.silence.column))
+            .max(silent(Fault::SpeedTimeout, v.silence.speeds))
+            .max(silent(Fault::CommandTimeout, v.silence.request))
+    }
+
+    fn torque(&self, v: &mut Vitals, mode: Mode) -> (Torque, LimitReason) {
+        let wanted = match mode {
+            Mode::Active => self.guidance(v),
+            Mode::Fade | Mode::Handover => v.ramp.step(self.elapsed),
+            // At once: what is behind these modes must not move the wheel for another tick.
+            Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
+                return (Torque::ZERO, LimitReason::Mode);
+            }
+        };
+        // Without a column there is no override to judge; without a column there is also no Active.
+        let driver = self
+            .inputs
+            .column
+            .value()
+            .map_or(Torque::ZERO, |c| c.driver_torque);
+        let situation = Situation {
+            applied: self.applied,
+            elapsed: self.elapsed,
+            driver,
+        };
+        let (torque, limit) = self
+            .config
+            .envelope
+            .step(&mut v.envelope, self.now, wanted, &situation);
+        (
+            torque,
+            if limit == LimitReason::None && mode != Mode::Active {
+                LimitReason::Mode
+            } else {
+                limit
+            },
+        )
+    }
+
+    /// The law's torque, scaled by the authority.
+    fn guidance(&self, v: &mut Vitals) -> Torque {
+        let (Some(sample), Some(request)) = (self.inputs.lane.value(), self.inputs.request.value()) else {
+            return Torque::ZERO;
+        };
+        let asked = self.config.law.step(&mut v.law, self.now, sample);
+        // A share: more than all or less than nothing is a host's mistake.
+        let authority = request.authority.max(Gain::ZERO).min(Gain::ONE);
+        Torque::from_wide(product(authority.bits(), asked.bits()))
     }
 }

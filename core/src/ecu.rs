@@ -1,67 +1,241 @@
-//! The ECU: frames in, frames out. Holds one controller, the receivers of its inputs with their ages, and
-//! the counters of its own frames. Firmware and simulator carry bytes to it and from it, nothing more.
+//! The ECU: frames in, frames out. Holds one controller, the receivers of its inputs with their ages, the
+//! monitor, and the counters of its own frames. Firmware and simulator carry bytes to it and from it,
+//! nothing more.
 
+use heapless::Vec;
+
+use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
-use crate::bus::messages::{Column, Guidance, LanePreview, Message, TIMEOUT};
+use crate::bus::messages::{
+    Column as ColumnMessage, Demand, FaultRecord, Guidance, LanePreview, Message, ResetCause, TIMEOUT,
+    Vehicle, Warning,
+};
 use crate::bus::{Frame, Reject};
-use crate::controller::{Command, Controller, ControllerState, Inputs};
+use crate::controller::{Column, Command, Controller, ControllerState, Input, Inputs, Request};
+use crate::envelope::LimitReason;
+use crate::faults::{Fault, FaultSet, History};
 use crate::law::LaneSample;
-use crate::params::Config;
-use crate::quantity::Instant;
+use crate::modes::Mode;
+use crate::monitor::{Evidence, Monitor, MonitorState};
+use crate::params::{Config, Setup};
+use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
+use crate::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
+use crate::vital::{Guarded, Vital, vital};
 
-/// A controller with its bus.
+/// How the ECU came up: what the firmware knows before the first step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Boot {
+    /// Why it started.
+    pub reset: ResetCause,
+    /// Resets within the last 10 s, this one included, power-up not.
+    pub recent_resets: u8,
+}
+
+/// So many resets within 10 s lock the ECU.
+pub const RESETS_TO_LOCK: u8 = 3;
+
+/// What one step puts on the bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// The command behind the frames. Its torque is rounded to the bus's LSB: the one to apply.
+    pub command: Command,
+    /// The guidance frame.
+    pub guidance: Frame,
+    /// A warning and a line of the fault history, when it is their turn.
+    pub others: Vec<Frame, 2>,
+    /// Whether the monitor renewed its permission. Without it the firmware must not feed the watchdog.
+    pub permitted: bool,
+}
+
+/// The latest value of one input, with what judges the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+struct Slot<T> {
+    e2e: ReceiverState,
+    /// 1 while there is a value.
+    has: u32,
+    /// 1 until a step has seen it.
+    fresh: u32,
+    /// When it was true.
+    at: Instant,
+    value: T,
+}
+
+impl<T: Vital> Vital for Slot<T> {
+    fn complement(self) -> Self {
+        Self {
+            e2e: self.e2e.complement(),
+            has: self.has.complement(),
+            fresh: self.fresh.complement(),
+            at: self.at.complement(),
+            value: self.value.complement(),
+        }
+    }
+}
+
+impl<T: Copy> Slot<T> {
+    /// Nothing heard; `value` only fills the place.
+    const fn new(e2e: ReceiverState, value: T, now: Instant) -> Self {
+        Self {
+            e2e,
+            has: 0,
+            fresh: 0,
+            at: now,
+            value,
+        }
+    }
+
+    fn put(&mut self, value: T, at: Instant) {
+        (self.has, self.fresh, self.value, self.at) = (1, 1, value, at);
+    }
+
+    fn last(&self) -> Option<T> {
+        (self.has != 0).then_some(self.value)
+    }
+
+    /// What a step sees. A stale value is dropped, so that no instant outlives a wrap of the clock, and its
+    /// sender has to be trusted anew.
+    fn take(&mut self, now: Instant) -> Input<T> {
+        if self.has != 0 && now.since(self.at) > TIMEOUT {
+            self.has = 0;
+            self.e2e = ReceiverState::NEW;
+        }
+        let fresh = core::mem::replace(&mut self.fresh, 0) != 0;
+        match (self.has != 0, fresh) {
+            (false, _) => Input::Lost,
+            (true, false) => Input::Held(self.value),
+            (true, true) => Input::New(self.value),
+        }
+    }
+}
+
+vital! {
+    /// What the ECU must not lose to a flipped bit.
+    struct Vitals {
+        lane: Slot<LaneSample>,
+        column: Slot<Column>,
+        speeds: Slot<[Speed; 2]>,
+        request: Slot<Request>,
+        /// 1 when the sender of the last lane preview did not vouch for it.
+        lane_invalid: u32,
+        /// The torque applied since the last step.
+        applied: Torque,
+        /// [`Fault`] bits found outside the controller.
+        faults: u32,
+        last_step: Instant,
+        /// Steps, which give the counters of the frames and their turns.
+        steps: u32,
+    }
+}
+
+impl Vitals {
+    /// Nothing heard; `e2e` says whether the senders are trusted already.
+    fn new(e2e: ReceiverState, faults: FaultSet, now: Instant) -> Self {
+        let lane = LaneSample {
+            e_y: Metres::ZERO,
+            e_theta: Radians::ZERO,
+            at: now,
+        };
+        let column = Column {
+            driver_torque: Torque::ZERO,
+            wheel_angle: Radians::ZERO,
+        };
+        Self {
+            lane: Slot::new(e2e, lane, now),
+            column: Slot::new(e2e, column, now),
+            speeds: Slot::new(e2e, [Speed::ZERO; 2], now),
+            request: Slot::new(
+                e2e,
+                Request {
+                    engage: 0,
+                    authority: Gain::ZERO,
+                },
+                now,
+            ),
+            lane_invalid: 0,
+            applied: Torque::ZERO,
+            faults: u32::from(faults.bits()),
+            last_step: now,
+            steps: 0,
+        }
+    }
+}
+
+/// A controller with its bus and its monitor.
 #[derive(Debug, Clone)]
 pub struct Ecu {
     controller: Controller,
     state: ControllerState,
-    lane: Receiver<LaneSample>,
-    column: Receiver<Column>,
-    counter: u8,
+    monitor: Monitor,
+    monitor_state: MonitorState,
+    vitals: Guarded<Vitals>,
+    actuator: Actuator,
+    history: History,
+    boot: Boot,
+    /// Bytes of frames accepted since the last step, for the monitor's own decoding.
+    lane_bytes: Option<[u8; 8]>,
+    column_bytes: Option<[u8; 8]>,
+    warned_at: Option<u32>,
 }
 
-/// What one step puts on the bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Step {
-    /// The command behind the frame.
-    pub command: Command,
-    /// The guidance torque frame. Its torque, rounded to the bus's LSB, is the one to apply.
-    pub guidance: Frame,
-}
-
-/// The latest value of one input, with what judges the next.
-#[derive(Debug, Clone, Copy)]
-struct Receiver<T> {
-    e2e: ReceiverState,
-    last: Option<(T, Instant)>,
-}
-
-impl<T: Copy> Receiver<T> {
-    const fn new() -> Self {
-        Self {
-            e2e: ReceiverState::NEW,
-            last: None,
-        }
-    }
-
-    /// Drops a value that is stale, so that no instant outlives a wrap of the clock, and the sender's trust.
-    fn expire(&mut self, now: Instant) {
-        if self.last.is_some_and(|(_, at)| now.since(at) > TIMEOUT) {
-            self.last = None;
-            self.e2e.lose_trust();
-        }
-    }
-}
+/// Warnings and lines of the fault history come every so many steps.
+const TURN: u32 = 100;
+/// The monitor is tested every so many steps: twice a second.
+const SELF_TEST: u32 = 512;
 
 impl Ecu {
-    /// An ECU that has heard nothing yet.
+    /// An ECU at power-up or after a reset. Without a good set of parameters it locks.
     #[must_use]
-    pub const fn new(config: Config) -> Self {
+    pub fn new(setup: Option<&Setup>, boot: Boot, now: Instant) -> Self {
+        let mut faults = FaultSet::NONE;
+        faults.insert_if(setup.is_none(), Fault::Parameters);
+        faults.insert_if(boot.recent_resets >= RESETS_TO_LOCK, Fault::ResetLoop);
+        let state = ControllerState::new(now);
+        Self::with(
+            setup.unwrap_or(&Setup::PAPER),
+            state,
+            ReceiverState::NEW,
+            boot,
+            faults,
+            now,
+        )
+    }
+
+    /// Guidance active from the start and every sender trusted, as the paper's studies of driver models have
+    /// it. Not for a vehicle.
+    #[must_use]
+    pub fn engaged(setup: &Setup, now: Instant) -> Self {
+        let state = ControllerState::engaged(now);
+        Self::with(
+            setup,
+            state,
+            ReceiverState::TRUSTED,
+            Boot::default(),
+            FaultSet::NONE,
+            now,
+        )
+    }
+
+    fn with(
+        setup: &Setup,
+        state: ControllerState,
+        e2e: ReceiverState,
+        boot: Boot,
+        faults: FaultSet,
+        now: Instant,
+    ) -> Self {
         Self {
-            controller: Controller::new(config),
-            state: ControllerState::NEW,
-            lane: Receiver::new(),
-            column: Receiver::new(),
-            counter: 0,
+            controller: Controller::new(setup.config),
+            state,
+            monitor: setup.monitor,
+            monitor_state: MonitorState::NEW,
+            vitals: Guarded::new(Vitals::new(e2e, faults, now)),
+            actuator: Actuator::new(),
+            history: History::new(now),
+            boot,
+            lane_bytes: None,
+            column_bytes: None,
+            warned_at: None,
         }
     }
 
@@ -70,23 +244,72 @@ impl Ecu {
     /// # Errors
     /// Why a frame with a known identifier is not used; the last good one stays in use until it is stale.
     pub fn receive(&mut self, frame: &Frame, now: Instant) -> Result<(), Reject> {
+        // Damaged vitals are found and reported by the next step.
+        let Some(mut v) = self.vitals.get() else {
+            return Ok(());
+        };
+        let result = self.take_in(&mut v, frame, now);
+        // Even a rejected frame may have moved a counter.
+        self.vitals.set(v);
+        result
+    }
+
+    fn take_in(&mut self, v: &mut Vitals, frame: &Frame, now: Instant) -> Result<(), Reject> {
         match frame.id() {
             LanePreview::ID => {
-                let lane = LanePreview::decode(&mut self.lane.e2e, frame)?;
-                if lane.valid {
-                    let at = now.before(lane.age);
-                    self.lane.last = Some((
-                        LaneSample {
-                            e_y: lane.e_y,
-                            e_theta: lane.e_theta,
-                            at,
-                        },
-                        at,
-                    ));
+                let lane = LanePreview::decode(&mut v.lane.e2e, frame)?;
+                v.lane_invalid = u32::from(!lane.valid);
+                if !lane.valid {
+                    return Ok(());
                 }
+                let at = now.before(lane.age);
+                let sample = LaneSample {
+                    e_y: lane.e_y,
+                    e_theta: lane.e_theta,
+                    at,
+                };
+                if v.lane
+                    .last()
+                    .is_some_and(|last| !lane_step_is_possible(&last, &sample))
+                {
+                    return Err(Reject::Step);
+                }
+                v.lane.put(sample, at);
+                self.lane_bytes = frame.full_data();
             }
-            Column::ID => {
-                self.column.last = Some((Column::decode(&mut self.column.e2e, frame)?, now));
+            ColumnMessage::ID => {
+                let c = ColumnMessage::decode(&mut v.column.e2e, frame)?;
+                v.column.put(
+                    Column {
+                        driver_torque: c.driver_torque,
+                        wheel_angle: c.wheel_angle,
+                    },
+                    now,
+                );
+                self.actuator.deliver(c.motor_torque);
+                self.column_bytes = frame.full_data();
+            }
+            Vehicle::ID => {
+                let speeds = Vehicle::decode(&mut v.speeds.e2e, frame)?.speeds;
+                let follows = |last: [Speed; 2]| {
+                    last.iter()
+                        .zip(&speeds)
+                        .all(|(last, new)| speed_step_is_possible(*last, *new))
+                };
+                if v.speeds.last().is_some_and(|last| !follows(last)) {
+                    return Err(Reject::Step);
+                }
+                v.speeds.put(speeds, now);
+            }
+            Demand::ID => {
+                let demand = Demand::decode(&mut v.request.e2e, frame)?;
+                v.request.put(
+                    Request {
+                        engage: u32::from(demand.engage),
+                        authority: demand.authority,
+                    },
+                    now,
+                );
             }
             _ => {}
         }
@@ -95,24 +318,135 @@ impl Ecu {
 
     /// One step of the 1 kHz loop.
     pub fn step(&mut self, now: Instant) -> Step {
-        self.lane.expire(now);
-        self.column.expire(now);
+        let mut v = self.vitals.get().unwrap_or_else(|| self.begin_anew(now));
+        let steps = v.steps;
+        let mut faults = FaultSet::from_bits(v.faults as u16);
+        faults.insert_if(!self.actuator.obeys(v.applied), Fault::Actuator);
+        faults.insert_if(
+            steps.is_multiple_of(SELF_TEST) && !self.monitor_refuses_nonsense(),
+            Fault::SelfTest,
+        );
+        let lane = v.lane.take(now);
+        // An invalid preview is the reason of a time-out, not a fault by itself: one may be a blink.
+        faults.set(lane == Input::Lost && v.lane_invalid != 0, Fault::LaneInvalid);
         let inputs = Inputs {
-            lane: self.lane.last.map(|(sample, _)| sample),
+            lane,
+            column: v.column.take(now),
+            speeds: v.speeds.take(now),
+            request: v.request.take(now),
+            faults,
         };
-        let command = self.controller.step(&mut self.state, now, &inputs);
-        let guidance = Guidance {
-            torque: command.torque,
-            limit: command.limit,
+        let mut command = self.controller.step(&mut self.state, now, v.applied, &inputs);
+        command.torque = Guidance::rounded(command.torque);
+        let mut guidance = self.guidance(&command, steps);
+
+        let evidence = Evidence {
+            lane: self.lane_bytes.as_ref(),
+            column: self.column_bytes.as_ref(),
+            guidance: guidance.bytes(),
+            elapsed_us: now.since(v.last_step).us(),
+        };
+        let permitted = self.monitor.step(&mut self.monitor_state, &evidence);
+        if !permitted {
+            faults.insert(Fault::Monitor);
+            command = Command {
+                torque: Torque::ZERO,
+                limit: LimitReason::Monitor,
+                mode: Mode::Fault,
+                faults: command.faults.union(faults),
+                warning: true,
+            };
+            guidance = self.guidance(&command, steps);
         }
-        .encode(self.counter);
-        self.counter = self.counter.wrapping_add(1) & 0x0F;
-        Step { command, guidance }
+        (self.lane_bytes, self.column_bytes) = (None, None);
+        v.faults = u32::from(faults.bits());
+        v.applied = command.torque;
+        v.last_step = now;
+        v.steps = steps.wrapping_add(1);
+        self.vitals.set(v);
+        self.history.step(now, command.faults);
+        let others = self.others(&command, steps);
+        Step {
+            command,
+            guidance,
+            others,
+            permitted,
+        }
     }
 
-    /// The driver torque and wheel angle in use, if they are fresh.
+    /// The vital state is damaged: nothing of it can be used. What comes in its place knows nothing but the
+    /// memory fault, which latches.
+    fn begin_anew(&mut self, now: Instant) -> Vitals {
+        let mut faults = FaultSet::NONE;
+        faults.insert(Fault::Memory);
+        self.state = ControllerState::new(now);
+        let vitals = Vitals::new(ReceiverState::NEW, faults, now);
+        self.vitals.set(vitals);
+        vitals
+    }
+
+    fn guidance(&self, command: &Command, steps: u32) -> Frame {
+        Guidance {
+            torque: command.torque,
+            limit: command.limit,
+            mode: command.mode,
+            warning: command.warning,
+            faults: command.faults,
+            reset: self.boot.reset,
+        }
+        .encode(steps as u8)
+    }
+
+    /// A warning in the step that needs it, then one each turn; a line of the fault history each turn.
+    fn others(&mut self, command: &Command, steps: u32) -> Vec<Frame, 2> {
+        let mut frames = Vec::new();
+        let due = |since: u32| steps.wrapping_sub(since).is_multiple_of(TURN);
+        if command.warning {
+            let since = *self.warned_at.get_or_insert(steps);
+            if due(since) {
+                let counter = steps.wrapping_sub(since) / TURN;
+                let warning = Warning {
+                    mode: command.mode,
+                    faults: command.faults,
+                };
+                // Two frames have two places.
+                let _ = frames.push(warning.encode(counter as u8));
+            }
+        } else {
+            self.warned_at = None;
+        }
+        let records = self.history.records();
+        if due(0) && !records.is_empty() {
+            let turn = steps / TURN;
+            let index = (turn as usize).checked_rem(records.len()).unwrap_or(0);
+            if let Some(record) = records.get(index) {
+                let line = FaultRecord {
+                    index: index as u8,
+                    total: records.len() as u8,
+                    record: *record,
+                };
+                let _ = frames.push(line.encode(turn as u8));
+            }
+        }
+        frames
+    }
+
+    /// The self-test: the monitor must refuse 8 N.m, which no profile allows.
+    fn monitor_refuses_nonsense(&self) -> bool {
+        let mut state = MonitorState::NEW;
+        let nonsense = (0x7FFF_u64 << 12 | u64::from(Mode::Active as u8) << 32).to_le_bytes();
+        let evidence = Evidence {
+            lane: None,
+            column: None,
+            guidance: &nonsense,
+            elapsed_us: 1000,
+        };
+        !self.monitor.step(&mut state, &evidence)
+    }
+
+    /// The configuration in use, if its copies agree.
     #[must_use]
-    pub fn column(&self) -> Option<Column> {
-        self.column.last.map(|(column, _)| column)
+    pub fn config(&self) -> Option<Config> {
+        self.controller.config()
     }
 }

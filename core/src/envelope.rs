@@ -1,8 +1,19 @@
 //! The torque envelope: the last word on every command. It knows nothing of the guidance law.
 //!
-//! Every clamp returns its reason, and the reason that won is in the output.
+//! All limits are judged on the torque that was really applied, which the caller hands in: the envelope
+//! keeps no history of its own that could drift from the truth. Every clamp returns its reason; the reason
+//! that won is the last one that acted.
+//!
+//! | limit | bound |
+//! |---|---|
+//! | absolute | abs(T) <= L |
+//! | window | abs(T) grows by at most 1.2 N.m in 250 ms |
+//! | wind-up | abs(T) grows by at most 4 N.m/s |
+//! | reduction | abs(T) falls by at most 8 N.m/s |
+//! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
-use crate::quantity::Torque;
+use crate::quantity::{Gain, Instant, Micros, Torque, per_second_times, product, saturate};
+use crate::vital::vital;
 
 /// Which limit held the torque back.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -13,42 +24,171 @@ pub enum LimitReason {
     None = 0,
     /// The absolute limit L.
     Absolute = 1,
-    /// No lane preview that may be trusted: the torque is zero.
-    NoLaneInput = 2,
-}
-
-/// Limits of the torque; immutable once validated by [`crate::params`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Envelope {
-    pub(crate) absolute: Torque,
-}
-
-impl Envelope {
-    /// The nearest torque within the envelope, and which limit held it back.
-    #[must_use]
-    pub fn limit(&self, wanted: Torque) -> (Torque, LimitReason) {
-        // +-L: the driver must be able to override the guidance by hand (paper, section 3.2).
-        let limited = wanted.clamp(self.absolute.opposite(), self.absolute);
-        (
-            limited,
-            if limited == wanted {
-                LimitReason::None
-            } else {
-                LimitReason::Absolute
-            },
-        )
-    }
+    /// The growth within 250 ms.
+    Window = 2,
+    /// The rate of growth.
+    WindUp = 3,
+    /// The rate of reduction.
+    Reduction = 4,
+    /// The driver opposes.
+    DriverOverride = 5,
+    /// The mode allows no torque, or less than the law asks for.
+    Mode = 6,
+    /// The monitor withdrew its permission.
+    Monitor = 7,
 }
 
 impl LimitReason {
     /// The reason of a code on the bus.
     #[must_use]
     pub const fn from_code(code: i64) -> Option<Self> {
-        match code {
-            0 => Some(Self::None),
-            1 => Some(Self::Absolute),
-            2 => Some(Self::NoLaneInput),
-            _ => None,
+        Some(match code {
+            0 => Self::None,
+            1 => Self::Absolute,
+            2 => Self::Window,
+            3 => Self::WindUp,
+            4 => Self::Reduction,
+            5 => Self::DriverOverride,
+            6 => Self::Mode,
+            7 => Self::Monitor,
+            _ => return None,
+        })
+    }
+}
+
+vital! {
+    /// Limits of the torque; immutable once validated by [`crate::params`].
+    pub struct Envelope {
+        /// L.
+        pub(crate) absolute: Torque,
+        /// Growth per second.
+        pub(crate) wind_up: Torque,
+        /// Fall per second.
+        pub(crate) reduction: Torque,
+        /// Growth per [`WINDOW`].
+        pub(crate) window: Torque,
+        /// Opposing driver torque at which the bound begins to shrink.
+        pub(crate) override_from: Torque,
+        /// How fast it shrinks, N.m per N.m.
+        pub(crate) override_slope: Gain,
+    }
+}
+
+vital! {
+    /// The anchor of the window; everything else is handed in.
+    pub struct EnvelopeState {
+        anchor: Torque,
+        anchor_at: Instant,
+    }
+}
+
+/// What the envelope judges a wish against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Situation {
+    /// The torque really applied until now.
+    pub applied: Torque,
+    /// Since when: the time that the rate limits may use.
+    pub elapsed: Micros,
+    /// The driver's torque on the wheel.
+    pub driver: Torque,
+}
+
+/// Length of the window. Growth is counted from an anchor that moves up every 250 ms.
+pub const WINDOW: Micros = Micros::from_ms(250);
+
+/// A late step earns no more than this much of a rate limit: two ticks. A larger jump after a pause would
+/// be felt as one.
+const MAX_ELAPSED: Micros = Micros::from_ms(2);
+
+impl EnvelopeState {
+    /// No torque so far.
+    #[must_use]
+    pub const fn new(now: Instant) -> Self {
+        Self {
+            anchor: Torque::ZERO,
+            anchor_at: now,
         }
     }
+}
+
+impl Envelope {
+    /// The nearest torque within the envelope, and which limit held it back.
+    #[must_use]
+    pub fn step(
+        &self,
+        state: &mut EnvelopeState,
+        now: Instant,
+        wanted: Torque,
+        at: &Situation,
+    ) -> (Torque, LimitReason) {
+        if now.since(state.anchor_at) >= WINDOW {
+            *state = EnvelopeState {
+                anchor: at.applied,
+                anchor_at: now,
+            };
+        }
+        let mut command = (wanted, LimitReason::None);
+        // +-L: the driver must be able to override the guidance by hand (paper, section 3.2).
+        hold(
+            &mut command,
+            self.absolute.opposite(),
+            self.absolute,
+            LimitReason::Absolute,
+        );
+        let window = sum(state.anchor.abs(), self.window);
+        hold(&mut command, window.opposite(), window, LimitReason::Window);
+        self.hold_rates(&mut command, at);
+        // Last, and exempt from the reduction limit: whatever else holds, the driver's hand wins at once.
+        // Zero is always inside these bounds, so they can only make the torque smaller.
+        let (low, high) = self.override_bounds(at.driver);
+        hold(&mut command, low, high, LimitReason::DriverOverride);
+        command
+    }
+
+    /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
+    fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
+        let elapsed = at.elapsed.min(MAX_ELAPSED);
+        let step = |rate: Torque| i64::from(saturate(per_second_times(i64::from(rate.bits()), elapsed)));
+        let (growth, fall) = (step(self.wind_up), step(self.reduction));
+        // Judged in the frame where the applied torque is positive.
+        let mirror = at.applied < Torque::ZERO;
+        let turn = |t: Torque| if mirror { t.opposite() } else { t };
+        let applied = i64::from(at.applied.abs().bits());
+        let mut turned = (turn(command.0), command.1);
+        let high = Torque::from_wide(applied.saturating_add(growth));
+        hold(&mut turned, Torque::MIN, high, LimitReason::WindUp);
+        if applied > fall {
+            let low = Torque::from_wide(applied.saturating_sub(fall));
+            hold(&mut turned, low, Torque::MAX, LimitReason::Reduction);
+        } else {
+            // Across zero: the old torque can fall to zero in this step, and the new one grows from there.
+            let low = Torque::from_wide(growth).opposite();
+            hold(&mut turned, low, Torque::MAX, LimitReason::WindUp);
+        }
+        *command = (turn(turned.0), turned.1);
+    }
+
+    /// `clamp(L + 3*(T_d + 0.8), 0, L)` above, `-clamp(L + 3*(0.8 - T_d), 0, L)` below (defaults).
+    fn override_bounds(&self, driver: Torque) -> (Torque, Torque) {
+        let bound = |toward: Torque| {
+            let margin = sum(toward, self.override_from);
+            let shrunk = i64::from(self.absolute.bits())
+                .saturating_add(product(self.override_slope.bits(), margin.bits()));
+            // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway.
+            Torque::from_wide(shrunk.clamp(0, i64::from(self.absolute.bits())))
+        };
+        (bound(driver.opposite()).opposite(), bound(driver))
+    }
+}
+
+/// Clamps a command; a limit that changes it becomes its reason.
+fn hold(command: &mut (Torque, LimitReason), low: Torque, high: Torque, reason: LimitReason) {
+    let held = command.0.max(low).min(high);
+    if held != command.0 {
+        *command = (held, reason);
+    }
+}
+
+fn sum(a: Torque, b: Torque) -> Torque {
+    Torque::from_wide(i64::from(a.bits()).saturating_add(i64::from(b.bits())))
 }

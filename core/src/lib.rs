@@ -18,10 +18,17 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod actuator;
 pub mod bus;
 pub mod controller;
 pub mod ecu;
 pub mod envelope;
+pub mod faults;
 pub mod law;
+pub mod modes;
+pub mod monitor;
 pub mod params;
+pub mod plausibility;
 pub mod quantity;
+pub mod ramp;
+pub mod vital;

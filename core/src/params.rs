@@ -7,9 +7,12 @@ use core::fmt;
 
 use crate::envelope::Envelope;
 use crate::law::Law;
-use crate::quantity::{Gain, Torque};
+use crate::monitor::Monitor;
+use crate::plausibility::Plausibility;
+use crate::quantity::{Gain, Speed, Torque};
+use crate::vital::vital;
 
-/// Parameters of the guidance controller, SI units. The default is the paper's table 8.
+/// Parameters of the guidance controller, SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// K_1, overall gain, N.m, 0 to 4.
@@ -27,6 +30,29 @@ pub struct Params {
     /// L, absolute limit of the guidance torque, N.m, 0.1 to 5. Profiles in use: 5 (paper, section 3.2) and
     /// 3 (production units that fault above 3).
     pub torque_limit_nm: f64,
+    /// Largest growth of the torque, N.m/s, 0.5 to 4 (lateral jerk and acceleration limits of ISO 11270).
+    pub wind_up_nm_per_s: f64,
+    /// Largest fall of the torque, N.m/s, 4 (a planned fade) to 8.
+    pub reduction_nm_per_s: f64,
+    /// Slowest speed that is guided, m/s, 0.5 to 30.
+    pub least_speed_mps: f64,
+    /// The vehicle as the plausibility checks know it.
+    pub vehicle: VehicleParams,
+}
+
+/// What the plausibility checks know of the vehicle. The defaults follow from the paper's tables 8 and 9.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VehicleParams {
+    /// K_t/l, front wheel angle per wheel angle over the wheelbase, 1/m, 0.001 to 0.1.
+    pub curvature_gain_1pm: f64,
+    /// Stability factor `A = m*(l_r*K_r - l_f*K_f)/(2*l^2*K_f*K_r)`, s2/m2, 0 to 0.01.
+    pub stability_factor_s2pm2: f64,
+    /// Aligning torque on the column per lateral acceleration `K_aln*m*l_r/(2*l*K_f)`, N.m.s2/m, 0 to 20.
+    pub aligning_gain_nms2pm: f64,
+    /// B_s, N.m.s/rad, 0 to 10.
+    pub column_damping_nms: f64,
+    /// t'_f of the lane preview's sender, s, 0.1 to 3.
+    pub far_time_s: f64,
 }
 
 impl Params {
@@ -39,6 +65,17 @@ impl Params {
         a_4: 1.0,
         rate_corner_hz: 10.0,
         torque_limit_nm: 5.0,
+        wind_up_nm_per_s: 4.0,
+        reduction_nm_per_s: 8.0,
+        least_speed_mps: 5.0,
+        vehicle: VehicleParams {
+            // (1/17) / 2.635
+            curvature_gain_1pm: 0.022_324,
+            stability_factor_s2pm2: 0.001_753,
+            aligning_gain_nms2pm: 0.987_4,
+            column_damping_nms: 0.57,
+            far_time_s: 0.7,
+        },
     };
 }
 
@@ -73,11 +110,18 @@ impl fmt::Display for ParamError {
 
 impl core::error::Error for ParamError {}
 
-/// The checked configuration of every block of the controller.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Config {
-    pub(crate) law: Law,
-    pub(crate) envelope: Envelope,
+vital! {
+    /// The checked configuration of every block of the controller.
+    pub struct Config {
+        /// Equation (9).
+        pub law: Law,
+        /// Torque limits.
+        pub envelope: Envelope,
+        /// Margins of the input checks.
+        pub plausibility: Plausibility,
+        /// Slowest speed that is guided.
+        pub least_speed: Speed,
+    }
 }
 
 /// Largest product K_1*a', in N.m per unit: keeps the law's wide sum inside an `i64`.
@@ -95,6 +139,7 @@ impl Config {
     /// # Errors
     /// The first parameter that is not a number within its range.
     pub const fn new(p: &Params) -> Result<Self, ParamError> {
+        let v = &p.vehicle;
         let checks = [
             ("k_1", p.k_1, 0.0, 4.0),
             ("a_1", p.a_1, 0.0, 100.0),
@@ -103,6 +148,19 @@ impl Config {
             ("a_4", p.a_4, 0.0, 100.0),
             ("rate_corner_hz", p.rate_corner_hz, 0.5, 60.0),
             ("torque_limit_nm", p.torque_limit_nm, 0.1, 5.0),
+            ("wind_up_nm_per_s", p.wind_up_nm_per_s, 0.5, 4.0),
+            ("reduction_nm_per_s", p.reduction_nm_per_s, 4.0, 8.0),
+            ("least_speed_mps", p.least_speed_mps, 0.5, 30.0),
+            ("vehicle.curvature_gain_1pm", v.curvature_gain_1pm, 0.001, 0.1),
+            (
+                "vehicle.stability_factor_s2pm2",
+                v.stability_factor_s2pm2,
+                0.0,
+                0.01,
+            ),
+            ("vehicle.aligning_gain_nms2pm", v.aligning_gain_nms2pm, 0.0, 20.0),
+            ("vehicle.column_damping_nms", v.column_damping_nms, 0.0, 10.0),
+            ("vehicle.far_time_s", v.far_time_s, 0.1, 3.0),
             ("k_1 * a_1", p.k_1 * p.a_1, 0.0, MAX_GAIN),
             ("k_1 * a_2", p.k_1 * p.a_2, 0.0, MAX_GAIN),
             ("k_1 * a_3", p.k_1 * p.a_3, 0.0, MAX_GAIN),
@@ -132,7 +190,70 @@ impl Config {
             },
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
+                wind_up: Torque::from_nm(p.wind_up_nm_per_s),
+                reduction: Torque::from_nm(p.reduction_nm_per_s),
+                window: Torque::from_nm(1.2),
+                override_from: Torque::from_nm(0.8),
+                override_slope: Gain::from_si(3.0),
             },
+            plausibility: Plausibility {
+                curvature_gain: Gain::from_si(v.curvature_gain_1pm),
+                stability_factor: Gain::from_si(v.stability_factor_s2pm2),
+                aligning_gain: Gain::from_si(v.aligning_gain_nms2pm),
+                column_damping: Gain::from_si(v.column_damping_nms),
+                far_time: Gain::from_si(v.far_time_s),
+                lane_margin: Gain::from_si(0.4),
+                column_margin: Gain::from_si(0.6),
+            },
+            least_speed: Speed::from_mps(p.least_speed_mps),
         })
+    }
+}
+
+/// Everything that parameters decide: the controller's configuration and the monitor's.
+#[derive(Debug, Clone, Copy)]
+pub struct Setup {
+    /// Law, envelope, plausibility.
+    pub config: Config,
+    /// The monitor's own limits.
+    pub monitor: Monitor,
+}
+
+impl Setup {
+    /// The paper's parameters.
+    pub const PAPER: Self = Self {
+        config: Config::PAPER,
+        monitor: Monitor::new(&Params::PAPER),
+    };
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// The first parameter that is not a number within its range.
+    pub const fn new(p: &Params) -> Result<Self, ParamError> {
+        match Config::new(p) {
+            Ok(config) => Ok(Self {
+                config,
+                monitor: Monitor::new(p),
+            }),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+impl Monitor {
+    /// The monitor's own limits, straight from the SI parameters and past the configuration above.
+    #[must_use]
+    pub const fn new(p: &Params) -> Self {
+        Self {
+            limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
+            growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
+            gains_mnm: [
+                (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
+            ],
+        }
     }
 }

@@ -10,6 +10,8 @@
 
 use fixed::types::I8F24;
 
+use crate::vital::Vital;
+
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $from:ident, $get:ident, $unit:literal) => {
         $(#[$doc])*
@@ -20,6 +22,10 @@ macro_rules! quantity {
         impl $name {
             /// Zero.
             pub const ZERO: Self = Self(I8F24::ZERO);
+            /// The least value, -128.
+            pub const MIN: Self = Self(I8F24::MIN);
+            /// The largest value, 128 - 2^-24.
+            pub const MAX: Self = Self(I8F24::MAX);
 
             #[doc = concat!("From ", $unit, ": rounds to nearest, saturates at the ends of the range.")]
             #[must_use]
@@ -46,6 +52,12 @@ macro_rules! quantity {
                 self.0.to_bits()
             }
         }
+
+        impl Vital for $name {
+            fn complement(self) -> Self {
+                Self::from_bits(!self.bits())
+            }
+        }
     };
 }
 
@@ -60,6 +72,10 @@ quantity!(
 quantity!(
     /// An angle, rad.
     Radians, from_rad, rad, "radians"
+);
+quantity!(
+    /// A speed along the road, m/s, forward positive.
+    Speed, from_mps, mps, "metres per second"
 );
 quantity!(
     /// A torque on the steering column, N.m, positive turns left.
@@ -80,20 +96,14 @@ impl Torque {
     }
 }
 
-/// A gain, in the units its name gives it. Format I8F24 like the quantities, range -128 to 128 (exclusive).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Gain(I8F24);
+quantity!(
+    /// A gain or a margin, in the SI units that its field gives it.
+    Gain, from_si, si, "SI units"
+);
 
 impl Gain {
-    /// From SI: rounds to nearest, saturates.
-    #[must_use]
-    pub const fn from_si(si: f64) -> Self {
-        Self(I8F24::from_bits(round_to_bits(si)))
-    }
-
-    pub(crate) const fn bits(self) -> i32 {
-        self.0.to_bits()
-    }
+    /// One.
+    pub const ONE: Self = Self::from_bits(1 << FRAC_BITS);
 }
 
 /// A time span in microseconds, up to 71.6 minutes.
@@ -117,6 +127,12 @@ impl Micros {
     #[must_use]
     pub const fn us(self) -> u32 {
         self.0
+    }
+}
+
+impl Vital for Micros {
+    fn complement(self) -> Self {
+        Self(!self.0)
     }
 }
 
@@ -157,6 +173,23 @@ impl Instant {
     pub const fn after(self, span: Micros) -> Self {
         Self(self.0.wrapping_add(span.0))
     }
+}
+
+impl Vital for Instant {
+    fn complement(self) -> Self {
+        Self(!self.0)
+    }
+}
+
+/// `a * b` of two I8F24 values as I8F24 bits, rounded to nearest.
+pub(crate) const fn product(a: i32, b: i32) -> i64 {
+    shift_round((a as i64).saturating_mul(b as i64), FRAC_BITS)
+}
+
+/// `bits * span / 1 s`, for a span of at most 0.5 s: 2^32 / 10^6 as a multiplier, 8e-6 of relative error.
+pub(crate) const fn per_second_times(bits: i64, span: Micros) -> i64 {
+    let us = if span.us() > 500_000 { 500_000 } else { span.us() };
+    shift_round(bits.saturating_mul((us as i64).saturating_mul(4295)), 32)
 }
 
 /// Nearest `i32`, saturating.

@@ -4,9 +4,13 @@
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Column, Guidance, LanePreview, Message, SimTime};
+use haptic_core::bus::messages::{
+    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ResetCause, SimTime, Vehicle, Warning,
+};
 use haptic_core::envelope::LimitReason;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Torque};
+use haptic_core::faults::{Fault, FaultSet, Record};
+use haptic_core::modes::Mode;
+use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -100,6 +104,7 @@ fn column() {
         let sent = Column {
             driver_torque: Torque::from_nm(torque),
             wheel_angle: Radians::from_rad(angle_deg.to_radians()),
+            motor_torque: Torque::from_nm(-torque / 4.0),
         };
         let frame = sent.encode(i as u8);
         near(signal(&dbc, &frame, "DriverTorque"), torque, 1.0 / 4096.0);
@@ -115,17 +120,87 @@ fn column() {
 }
 
 #[test]
+fn vehicle_and_demand() {
+    let dbc = dbc();
+    for raw in 0..=90 * 256 {
+        let (a, b) = (f64::from(raw) / 256.0, f64::from(90 * 256 - raw) / 256.0);
+        let sent = Vehicle {
+            speeds: [Speed::from_mps(a), Speed::from_mps(b)],
+        };
+        let frame = sent.encode(3);
+        assert_eq!(
+            [signal(&dbc, &frame, "Speed1"), signal(&dbc, &frame, "Speed2")],
+            [a, b]
+        );
+        assert_eq!(decode(sent), sent);
+    }
+    for raw in 0..=128 {
+        let sent = Demand {
+            engage: raw % 2 == 0,
+            authority: Gain::from_si(f64::from(raw) / 128.0),
+        };
+        let frame = sent.encode(3);
+        assert_eq!(signal(&dbc, &frame, "Authority"), f64::from(raw) / 128.0);
+        assert_eq!(signal(&dbc, &frame, "Engage"), f64::from(u8::from(raw % 2 == 0)));
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
 fn guidance() {
     let dbc = dbc();
-    for raw in -20_480..=20_480 {
+    for raw in -20_480..=20_480_i32 {
         let torque = f64::from(raw) / 4096.0;
+        let (code, bits) = (raw.rem_euclid(7), (raw & 0x7FFF) as u16);
         let sent = Guidance {
             torque: Torque::from_nm(torque),
-            limit: LimitReason::NoLaneInput,
+            limit: LimitReason::from_code(i64::from(code)).unwrap(),
+            mode: Mode::from_code(code as u32).unwrap(),
+            warning: raw % 2 == 0,
+            faults: FaultSet::from_bits(bits),
+            reset: ResetCause::from_code(i64::from(code.min(5))).unwrap(),
         };
         let frame = sent.encode(0);
         assert_eq!(signal(&dbc, &frame, "Torque"), torque);
-        assert_eq!(signal(&dbc, &frame, "Limit"), 2.0);
+        assert_eq!(signal(&dbc, &frame, "Limit"), f64::from(code));
+        assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
+        assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
+        assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code.min(5)));
+        for (i, fault) in Fault::ALL.iter().enumerate() {
+            let name = format!("Fault_{fault:?}");
+            assert_eq!(signal(&dbc, &frame, &name), f64::from(bits >> i & 1), "{name}");
+        }
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
+fn warning_and_fault_record() {
+    let dbc = dbc();
+    for (i, fault) in Fault::ALL.into_iter().enumerate() {
+        let mut faults = FaultSet::NONE;
+        faults.insert(fault);
+        let sent = Warning {
+            mode: Mode::Handover,
+            faults,
+        };
+        let frame = sent.encode(0);
+        assert_eq!(signal(&dbc, &frame, "Mode"), 4.0);
+        assert_eq!(signal(&dbc, &frame, &format!("Fault_{fault:?}")), 1.0);
+        assert_eq!(decode(sent), sent);
+        let record = Record {
+            fault,
+            count: 200,
+            age_s: 54_321,
+        };
+        let sent = FaultRecord {
+            index: i as u8,
+            total: 15,
+            record,
+        };
+        let frame = sent.encode(0);
+        let signals = ["Index", "Total", "Fault", "Count", "Age"].map(|name| signal(&dbc, &frame, name));
+        assert_eq!(signals, [i as f64, 15.0, i as f64, 200.0, 54_321.0]);
         assert_eq!(decode(sent), sent);
     }
 }
@@ -182,24 +257,39 @@ fn simulated_time() {
     assert_eq!(SimTime::decode(&Frame::new(0x7F1, frame.data()).unwrap()), None);
 }
 
-#[test]
-fn the_dbc_file_names_every_limit_reason() {
+/// Names that the DBC file gives a signal's codes.
+fn named(signal: &str) -> Vec<(i64, String)> {
     let dbc = dbc();
     let values = dbc.value_descriptions.iter().find_map(|v| match v {
         can_dbc::ValueDescription::Signal {
             name,
             value_descriptions,
             ..
-        } if name == "Guidance_Limit" => Some(value_descriptions),
+        } if name == signal => Some(value_descriptions),
         _ => None,
     });
-    let named: Vec<(i64, String)> = values
+    values
         .unwrap()
         .iter()
         .map(|d| (d.id, d.description.clone()))
-        .collect();
-    let ours: Vec<(i64, String)> = (0..16)
-        .filter_map(|code| LimitReason::from_code(code).map(|reason| (code, format!("{reason:?}"))))
-        .collect();
-    assert_eq!(named, ours);
+        .collect()
+}
+
+/// Names that the code gives them.
+fn coded<T: core::fmt::Debug>(from_code: impl Fn(i64) -> Option<T>) -> Vec<(i64, String)> {
+    (0..16)
+        .filter_map(|code| from_code(code).map(|value| (code, format!("{value:?}"))))
+        .collect()
+}
+
+#[test]
+fn the_dbc_file_names_every_code() {
+    assert_eq!(named("Guidance_Limit"), coded(LimitReason::from_code));
+    assert_eq!(named("Guidance_Mode"), coded(|code| Mode::from_code(code as u32)));
+    assert_eq!(named("Warning_Mode"), coded(|code| Mode::from_code(code as u32)));
+    assert_eq!(named("Guidance_Reset"), coded(ResetCause::from_code));
+    assert_eq!(
+        named("FaultRecord_Fault"),
+        coded(|code| Fault::ALL.get(code as usize).copied())
+    );
 }

@@ -50,7 +50,7 @@ fn frames_of_another_implementation() {
 #[test]
 fn every_flip_of_up_to_three_bits_is_detected() {
     // The CRC is linear, so zero payload stands for all payloads except through the counter's choice of ID.
-    for constant in [0x11, 0x22, 0x5A] {
+    for constant in [0x11, 0x22, 0x33, 0x44, 0x5A, 0x66, 0x77] {
         let protection = Protection::new(constant);
         for counter in 0..16 {
             let mut data = [0; 8];
@@ -73,13 +73,14 @@ fn every_flip_of_up_to_three_bits_is_detected() {
 
 #[test]
 fn a_frame_of_another_message_always_fails() {
-    for (sent, heard) in [(0x11, 0x22), (0x11, 0x5A), (0x22, 0x5A)] {
+    for (sent, heard) in (0..=255)
+        .flat_map(|a| (0..=255).map(move |b| (a, b)))
+        .filter(|(a, b)| a != b)
+    {
         for counter in 0..16 {
             let mut data = [7; 8];
             Protection::new(sent).protect(&mut data, counter);
             assert!(!Protection::new(heard).is_intact(&data));
-            Protection::new(heard).protect(&mut data, counter);
-            assert!(!Protection::new(sent).is_intact(&data));
         }
     }
 }
@@ -103,7 +104,7 @@ fn three_clean_frames_to_trust() {
         hear(&mut state, &[14, 15, 0, 1]),
         [Err(NotTrusted), Err(NotTrusted), Ok(()), Ok(())]
     );
-    state.lose_trust();
+    state = ReceiverState::NEW;
     // A gap, a repetition and a step back each start the count anew.
     assert_eq!(hear(&mut state, &[2, 3, 5, 6, 6, 7, 5, 6]), [Err(NotTrusted); 8]);
     assert_eq!(hear(&mut state, &[7]), [Ok(())]);

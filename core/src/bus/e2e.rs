@@ -9,13 +9,15 @@
 //! three clean frames in a row before it is trusted again. Terms: *delta* is the counter's step from the
 //! last accepted frame, modulo 16.
 
+use crate::vital::vital;
+
 /// Data IDs, one for each counter value.
 const DATA_IDS: [u8; 16] = [
     0xD9, 0xAD, 0xC1, 0x0B, 0x75, 0xF8, 0xE0, 0x7C, 0x7A, 0xE6, 0xAE, 0x92, 0x9B, 0x3E, 0xEA, 0x5E,
 ];
 
 /// Clean frames in a row before a resumed sender is trusted.
-pub const CLEAN_FRAMES_TO_TRUST: u8 = 3;
+pub const CLEAN_FRAMES_TO_TRUST: u32 = 3;
 
 const CRC_TABLE: [u8; 256] = {
     let mut table = [0; 256];
@@ -110,23 +112,31 @@ pub enum Reject {
     NotTrusted,
     /// A signal is outside its range.
     Range,
+    /// The value is further from the last one than a vehicle can move.
+    Step,
 }
 
-/// One receiver's memory of a sender.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReceiverState {
-    last: Option<u8>,
-    clean: u8,
+vital! {
+    /// One receiver's memory of a sender.
+    pub struct ReceiverState {
+        /// Counter of the last frame, [`NONE`] before the first.
+        last: u32,
+        /// Clean frames in a row, as far as they matter.
+        clean: u32,
+    }
 }
+
+/// No counter has been heard.
+const NONE: u32 = 16;
 
 impl ReceiverState {
     /// A sender not yet heard.
-    pub const NEW: Self = Self { last: None, clean: 0 };
-
-    /// Forgets the sender: it was silent past its time-out and has to be trusted anew.
-    pub fn lose_trust(&mut self) {
-        *self = Self::NEW;
-    }
+    pub const NEW: Self = Self { last: NONE, clean: 0 };
+    /// A sender that is trusted from its first frame on, for studies that start in mid-drive.
+    pub const TRUSTED: Self = Self {
+        last: NONE,
+        clean: CLEAN_FRAMES_TO_TRUST,
+    };
 
     /// Judges a frame and remembers its counter. `max_delta` is the largest step that lost frames explain
     /// within the message's time-out.
@@ -137,15 +147,15 @@ impl ReceiverState {
         if !protection.is_intact(data) {
             return Err(Reject::Crc);
         }
-        let counter = data[1] & 0x0F;
-        let delta = self.last.map(|last| counter.wrapping_sub(last) & 0x0F);
+        let counter = u32::from(data[1] & 0x0F);
+        let delta = (self.last != NONE).then(|| counter.wrapping_sub(self.last) & 0x0F);
         if self.clean < CLEAN_FRAMES_TO_TRUST {
             self.clean = if delta == Some(1) {
                 self.clean.saturating_add(1)
             } else {
                 1
             };
-            self.last = Some(counter);
+            self.last = counter;
             return if self.clean < CLEAN_FRAMES_TO_TRUST {
                 Err(Reject::NotTrusted)
             } else {
@@ -155,9 +165,9 @@ impl ReceiverState {
         match delta {
             Some(0) => Err(Reject::Repeated),
             // A frame out of order must not move the counter: the next one in order is still good.
-            Some(delta) if delta > max_delta => Err(Reject::Jump),
+            Some(delta) if delta > u32::from(max_delta) => Err(Reject::Jump),
             _ => {
-                self.last = Some(counter);
+                self.last = counter;
                 Ok(())
             }
         }

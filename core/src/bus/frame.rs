@@ -50,6 +50,11 @@ impl Frame {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
+    /// All eight bytes, those beyond the length zero.
+    pub(crate) const fn bytes(&self) -> &[u8; 8] {
+        &self.data
+    }
+
     /// All eight bytes, if the frame is full.
     pub(crate) fn full_data(&self) -> Option<[u8; 8]> {
         (self.len == 8).then_some(self.data)

@@ -1,0 +1,184 @@
+//! What the ECU hears.
+
+use super::{Message, from_lsb, put, signed, to_lsb, unsigned};
+use crate::bus::e2e::Protection;
+use crate::quantity::{Gain, Metres, Micros, Radians, Speed, Torque, shift_round};
+
+/// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LanePreview {
+    /// e_y' at the near point, +-4 m, LSB 2^-13 m, positive: the target is to the left.
+    pub e_y: Metres,
+    /// e_theta' at the far point, +-0.5 rad, LSB 2^-16 rad.
+    pub e_theta: Radians,
+    /// Age of the sample when the frame was sent, 0 to 51.1 ms, LSB 0.1 ms.
+    pub age: Micros,
+    /// Whether the sender vouches for the errors.
+    pub valid: bool,
+}
+
+impl LanePreview {
+    const E_Y_LSB: u32 = 13;
+    const E_THETA_LSB: u32 = 16;
+    /// +-4 m, the widest error the law is specified for.
+    const E_Y_MAX: i64 = 4 << Self::E_Y_LSB;
+    /// +-0.5 rad, likewise.
+    const E_THETA_MAX: i64 = 1 << (Self::E_THETA_LSB - 1);
+    const AGE_LSB_US: u32 = 100;
+    const AGE_MAX: u32 = 511;
+}
+
+impl Message for LanePreview {
+    const ID: u16 = 0x100;
+    const PROTECTION: Protection = Protection::new(0x11);
+    const MAX_DELTA: u8 = 3;
+
+    fn pack(&self) -> u64 {
+        let age = (self.age.us().saturating_add(Self::AGE_LSB_US / 2) / Self::AGE_LSB_US).min(Self::AGE_MAX);
+        put(to_lsb(self.e_y.bits(), Self::E_Y_LSB, Self::E_Y_MAX), 12, 17)
+            | put(
+                to_lsb(self.e_theta.bits(), Self::E_THETA_LSB, Self::E_THETA_MAX),
+                29,
+                17,
+            )
+            | put(i64::from(age), 46, 9)
+            | put(i64::from(self.valid), 55, 1)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let e_y = signed(word, 12, 17);
+        let e_theta = signed(word, 29, 17);
+        let in_range = e_y.abs() <= Self::E_Y_MAX && e_theta.abs() <= Self::E_THETA_MAX;
+        in_range.then(|| Self {
+            e_y: Metres::from_wide(from_lsb(e_y, Self::E_Y_LSB)),
+            e_theta: Radians::from_wide(from_lsb(e_theta, Self::E_THETA_LSB)),
+            age: Micros::from_us((unsigned(word, 46, 9) as u32).wrapping_mul(Self::AGE_LSB_US)),
+            valid: unsigned(word, 55, 1) != 0,
+        })
+    }
+}
+
+/// The column's sensors, every 2 ms.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Column {
+    /// T_d, +-20 N.m, LSB 2^-12 N.m.
+    pub driver_torque: Torque,
+    /// phi, +-720 deg, LSB 0.01 deg.
+    pub wheel_angle: Radians,
+    /// The torque that the motor delivers, +-7.9 N.m, LSB 2^-12 N.m: what checks the actuator.
+    pub motor_torque: Torque,
+}
+
+impl Column {
+    const TORQUE_LSB: u32 = 12;
+    /// +-20 N.m: no driver turns a wheel harder by hand.
+    const DRIVER_MAX: i64 = 20 << Self::TORQUE_LSB;
+    /// Beyond any guidance torque, so that a motor that delivers too much can say so.
+    const MOTOR_MAX: i64 = (1 << 15) - 1;
+    /// +-720 deg: two turns, lock to lock.
+    const ANGLE_MAX: i64 = 72_000;
+    /// 0.01 deg in 2^-40 rad.
+    const ANGLE_UNIT: i64 = 191_900_981;
+    /// 1 rad in 0.01 deg, with 16 fractional bits.
+    const PER_RADIAN: i64 = 375_493_621;
+}
+
+impl Message for Column {
+    const ID: u16 = 0x110;
+    const PROTECTION: Protection = Protection::new(0x22);
+    const MAX_DELTA: u8 = 14;
+
+    fn pack(&self) -> u64 {
+        let angle = shift_round(
+            i64::from(self.wheel_angle.bits()).saturating_mul(Self::PER_RADIAN),
+            40,
+        )
+        .clamp(-Self::ANGLE_MAX, Self::ANGLE_MAX);
+        put(
+            to_lsb(self.driver_torque.bits(), Self::TORQUE_LSB, Self::DRIVER_MAX),
+            12,
+            18,
+        ) | put(angle, 30, 18)
+            | put(
+                to_lsb(self.motor_torque.bits(), Self::TORQUE_LSB, Self::MOTOR_MAX),
+                48,
+                16,
+            )
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let driver = signed(word, 12, 18);
+        let angle = signed(word, 30, 18);
+        (driver.abs() <= Self::DRIVER_MAX && angle.abs() <= Self::ANGLE_MAX).then(|| Self {
+            driver_torque: Torque::from_wide(from_lsb(driver, Self::TORQUE_LSB)),
+            wheel_angle: Radians::from_wide(shift_round(angle.saturating_mul(Self::ANGLE_UNIT), 16)),
+            motor_torque: Torque::from_wide(from_lsb(signed(word, 48, 16), Self::TORQUE_LSB)),
+        })
+    }
+}
+
+/// The vehicle's speed from two independent sources, every 10 ms.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Vehicle {
+    /// Both speeds, 0 to 90 m/s, LSB 2^-8 m/s.
+    pub speeds: [Speed; 2],
+}
+
+impl Vehicle {
+    const LSB: u32 = 8;
+    /// 324 km/h.
+    const MAX: i64 = 90 << Self::LSB;
+}
+
+impl Message for Vehicle {
+    const ID: u16 = 0x120;
+    const PROTECTION: Protection = Protection::new(0x33);
+    const MAX_DELTA: u8 = 3;
+
+    fn pack(&self) -> u64 {
+        let [a, b] = self.speeds.map(|v| to_lsb(v.bits(), Self::LSB, Self::MAX));
+        put(a, 12, 16) | put(b, 28, 16)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let raw = [signed(word, 12, 16), signed(word, 28, 16)];
+        // Guidance backwards makes no sense: a negative speed is a sender's fault.
+        let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(v));
+        in_range.then(|| Self {
+            speeds: raw.map(|v| Speed::from_wide(from_lsb(v, Self::LSB))),
+        })
+    }
+}
+
+/// What the host wants, every 10 ms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Demand {
+    /// Guidance is wanted.
+    pub engage: bool,
+    /// Share of the law's torque, 0 to 1, LSB 2^-7.
+    pub authority: Gain,
+}
+
+impl Demand {
+    const LSB: u32 = 7;
+    const MAX: i64 = 1 << Self::LSB;
+}
+
+impl Message for Demand {
+    const ID: u16 = 0x130;
+    const PROTECTION: Protection = Protection::new(0x44);
+    const MAX_DELTA: u8 = 3;
+
+    fn pack(&self) -> u64 {
+        let authority = to_lsb(self.authority.bits(), Self::LSB, Self::MAX).max(0);
+        put(i64::from(self.engage), 12, 1) | put(authority, 13, 8)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let authority = unsigned(word, 13, 8);
+        (authority <= Self::MAX).then(|| Self {
+            engage: unsigned(word, 12, 1) != 0,
+            authority: Gain::from_wide(from_lsb(authority, Self::LSB)),
+        })
+    }
+}

@@ -1,0 +1,173 @@
+//! What the ECU says.
+
+use super::{Message, from_lsb, put, signed, to_lsb, unsigned};
+use crate::bus::e2e::Protection;
+use crate::envelope::LimitReason;
+use crate::faults::{Fault, FaultSet, Record};
+use crate::modes::Mode;
+use crate::quantity::Torque;
+
+/// Why the ECU last started.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ResetCause {
+    /// Power came.
+    #[default]
+    PowerOn = 0,
+    /// The watchdog was not fed.
+    Watchdog = 1,
+    /// The processor took a fault.
+    HardFault = 2,
+    /// A software check failed outside the torque path.
+    Panic = 3,
+    /// The stack ran into its guard.
+    StackOverflow = 4,
+    /// Supply voltage fell too low.
+    BrownOut = 5,
+}
+
+impl ResetCause {
+    /// The cause of a code on the bus or in memory that survived the reset.
+    #[must_use]
+    pub const fn from_code(code: i64) -> Option<Self> {
+        Some(match code {
+            0 => Self::PowerOn,
+            1 => Self::Watchdog,
+            2 => Self::HardFault,
+            3 => Self::Panic,
+            4 => Self::StackOverflow,
+            5 => Self::BrownOut,
+            _ => return None,
+        })
+    }
+}
+
+/// The guidance torque that the ECU applies, and its status, every 1 ms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Guidance {
+    /// T_h, +-5 N.m, LSB 2^-12 N.m.
+    pub torque: Torque,
+    /// The limit that acted.
+    pub limit: LimitReason,
+    /// The mode.
+    pub mode: Mode,
+    /// The driver has to take over.
+    pub warning: bool,
+    /// What is wrong, one bit each.
+    pub faults: FaultSet,
+    /// Why the ECU last started.
+    pub reset: ResetCause,
+}
+
+impl Guidance {
+    const TORQUE_LSB: u32 = 12;
+    /// +-5 N.m, the widest profile of the envelope.
+    const TORQUE_MAX: i64 = 5 << Self::TORQUE_LSB;
+
+    /// A torque as this message carries it.
+    #[must_use]
+    pub fn rounded(torque: Torque) -> Torque {
+        Torque::from_wide(from_lsb(
+            to_lsb(torque.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX),
+            Self::TORQUE_LSB,
+        ))
+    }
+}
+
+impl Message for Guidance {
+    const ID: u16 = 0x0C0;
+    const PROTECTION: Protection = Protection::new(0x5A);
+    const MAX_DELTA: u8 = 14;
+
+    fn pack(&self) -> u64 {
+        put(
+            to_lsb(self.torque.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX),
+            12,
+            16,
+        ) | put(i64::from(self.limit as u8), 28, 4)
+            | put(i64::from(self.mode as u8), 32, 4)
+            | put(i64::from(self.warning), 36, 1)
+            | put(i64::from(self.faults.bits()), 37, 15)
+            | put(i64::from(self.reset as u8), 52, 3)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let torque = signed(word, 12, 16);
+        let guidance = Self {
+            torque: Torque::from_wide(from_lsb(torque, Self::TORQUE_LSB)),
+            limit: LimitReason::from_code(unsigned(word, 28, 4))?,
+            mode: Mode::from_code(unsigned(word, 32, 4) as u32)?,
+            warning: unsigned(word, 36, 1) != 0,
+            faults: FaultSet::from_bits(unsigned(word, 37, 15) as u16),
+            reset: ResetCause::from_code(unsigned(word, 52, 3))?,
+        };
+        (torque.abs() <= Self::TORQUE_MAX).then_some(guidance)
+    }
+}
+
+/// The driver has to take over: in the same step as the reaction, then every 100 ms while it holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Warning {
+    /// The mode that made it necessary.
+    pub mode: Mode,
+    /// Why.
+    pub faults: FaultSet,
+}
+
+impl Message for Warning {
+    const ID: u16 = 0x0D0;
+    const PROTECTION: Protection = Protection::new(0x66);
+    const MAX_DELTA: u8 = 14;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.mode as u8), 12, 4) | put(i64::from(self.faults.bits()), 16, 15)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        Some(Self {
+            mode: Mode::from_code(unsigned(word, 12, 4) as u32)?,
+            faults: FaultSet::from_bits(unsigned(word, 16, 15) as u16),
+        })
+    }
+}
+
+/// One line of the fault history, the next every 100 ms, for as long as there is one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FaultRecord {
+    /// Which line.
+    pub index: u8,
+    /// How many lines there are.
+    pub total: u8,
+    /// The line.
+    pub record: Record,
+}
+
+impl Message for FaultRecord {
+    const ID: u16 = 0x300;
+    const PROTECTION: Protection = Protection::new(0x77);
+    const MAX_DELTA: u8 = 14;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.index), 12, 4)
+            | put(i64::from(self.total), 16, 4)
+            | put(i64::from(self.record.fault as u8), 20, 4)
+            | put(i64::from(self.record.count), 24, 8)
+            | put(i64::from(self.record.age_s), 32, 16)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let code = unsigned(word, 20, 4);
+        let fault = Fault::ALL
+            .into_iter()
+            .find(|fault| i64::from(*fault as u8) == code)?;
+        Some(Self {
+            index: unsigned(word, 12, 4) as u8,
+            total: unsigned(word, 16, 4) as u8,
+            record: Record {
+                fault,
+                count: unsigned(word, 24, 8) as u8,
+                age_s: unsigned(word, 32, 16) as u16,
+            },
+        })
+    }
+}

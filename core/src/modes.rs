@@ -1,0 +1,108 @@
+//! The mode machine: one explicit table of what follows what.
+//!
+//! Torque is zero outside Active, Fade and Handover. Nothing re-engages by itself: the only way into Active
+//! is `Engage`, which the controller raises on a rising edge of the request after 500 ms of valid data in
+//! Standby. `docs/safety.md` draws this table, and a test holds the drawing to it.
+//!
+//! Not here: what raises an event, and what the torque does in a mode.
+
+/// What the ECU is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mode {
+    /// Checking itself and its parameters.
+    Boot = 0,
+    /// Ready or waiting for valid inputs; no torque.
+    Standby = 1,
+    /// Guiding.
+    Active = 2,
+    /// Planned end of guidance: the torque falls to zero at 4 N.m/s.
+    Fade = 3,
+    /// An input failed: the last trusted torque fades to zero over 2 s while the driver is warned.
+    Handover = 4,
+    /// The computation, memory, timing or output failed: no torque until the next power-up.
+    Fault = 5,
+    /// No good parameters, or resets in a row: no torque until the next power-up.
+    Locked = 6,
+}
+
+/// What can change a mode, least urgent first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Event {
+    /// The self-test passed.
+    BootPassed = 0,
+    /// An explicit request, with the inputs ready for it.
+    Engage = 1,
+    /// The torque of a fade or a handover has reached zero.
+    Faded = 2,
+    /// The request ended, or the vehicle is too slow to be guided (class A).
+    Disengage = 3,
+    /// An input is stale, frozen or implausible (class B).
+    InputLost = 4,
+    /// The self-test found no usable parameters, or too many resets.
+    BootRejected = 5,
+    /// Computation, memory, deadline or output fault (class C).
+    Critical = 6,
+}
+
+use Mode::{Active, Boot, Fade, Fault, Handover, Locked, Standby};
+
+impl Mode {
+    /// Every mode, in the order of the codes.
+    pub const ALL: [Self; 7] = [Boot, Standby, Active, Fade, Handover, Fault, Locked];
+
+    /// The mode of a code on the bus or in memory.
+    #[must_use]
+    pub const fn from_code(code: u32) -> Option<Self> {
+        Some(match code {
+            0 => Boot,
+            1 => Standby,
+            2 => Active,
+            3 => Fade,
+            4 => Handover,
+            5 => Fault,
+            6 => Locked,
+            _ => return None,
+        })
+    }
+
+    /// The transition table.
+    #[must_use]
+    pub const fn after(self, event: Event) -> Self {
+        match (self, event) {
+            // A fault or a lock ends with the next power-up, and a fault is the last word on any other mode.
+            (Fault | Locked, _) => self,
+            (_, Event::Critical) => Fault,
+            (Boot, Event::BootPassed) => Standby,
+            (Boot, Event::BootRejected) => Locked,
+            (Standby, Event::Engage) => Active,
+            (Active, Event::Disengage) => Fade,
+            (Active, Event::InputLost) => Handover,
+            // The driver's own switch is quicker than the two seconds of a handover.
+            (Handover, Event::Disengage) => Fade,
+            (Fade | Handover, Event::Faded) => Standby,
+            // A fade needs no input, so losing one changes nothing.
+            _ => self,
+        }
+    }
+
+    /// Whether the mode may have a torque at all.
+    #[must_use]
+    pub const fn may_have_torque(self) -> bool {
+        matches!(self, Active | Fade | Handover)
+    }
+}
+
+impl Event {
+    /// Every event, least urgent first.
+    pub const ALL: [Self; 7] = [
+        Self::BootPassed,
+        Self::Engage,
+        Self::Faded,
+        Self::Disengage,
+        Self::InputLost,
+        Self::BootRejected,
+        Self::Critical,
+    ];
+}

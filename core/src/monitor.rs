@@ -1,0 +1,198 @@
+//! The independent monitor: alone holds the permission to drive, renews it every millisecond and withdraws
+//! it for good on disagreement.
+//!
+//! A second, simpler computation in plain `i32` milli-newton-metres. It decodes the frames itself, from the
+//! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
+//! module: a mistake there must not repeat itself here.
+//!
+//! What it refuses: a torque beyond the limit, growing too fast, in a mode without torque, against a driver
+//! who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for.
+//! The last is coarse (proportional part and rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for
+//! 20 ms, or while the torque falls: the envelope may still be bringing an honest change about.
+
+/// Limits in mN.m and per unit; immutable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Monitor {
+    /// L.
+    pub(crate) limit_mnm: i32,
+    /// Largest growth in one millisecond.
+    pub(crate) growth_mnm_per_ms: i32,
+    /// Law, mN.m per m, per rad, per m/s, per rad/s.
+    pub(crate) gains_mnm: [i32; 4],
+}
+
+/// What the monitor remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MonitorState {
+    torque_mnm: i32,
+    driver_mnm: i32,
+    lane: Lane,
+    /// An older lane sample, for rates.
+    before: Lane,
+    astray_ms: i32,
+    permitted: bool,
+}
+
+/// Lane errors as the monitor reads them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Lane {
+    e_y_mm: i32,
+    e_theta_urad: i32,
+    /// Since it was true.
+    age_us: i32,
+}
+
+/// A frame with the time since the last step in mind: what the monitor is shown every millisecond.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Evidence<'a> {
+    /// Bytes of the latest lane preview frame in use, if a new one arrived.
+    pub lane: Option<&'a [u8; 8]>,
+    /// Bytes of the latest column frame in use, if a new one arrived.
+    pub column: Option<&'a [u8; 8]>,
+    /// Bytes of the guidance frame about to leave.
+    pub guidance: &'a [u8; 8],
+    /// Time since the last step, us.
+    pub elapsed_us: u32,
+}
+
+/// Modes as the frame codes them: Active, Fade, Handover.
+const ACTIVE: i32 = 2;
+const LAST_WITH_TORQUE: i32 = 4;
+/// Half an LSB on each side, and the roundings of this file.
+const TOLERANCE_MNM: i32 = 3;
+/// Around the torque that the lane errors ask for.
+const BAND_MNM: i32 = 300;
+/// For how long the torque may be outside that band.
+const ASTRAY_MS: i32 = 20;
+/// Lane data older than this must not move the wheel in Active: the time-out and a camera period.
+const OLDEST_LANE_US: i32 = 40_000;
+/// Override bound: from 0.8 N.m of opposing torque, 3 N.m per N.m, and what two frames' time can change.
+const OVERRIDE_FROM_MNM: i32 = 800;
+const OVERRIDE_SLOPE: i32 = 3;
+const OVERRIDE_SLACK_MNM: i32 = 50;
+/// Rates are taken over at least this.
+const RATE_SPAN_US: i32 = 50_000;
+
+impl MonitorState {
+    /// Nothing seen, permission granted.
+    pub const NEW: Self = Self {
+        torque_mnm: 0,
+        driver_mnm: 0,
+        lane: Lane {
+            e_y_mm: 0,
+            e_theta_urad: 0,
+            age_us: 0,
+        },
+        before: Lane {
+            e_y_mm: 0,
+            e_theta_urad: 0,
+            age_us: 0,
+        },
+        astray_ms: 0,
+        permitted: true,
+    };
+}
+
+impl Monitor {
+    /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
+    /// `false` it is never renewed.
+    #[must_use]
+    pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
+        let elapsed_us = i32::try_from(evidence.elapsed_us)
+            .unwrap_or(i32::MAX)
+            .min(1_000_000);
+        state.observe(evidence, elapsed_us);
+        let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
+        let mode = field(evidence.guidance, 32, 4);
+        let grown = torque
+            .saturating_abs()
+            .saturating_sub(state.torque_mnm.saturating_abs());
+        let allowed = self
+            .growth_mnm_per_ms
+            .saturating_mul(elapsed_us.clamp(1000, 2000))
+            / 1000;
+        state.permitted &= torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
+            && grown <= allowed.saturating_add(TOLERANCE_MNM)
+            && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
+            && self.leaves_the_driver_in_charge(torque, state.driver_mnm)
+            && (mode != ACTIVE || self.follows_the_lane(state, torque));
+        state.torque_mnm = torque;
+        state.permitted
+    }
+
+    /// `abs(T) <= L + 3*(0.8 - opposing)`.
+    fn leaves_the_driver_in_charge(&self, torque: i32, driver: i32) -> bool {
+        let opposing = if torque < 0 {
+            driver
+        } else {
+            driver.saturating_neg()
+        };
+        let shrink = opposing
+            .saturating_sub(OVERRIDE_FROM_MNM)
+            .max(0)
+            .saturating_mul(OVERRIDE_SLOPE);
+        let bound = self.limit_mnm.saturating_sub(shrink).max(0);
+        torque.saturating_abs() <= bound.saturating_add(OVERRIDE_SLACK_MNM)
+    }
+
+    fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
+        if state.lane.age_us > OLDEST_LANE_US && torque != 0 {
+            return false;
+        }
+        let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
+        let (lane, before) = (&state.lane, &state.before);
+        let span_ms = (before.age_us.saturating_sub(lane.age_us) / 1000).max(1);
+        let e_y_mmps = lane.e_y_mm.saturating_sub(before.e_y_mm).saturating_mul(1000) / span_ms;
+        let e_theta_urps =
+            (lane.e_theta_urad.saturating_sub(before.e_theta_urad) / span_ms).saturating_mul(1000);
+        let position = per_m
+            .saturating_mul(lane.e_y_mm)
+            .saturating_div(1000)
+            .saturating_add(per_rad.saturating_mul(lane.e_theta_urad / 100) / 10_000);
+        let rate = per_mps
+            .saturating_mul(e_y_mmps)
+            .saturating_div(1000)
+            .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
+        let both = position.saturating_add(rate);
+        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
+        let high = position.max(both).max(0).saturating_add(BAND_MNM);
+        let low = position.min(both).min(0).saturating_sub(BAND_MNM);
+        let falling = torque.saturating_abs() < state.torque_mnm.saturating_abs();
+        let astray = !(low..=high).contains(&torque) && !falling;
+        state.astray_ms = if astray {
+            state.astray_ms.saturating_add(1)
+        } else {
+            0
+        };
+        state.astray_ms <= ASTRAY_MS
+    }
+}
+
+impl MonitorState {
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) {
+        self.lane.age_us = self.lane.age_us.saturating_add(elapsed_us);
+        self.before.age_us = self.before.age_us.saturating_add(elapsed_us);
+        if let Some(bytes) = evidence.lane {
+            if self.before.age_us.saturating_sub(self.lane.age_us) > RATE_SPAN_US
+                || self.before.age_us > 200_000
+            {
+                self.before = self.lane;
+            }
+            self.lane = Lane {
+                e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
+                e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
+                age_us: (field(bytes, 46, 10) & 0x1FF).saturating_mul(100),
+            };
+        }
+        if let Some(bytes) = evidence.column {
+            self.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
+        }
+    }
+}
+
+/// A signed little-endian bit field.
+fn field(bytes: &[u8; 8], start: u32, length: u32) -> i32 {
+    let up = 64_u32.wrapping_sub(start).wrapping_sub(length);
+    let down = 64_u32.wrapping_sub(length);
+    i64::from_le_bytes(*bytes).wrapping_shl(up).wrapping_shr(down) as i32
+}

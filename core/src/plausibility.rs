@@ -1,0 +1,224 @@
+//! Whether the inputs can be true together: what a CRC cannot see.
+//!
+//! **Lane.** Between two samples the near-point error must move as the vehicle does:
+//! `de_y'/dt = v*e_theta' - L_f*chi_dot` (`L_f = v*t'_f`; `chi_dot`, the rate of the direction of movement,
+//! from wheel angle and speed by the steady-state bicycle model). The change predicted and the change seen
+//! are both summed with a memory of 1 s; the preview is declared implausible when the prediction exceeds
+//! what was seen, in the prediction's direction, by the margin. So a frozen, flipped or too small error is
+//! found when it must have moved; an error that moves *more* than predicted (gust, noise, a camera's scale)
+//! is a valid extreme and meets the envelope only. A yaw error that is frozen or flipped predicts a movement
+//! that does not come, and is found the same way.
+//!
+//! **Column.** Torque in equals torque out: `T_d + T_h = c_a(v)*phi + B_s*dphi/dt`, summed with the same
+//! memory; the inertia (0.11 kg.m2 at hand speeds: 0.02 N.m.s) is far inside the margin. A torque sensor
+//! that is stuck high or has its sign flipped is found by the momentum that does not show in the wheel.
+//!
+//! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump
+//! persists, the input goes stale and is a fault.
+//!
+//! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
+//! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
+
+use crate::law::LaneSample;
+use crate::quantity::{
+    FRAC_BITS, Gain, Instant, Metres, Micros, Radians, Speed, Torque, per_second_times, product,
+};
+use crate::vital::vital;
+
+vital! {
+    /// The vehicle as the checks know it; immutable once validated by [`crate::params`].
+    pub struct Plausibility {
+        /// K_t/l: front wheel angle per wheel angle, over the wheelbase, 1/m.
+        pub(crate) curvature_gain: Gain,
+        /// Stability factor A of the steady-state bicycle, in 2^-24 s2/m2.
+        pub(crate) stability_factor: Gain,
+        /// Aligning torque on the column per lateral acceleration, N.m per m/s2.
+        pub(crate) aligning_gain: Gain,
+        /// B_s, N.m.s/rad.
+        pub(crate) column_damping: Gain,
+        /// t'_f, s.
+        pub(crate) far_time: Gain,
+        /// Margin of the lane check, m.
+        pub(crate) lane_margin: Gain,
+        /// Margin of the column check, N.m.s.
+        pub(crate) column_margin: Gain,
+    }
+}
+
+vital! {
+    /// Sums and last samples.
+    pub struct PlausibilityState {
+        speed: Speed,
+        wheel: Radians,
+        /// Rate of the direction of movement, 2^-24 rad/s.
+        turning: Gain,
+        has_lane: u32,
+        lane: LaneSample,
+        lane_predicted: Gain,
+        lane_seen: Gain,
+        has_column: u32,
+        column_at: Instant,
+        column_sum: Gain,
+    }
+}
+
+impl PlausibilityState {
+    /// Nothing heard yet.
+    pub const NEW: Self = Self {
+        speed: Speed::ZERO,
+        wheel: Radians::ZERO,
+        turning: Gain::ZERO,
+        has_lane: 0,
+        lane: LaneSample {
+            e_y: Metres::ZERO,
+            e_theta: Radians::ZERO,
+            at: Instant::from_us(0),
+        },
+        lane_predicted: Gain::ZERO,
+        lane_seen: Gain::ZERO,
+        has_column: 0,
+        column_at: Instant::from_us(0),
+        column_sum: Gain::ZERO,
+    };
+
+    /// The lane was lost: what comes next has no past.
+    pub fn forget_lane(&mut self) {
+        (self.has_lane, self.lane_predicted, self.lane_seen) = (0, Gain::ZERO, Gain::ZERO);
+    }
+
+    /// The column was lost.
+    pub fn forget_column(&mut self) {
+        (self.has_column, self.column_sum) = (0, Gain::ZERO);
+    }
+}
+
+/// Largest honest change of the near-point error between two samples: 0.3 m, twenty times what 40 m/s and a
+/// yaw error of 0.1 rad give in 8.3 ms.
+const LANE_STEP: Metres = Metres::from_m(0.3);
+/// Likewise for the yaw error: 0.1 rad in 8.3 ms would be 12 rad/s.
+const YAW_STEP: Radians = Radians::from_rad(0.1);
+/// Largest honest change of a speed between two messages: 1 m/s in 10 ms is 10 g.
+const SPEED_STEP: Speed = Speed::from_mps(1.0);
+/// Two sources that differ by this much are not both right.
+const SPEED_SPREAD: Speed = Speed::from_mps(2.0);
+/// The sums forget with this time constant.
+const MEMORY_US: i64 = 1_000_000;
+
+/// Whether a new lane sample is no further from the last than a vehicle can move.
+#[must_use]
+pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
+    distance(last.e_y.bits(), new.e_y.bits()) <= i64::from(LANE_STEP.bits())
+        && distance(last.e_theta.bits(), new.e_theta.bits()) <= i64::from(YAW_STEP.bits())
+}
+
+/// Whether a speed follows from the last one.
+#[must_use]
+pub fn speed_step_is_possible(last: Speed, new: Speed) -> bool {
+    distance(last.bits(), new.bits()) <= i64::from(SPEED_STEP.bits())
+}
+
+/// Whether two sources of speed agree: less than 2 m/s apart.
+#[must_use]
+pub fn speeds_agree(a: Speed, b: Speed) -> bool {
+    distance(a.bits(), b.bits()) < i64::from(SPEED_SPREAD.bits())
+}
+
+fn distance(a: i32, b: i32) -> i64 {
+    i64::from(a).saturating_sub(i64::from(b)).abs()
+}
+
+impl Plausibility {
+    /// Takes the speed in use; returns nothing, for it has no counterpart but its second source.
+    pub fn speed(&self, state: &mut PlausibilityState, speed: Speed) {
+        state.speed = speed;
+        self.update_turning(state);
+    }
+
+    /// Takes driver torque, wheel angle and the guidance torque applied; `false` when they cannot belong
+    /// together.
+    #[must_use]
+    pub fn column(
+        &self,
+        state: &mut PlausibilityState,
+        now: Instant,
+        driver: Torque,
+        wheel: Radians,
+        applied: Torque,
+    ) -> bool {
+        let moved = i64::from(wheel.bits()).saturating_sub(i64::from(state.wheel.bits()));
+        let dt = now.since(state.column_at);
+        if state.has_column != 0 {
+            // Steady-state aligning torque: c_a * v * chi_dot.
+            let lateral = product(state.speed.bits(), state.turning.bits());
+            let aligning = i64::from(self.aligning_gain.bits()).saturating_mul(lateral) >> FRAC_BITS;
+            let torque = i64::from(driver.bits())
+                .saturating_add(i64::from(applied.bits()))
+                .saturating_sub(aligning);
+            let damped = i64::from(self.column_damping.bits()).saturating_mul(moved) >> FRAC_BITS;
+            let change = per_second_times(torque, dt).saturating_sub(damped);
+            state.column_sum = leak(state.column_sum, change, dt);
+        }
+        (state.has_column, state.column_at, state.wheel) = (1, now, wheel);
+        self.update_turning(state);
+        i64::from(state.column_sum.bits()).abs() <= i64::from(self.column_margin.bits())
+    }
+
+    /// Takes a new lane sample; `false` when its error did not move as it must have.
+    #[must_use]
+    pub fn lane(&self, state: &mut PlausibilityState, sample: LaneSample) -> bool {
+        let dt = sample.at.since(state.lane.at);
+        if state.has_lane != 0 && dt.us() != 0 {
+            let heading = product(state.speed.bits(), state.lane.e_theta.bits());
+            let far = product(self.far_time.bits(), state.speed.bits());
+            let turned = (far.saturating_mul(i64::from(state.turning.bits()))) >> FRAC_BITS;
+            let predicted = per_second_times(heading.saturating_sub(turned), dt);
+            let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.e_y.bits()));
+            state.lane_predicted = leak(state.lane_predicted, predicted, dt);
+            state.lane_seen = leak(state.lane_seen, seen, dt);
+        }
+        (state.has_lane, state.lane) = (1, sample);
+        let (predicted, seen) = (
+            i64::from(state.lane_predicted.bits()),
+            i64::from(state.lane_seen.bits()),
+        );
+        let margin = i64::from(self.lane_margin.bits());
+        let missing = if predicted < 0 {
+            seen.saturating_sub(predicted)
+        } else {
+            predicted.saturating_sub(seen)
+        };
+        // Half the margin has to be predicted: a movement that nothing predicts is no proof of a fault.
+        missing <= margin || predicted.abs() <= margin >> 1
+    }
+
+    /// How much of the margins is used up: lane (m), column (N.m.s).
+    #[must_use]
+    pub fn used(state: &PlausibilityState) -> (Metres, Gain) {
+        let predicted = i64::from(state.lane_predicted.bits());
+        let missing = predicted.saturating_sub(i64::from(state.lane_seen.bits()));
+        let missing = if predicted < 0 {
+            missing.wrapping_neg()
+        } else {
+            missing
+        };
+        (Metres::from_wide(missing), state.column_sum)
+    }
+
+    /// `chi_dot = v*K_t*phi / (l*(1 + A*v^2))`, the steady state of the bicycle model.
+    fn update_turning(&self, state: &mut PlausibilityState) {
+        let v = state.speed.bits();
+        let slip = (i64::from(self.stability_factor.bits()).saturating_mul(product(v, v))) >> FRAC_BITS;
+        let divisor = slip.saturating_add(1 << FRAC_BITS);
+        let curvature = product(self.curvature_gain.bits(), state.wheel.bits());
+        let turning = (curvature.saturating_mul(i64::from(v))).checked_div(divisor);
+        state.turning = Gain::from_wide(turning.unwrap_or(0));
+    }
+}
+
+/// A leaking sum: `sum + change - sum*dt/memory`.
+fn leak(sum: Gain, change: i64, dt: Micros) -> Gain {
+    let dt = i64::from(dt.us()).min(MEMORY_US);
+    let sum = i64::from(sum.bits());
+    let kept = sum.saturating_sub(sum.saturating_mul(dt) / MEMORY_US);
+    Gain::from_wide(kept.saturating_add(change))
+}

@@ -1,0 +1,139 @@
+//! Torques that end by themselves: the last trusted torque, and its way to zero.
+//!
+//! A sudden loss of guidance in a curve takes a relying driver 0.44 to 0.62 m off the centreline; the same
+//! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/safety.md has the
+//! table). Neither ramp ever grows.
+
+use heapless::Deque;
+
+use crate::quantity::{Instant, Micros, Torque};
+use crate::vital::vital;
+
+/// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
+pub const HANDOVER: Micros = Micros::from_ms(2000);
+
+/// How far back an output may be trusted.
+pub const HISTORY: Micros = Micros::from_ms(250);
+
+vital! {
+    /// A straight line from a torque to zero.
+    pub struct Ramp {
+        from: Torque,
+        length: Micros,
+        done: Micros,
+    }
+}
+
+impl Ramp {
+    /// Already at zero.
+    pub const NONE: Self = Self {
+        from: Torque::ZERO,
+        length: Micros::from_us(1),
+        done: Micros::from_us(1),
+    };
+
+    /// From `torque` to zero in `length`.
+    #[must_use]
+    pub const fn over(torque: Torque, length: Micros) -> Self {
+        Self {
+            from: torque,
+            length,
+            done: Micros::from_us(0),
+        }
+    }
+
+    /// From `torque` to zero at `rate` per second.
+    #[must_use]
+    pub fn at_rate(torque: Torque, rate: Torque) -> Self {
+        let us = i64::from(torque.abs().bits()).saturating_mul(1_000_000);
+        let us = us.checked_div(i64::from(rate.bits())).unwrap_or(0);
+        Self::over(
+            torque,
+            Micros::from_us(u32::try_from(us).unwrap_or(0).saturating_add(1)),
+        )
+    }
+
+    /// The torque after another `elapsed`.
+    #[must_use]
+    pub fn step(&mut self, elapsed: Micros) -> Torque {
+        self.done = Micros::from_us(self.done.us().saturating_add(elapsed.us()));
+        let left = i64::from(self.length.us().saturating_sub(self.done.us()));
+        let torque = i64::from(self.from.bits()).saturating_mul(left);
+        // The length is never zero by construction; a division that truncates never grows the torque.
+        Torque::from_wide(torque.checked_div(i64::from(self.length.us())).unwrap_or(0))
+    }
+
+    /// Whether zero is reached.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.done >= self.length
+    }
+}
+
+/// The outputs of the last 250 ms, one every 5 ms.
+///
+/// Not kept twice: what comes out of it can only make a handover start lower than the torque applied.
+#[derive(Debug, Clone)]
+pub struct History {
+    outputs: Deque<(Instant, Torque), 51>,
+}
+
+const HISTORY_STEP: Micros = Micros::from_ms(5);
+
+impl History {
+    /// Nothing applied yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            outputs: Deque::new(),
+        }
+    }
+
+    /// Remembers an output.
+    pub fn push(&mut self, now: Instant, torque: Torque) {
+        if self
+            .outputs
+            .back()
+            .is_some_and(|(at, _)| now.since(*at) < HISTORY_STEP)
+        {
+            return;
+        }
+        if self.outputs.is_full() {
+            self.outputs.pop_front();
+        }
+        // There is room: the oldest has just left.
+        let _ = self.outputs.push_back((now, torque));
+    }
+
+    /// The last output before `suspect` time ago: the oldest one kept if that is longer ago than the
+    /// history, zero if there is none.
+    #[must_use]
+    pub fn trusted(&self, now: Instant, suspect: Micros) -> Torque {
+        let before = self.outputs.iter().rev().find(|(at, _)| now.since(*at) > suspect);
+        before
+            .or(self.outputs.front())
+            .map_or(Torque::ZERO, |(_, torque)| *torque)
+    }
+
+    /// Where a handover starts: the smaller of the torque applied and the torque trusted, with the sign of
+    /// the trusted one; zero if their signs differ.
+    #[must_use]
+    pub fn handover_start(&self, now: Instant, suspect: Micros, applied: Torque) -> Torque {
+        let trusted = self.trusted(now, suspect);
+        if (trusted > Torque::ZERO) == (applied > Torque::ZERO) {
+            if trusted.abs() < applied.abs() {
+                trusted
+            } else {
+                applied
+            }
+        } else {
+            Torque::ZERO
+        }
+    }
+}
+
+impl Default for History {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,81 @@
+//! State that must survive a bit flip: kept twice, the second copy inverted.
+//!
+//! A vital struct holds integers and quantities only, so every bit pattern of it is a valid value and
+//! whatever a flip makes of it can be read, compared and refused. Not here: what a refusal leads to.
+
+use core::hint::black_box;
+
+/// A value whose every bit can be inverted and still be a value.
+pub trait Vital: Copy + PartialEq {
+    /// The value with every bit inverted.
+    #[must_use]
+    fn complement(self) -> Self;
+}
+
+impl Vital for u32 {
+    fn complement(self) -> Self {
+        !self
+    }
+}
+
+impl Vital for i32 {
+    fn complement(self) -> Self {
+        !self
+    }
+}
+
+impl<T: Vital, const N: usize> Vital for [T; N] {
+    fn complement(self) -> Self {
+        self.map(T::complement)
+    }
+}
+
+/// Declares a struct of vital fields, laid out as it is written, without padding.
+macro_rules! vital {
+    ($(#[$doc:meta])* $vis:vis struct $name:ident { $($(#[$field_doc:meta])* $field_vis:vis $field:ident: $type:ty,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(C)]
+        $vis struct $name { $($(#[$field_doc])* $field_vis $field: $type,)* }
+
+        impl $crate::vital::Vital for $name {
+            fn complement(self) -> Self {
+                Self { $($field: $crate::vital::Vital::complement(self.$field),)* }
+            }
+        }
+    };
+}
+pub(crate) use vital;
+
+/// A value and its inverted copy.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct Guarded<T> {
+    value: T,
+    inverted: T,
+}
+
+impl<T: Vital> Guarded<T> {
+    /// Both copies.
+    #[must_use]
+    pub fn new(value: T) -> Self {
+        Self {
+            value,
+            inverted: value.complement(),
+        }
+    }
+
+    /// The value, if both copies still agree.
+    #[must_use]
+    pub fn get(&self) -> Option<T> {
+        // Without the black box the compiler may prove, across the loop that owns this value, that the
+        // copies always agree, and drop the comparison.
+        let (value, inverted) = black_box((self.value, self.inverted));
+        (value == inverted.complement()).then_some(value)
+    }
+
+    /// Replaces both copies.
+    pub fn set(&mut self, value: T) {
+        *self = Self::new(value);
+    }
+}
