@@ -1,4 +1,5 @@
 //! The world around the controller, and the workbench that studies it.
 
 pub mod metrics;
+pub mod plot;
 pub mod trace;
