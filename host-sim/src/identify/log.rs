@@ -1,0 +1,462 @@
+//! A recorded drive, read from a CSV file and checked before anything is estimated from it.
+//!
+//! An estimator turns a wrong unit or a hole in the record into a plausible wrong number, so everything that
+//! can be seen to be wrong is refused here, with the line. What is *not* here: any filtering or repair. A log
+//! with a gap is cut by its owner, who knows what happened there.
+//!
+//! Columns: `time_s`, `e_y_m` and `e_theta_rad` (at the driver's near and far point), `wheel_angle_rad`,
+//! `guidance_torque_nm` (the torque really applied, probe included), `driver_torque_nm`. Others are ignored.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+/// Names of the columns that a log must have, in the order of the fields of [`DriveLog`].
+pub const COLUMNS: [&str; 6] = [
+    "time_s",
+    "e_y_m",
+    "e_theta_rad",
+    "wheel_angle_rad",
+    "guidance_torque_nm",
+    "driver_torque_nm",
+];
+
+const GUIDANCE_COLUMN: usize = 4;
+
+/// Largest magnitude that a column may hold, and what a larger one suggests. Chosen so that no drive on a road
+/// reaches it while the usual wrong unit does within the first curve.
+const LIMITS: [(f64, &str); 6] = [
+    (f64::INFINITY, ""),
+    (10.0, "is it in mm?"),
+    // The range of the lane preview on the bus; 1 s ahead on a bend of 0.3 g at 60 km/h it is 0.18 rad.
+    (0.5, "is it in degrees?"),
+    // Hands at ten and two do not go past half a turn.
+    (std::f64::consts::PI, "is it in degrees?"),
+    (50.0, "is it in mN.m?"),
+    (50.0, "is it in mN.m?"),
+];
+
+/// A wheel angle recorded more coarsely than this (about 1.1 deg) is not in radians.
+const COARSEST_WHEEL_STEP_RAD: f64 = 0.02;
+
+/// Share of a sample period by which a time stamp may miss the even grid: 10 % lets stamps rounded to a
+/// millisecond at 120 Hz pass.
+const TIME_STAMP_TOLERANCE: f64 = 0.1;
+
+/// Sample periods that the models here are valid for, s: the muscle's lag of 0.1 s needs 20 Hz at least.
+const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.05);
+
+/// Shortest record, s: a few times the slowest thing to be told from the data (the remnant's corner).
+const SHORTEST_S: f64 = 10.0;
+
+/// A drive as recorded: evenly spaced, finite, in SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveLog {
+    /// Time of the first row, s.
+    pub start_s: f64,
+    /// Sample period, s.
+    pub dt_s: f64,
+    /// e_y at the driver's near point, m.
+    pub e_y_m: Vec<f64>,
+    /// e_theta at the driver's far point, rad.
+    pub e_theta_rad: Vec<f64>,
+    /// Wheel angle phi, rad.
+    pub wheel_angle_rad: Vec<f64>,
+    /// Guidance torque T_h as applied, N.m.
+    pub guidance_torque_nm: Vec<f64>,
+    /// Driver torque T_d as measured, N.m.
+    pub driver_torque_nm: Vec<f64>,
+}
+
+/// Why a log was refused. The text names the line (1 is the header) and the column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogError(String);
+
+impl fmt::Display for LogError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for LogError {}
+
+fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
+    Err(LogError(message.into()))
+}
+
+impl DriveLog {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.driver_torque_nm.len()
+    }
+
+    /// Whether there is no row; never so for a log that was read.
+    pub fn is_empty(&self) -> bool {
+        self.driver_torque_nm.is_empty()
+    }
+
+    /// Time of row `k`, s.
+    pub fn time_s(&self, k: usize) -> f64 {
+        self.start_s + k as f64 * self.dt_s
+    }
+
+    /// Reads and checks the file at `path`. A `manual` drive may lack the guidance column: it is then zero.
+    ///
+    /// # Errors
+    /// The file cannot be read, or what it holds is refused; the text begins with the path.
+    pub fn open(path: &Path, manual: bool) -> Result<Self, LogError> {
+        let named = |e: String| LogError(format!("{}: {e}", path.display()));
+        let file = File::open(path).map_err(|e| named(e.to_string()))?;
+        Self::read(BufReader::new(file), manual).map_err(|e| named(e.0))
+    }
+
+    /// Reads and checks a log from `source`; see [`DriveLog::open`].
+    ///
+    /// # Errors
+    /// A missing or doubled column, a field that is no finite number, a value beyond its column's range, time
+    /// stamps that run backwards, repeat, leave a gap or are uneven, or a record that is too short.
+    pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(source);
+        let header = reader
+            .byte_headers()
+            .map_err(|e| LogError(e.to_string()))?
+            .clone();
+        let index = find_columns(&header, manual)?;
+        let mut columns: [Vec<f64>; 6] = Default::default();
+        let mut lines = Vec::new();
+        let mut record = csv::ByteRecord::new();
+        loop {
+            match reader.read_byte_record(&mut record) {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(e) => return refuse(describe(&e)),
+            }
+            let line = record.position().map_or(0, csv::Position::line);
+            lines.push(line);
+            for (c, column) in columns.iter_mut().enumerate() {
+                column.push(match index[c] {
+                    Some(i) => field(&record, i, line, c)?,
+                    None => 0.0,
+                });
+            }
+        }
+        let [
+            time,
+            e_y_m,
+            e_theta_rad,
+            wheel_angle_rad,
+            guidance_torque_nm,
+            driver_torque_nm,
+        ] = columns;
+        let dt_s = check_time(&time, &lines)?;
+        check_wheel_resolution(&wheel_angle_rad)?;
+        Ok(Self {
+            start_s: time[0],
+            dt_s,
+            e_y_m,
+            e_theta_rad,
+            wheel_angle_rad,
+            guidance_torque_nm,
+            driver_torque_nm,
+        })
+    }
+}
+
+/// Where each of [`COLUMNS`] stands; all that are missing are named at once.
+fn find_columns(header: &csv::ByteRecord, manual: bool) -> Result<[Option<usize>; 6], LogError> {
+    let names: Vec<String> = header
+        .iter()
+        .map(|h| {
+            String::from_utf8_lossy(h)
+                .trim_start_matches('\u{feff}')
+                .trim()
+                .to_owned()
+        })
+        .collect();
+    let mut index = [None; 6];
+    let mut missing = Vec::new();
+    for (c, wanted) in COLUMNS.iter().enumerate() {
+        let mut places = names
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| n == wanted)
+            .map(|(i, _)| i);
+        index[c] = places.next();
+        if places.next().is_some() {
+            return refuse(format!("line 1: column {wanted} is there twice"));
+        }
+        if index[c].is_none() && !(manual && c == GUIDANCE_COLUMN) {
+            // The unit is the last part of a name: a column that differs only there is a likely mistake.
+            let stem = wanted.rsplit_once('_').map_or(*wanted, |(stem, _)| stem);
+            match names.iter().find(|n| n.starts_with(stem)) {
+                Some(near) => missing.push(format!("{wanted} (there is {near}: convert it)")),
+                None => missing.push((*wanted).to_owned()),
+            }
+        }
+    }
+    if !missing.is_empty() {
+        return refuse(format!("line 1: missing column(s): {}", missing.join(", ")));
+    }
+    Ok(index)
+}
+
+fn describe(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths {
+            pos,
+            expected_len,
+            len,
+        } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            format!("line {line}: {len} fields where the header has {expected_len}")
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn field(record: &csv::ByteRecord, i: usize, line: u64, c: usize) -> Result<f64, LogError> {
+    let text = String::from_utf8_lossy(&record[i]);
+    let name = COLUMNS[c];
+    let Ok(value) = text.parse::<f64>() else {
+        return refuse(format!("line {line}: {name} is {text:?}, which is not a number"));
+    };
+    let (limit, hint) = LIMITS[c];
+    if !value.is_finite() {
+        return refuse(format!(
+            "line {line}: {name} is {text}, which is not a finite number"
+        ));
+    }
+    if value.abs() > limit {
+        return refuse(format!(
+            "line {line}: {name} is {value}, outside -{limit:.4} to {limit:.4}: {hint}"
+        ));
+    }
+    Ok(value)
+}
+
+/// Checks the time stamps and returns the sample period, s.
+fn check_time(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
+    if time.len() < 3 {
+        return refuse(format!("the log has {} rows, which is too few", time.len()));
+    }
+    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    if let Some(k) = steps.iter().position(|&d| d <= 0.0) {
+        return refuse(format!(
+            "line {}: time_s goes from {} to {}: it must grow",
+            lines[k + 1],
+            time[k],
+            time[k + 1]
+        ));
+    }
+    steps.sort_by(f64::total_cmp);
+    let usual = steps[steps.len() / 2];
+    let (low, high) = SAMPLE_PERIOD_RANGE_S;
+    if !(low..=high).contains(&usual) {
+        return refuse(format!(
+            "line {}: the step of time_s is {usual}, outside {low} to {high} s: is it in ms?",
+            lines[1]
+        ));
+    }
+    for (k, w) in time.windows(2).enumerate() {
+        let step = w[1] - w[0];
+        if step > 1.5 * usual {
+            return refuse(format!(
+                "line {}: gap of {step:.6} s before it, {:.1} samples of {usual:.6} s are missing",
+                lines[k + 1],
+                step / usual - 1.0
+            ));
+        }
+        if (step - usual).abs() > TIME_STAMP_TOLERANCE * usual {
+            return refuse(format!(
+                "line {}: uneven time stamps, a step of {step:.6} s where the usual one is {usual:.6} s",
+                lines[k + 1]
+            ));
+        }
+    }
+    let span = time[time.len() - 1] - time[0];
+    let dt = span / (time.len() - 1) as f64;
+    // Small deviations of one sign add up to a drift that the step by step check does not see.
+    if let Some(k) = (0..time.len()).find(|&k| (time[k] - time[0] - k as f64 * dt).abs() > 0.5 * dt) {
+        return refuse(format!(
+            "line {}: uneven time stamps, time_s is {} where an even grid has {:.6}",
+            lines[k],
+            time[k],
+            time[0] + k as f64 * dt
+        ));
+    }
+    if span < SHORTEST_S {
+        return refuse(format!("the log covers {span:.3} s, less than {SHORTEST_S} s"));
+    }
+    Ok(dt)
+}
+
+fn check_wheel_resolution(wheel_angle: &[f64]) -> Result<(), LogError> {
+    let step = wheel_angle
+        .windows(2)
+        .map(|w| (w[1] - w[0]).abs())
+        .filter(|&d| d > 1e-12)
+        .fold(f64::INFINITY, f64::min);
+    if step.is_finite() && step > COARSEST_WHEEL_STEP_RAD {
+        let line = wheel_angle
+            .windows(2)
+            .position(|w| (w[1] - w[0]).abs() > 1e-12)
+            .unwrap_or(0)
+            + 3;
+        return refuse(format!(
+            "line {line}: wheel_angle_rad moves by {step:.3} at least, coarser than {COARSEST_WHEEL_STEP_RAD} rad: \
+             is it in degrees?"
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm,driver_torque_nm";
+
+    /// 12 s at 100 Hz; `edit` may change the fields of data row `k` (line `k + 2`).
+    fn text(edit: impl Fn(usize, &mut [String; 6])) -> String {
+        let mut out = HEADER.to_owned();
+        for k in 0..1200 {
+            let t = k as f64 / 100.0;
+            let mut row = [
+                format!("{t:.4}"),
+                format!("{}", 0.01 * t),
+                format!("{}", 0.002 * t),
+                format!("{}", 0.01 * t),
+                "0.1".to_owned(),
+                "-0.2".to_owned(),
+            ];
+            edit(k, &mut row);
+            out.push('\n');
+            out.push_str(&row.join(","));
+        }
+        out
+    }
+
+    fn error(text: &str) -> String {
+        DriveLog::read(text.as_bytes(), false).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_good_log_is_read_whatever_the_order_of_its_columns() {
+        let log = DriveLog::read(text(|_, _| {}).as_bytes(), false).unwrap();
+        assert_eq!(log.len(), 1200);
+        assert!((log.dt_s - 0.01).abs() < 1e-12);
+        assert_eq!((log.guidance_torque_nm[7], log.driver_torque_nm[7]), (0.1, -0.2));
+        assert!((log.time_s(1199) - 11.99).abs() < 1e-9);
+        let mut shuffled =
+            "\u{feff}driver_torque_nm, note ,time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm"
+                .to_owned();
+        for k in 0..1200 {
+            shuffled.push_str(&format!("\n-0.3,word,{},0.5,0.05,0.1,0.2", f64::from(k) / 100.0));
+        }
+        let log = DriveLog::read(shuffled.as_bytes(), false).unwrap();
+        assert_eq!((log.e_y_m[3], log.driver_torque_nm[3]), (0.5, -0.3));
+    }
+
+    #[test]
+    fn every_missing_column_is_named_with_its_likely_stand_in() {
+        let e = error("time_s,e_y_m,wheel_angle_deg,driver_torque_nm\n0,0,0,0");
+        assert!(
+            e.contains("e_theta_rad, wheel_angle_rad (there is wheel_angle_deg"),
+            "{e}"
+        );
+        assert!(e.contains("guidance_torque_nm") && !e.contains("e_y_m"), "{e}");
+        assert!(error("time_s,time_s,e_y_m").contains("time_s is there twice"));
+    }
+
+    #[test]
+    fn a_manual_log_may_lack_the_guidance_column() {
+        let without: String = text(|_, _| {})
+            .lines()
+            .map(|l| {
+                let mut f: Vec<&str> = l.split(',').collect();
+                f.remove(4);
+                f.join(",") + "\n"
+            })
+            .collect();
+        let log = DriveLog::read(without.as_bytes(), true).unwrap();
+        assert!(log.guidance_torque_nm.iter().all(|&t| t == 0.0));
+        assert!(error(&without).contains("missing column(s): guidance_torque_nm"));
+    }
+
+    #[test]
+    fn what_is_no_finite_number_is_named_with_line_and_column() {
+        let e = error(&text(|k, r| {
+            if k == 40 {
+                r[2] = "nan".to_owned();
+            }
+        }));
+        assert!(e.starts_with("line 42: e_theta_rad is nan"), "{e}");
+        let e = error(&text(|k, r| {
+            if k == 0 {
+                r[5] = "3;1".to_owned();
+            }
+        }));
+        assert!(e.starts_with("line 2: driver_torque_nm is \"3;1\""), "{e}");
+        let e = error(&text(|k, r| {
+            if k == 9 {
+                r[5] = "1,2".to_owned();
+            }
+        }));
+        assert_eq!(e, "line 11: 7 fields where the header has 6");
+    }
+
+    #[test]
+    fn time_that_stops_jumps_or_limps_is_named_with_its_line() {
+        let e = error(&text(|k, r| {
+            if k == 5 {
+                r[0] = "0.04".to_owned();
+            }
+        }));
+        assert!(e.starts_with("line 7: time_s goes from 0.04 to 0.04"), "{e}");
+        let e = error(&text(|k, r| {
+            r[0] = format!("{}", k as f64 / 100.0 + if k > 600 { 0.1 } else { 0.0 })
+        }));
+        assert!(
+            e.starts_with("line 603: gap of 0.110000 s before it, 10.0 samples"),
+            "{e}"
+        );
+        let e = error(&text(|k, r| {
+            r[0] = format!("{}", k as f64 / 100.0 + if k == 300 { 0.002 } else { 0.0 })
+        }));
+        assert!(e.starts_with("line 302: uneven time stamps"), "{e}");
+        // 100 Hz for the first half, 95 Hz for the second: each step passes alone, the sum does not.
+        let e = error(&text(|k, r| {
+            r[0] = format!("{}", k as f64 / 100.0 + k.saturating_sub(600) as f64 / 1900.0)
+        }));
+        assert!(e.contains("uneven time stamps"), "{e}");
+        assert!(error(&text(|k, r| r[0] = format!("{}", 10 * k))).contains("is it in ms?"));
+        // Stamps rounded to a millisecond at 120 Hz are even enough.
+        let rounded = text(|k, r| r[0] = format!("{:.3}", k as f64 / 120.0 * 1.2));
+        assert!(DriveLog::read(rounded.as_bytes(), false).is_ok());
+    }
+
+    #[test]
+    fn degrees_and_millinewtons_are_seen() {
+        let e = error(&text(|k, r| r[3] = format!("{}", 0.01 * k as f64)));
+        assert!(e.starts_with("line 317: wheel_angle_rad is 3.15"), "{e}");
+        assert!(e.ends_with("is it in degrees?"), "{e}");
+        let e = error(&text(|k, r| r[3] = format!("{:.1}", 0.002 * k as f64)));
+        assert!(e.contains("wheel_angle_rad moves by 0.100 at least"), "{e}");
+        let e = error(&text(|k, r| r[2] = format!("{}", 0.01 * k as f64)));
+        assert!(e.starts_with("line 53: e_theta_rad is 0.51"), "{e}");
+        assert!(error(&text(|_, r| r[5] = "-200".to_owned())).contains("line 2: driver_torque_nm is -200"));
+        assert!(error(&text(|_, r| r[1] = "120".to_owned())).contains("is it in mm?"));
+    }
+
+    #[test]
+    fn a_short_log_is_refused() {
+        let short: String = text(|_, _| {})
+            .lines()
+            .take(500)
+            .map(|l| l.to_owned() + "\n")
+            .collect();
+        assert!(error(&short).contains("covers 4.980 s"));
+        assert!(error(HEADER).contains("0 rows"));
+    }
+}
