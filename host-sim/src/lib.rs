@@ -1,5 +1,6 @@
 //! The world around the controller, and the workbench that studies it.
 
+pub mod identify;
 pub mod metrics;
 pub mod plot;
 pub mod trace;

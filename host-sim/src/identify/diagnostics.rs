@@ -1,0 +1,145 @@
+//! Is the model enough? Fit, whiteness of the residuals, and their independence of the inputs.
+//!
+//! Sources: Ljung and Box, "On a measure of lack of fit in time series models", Biometrika 65 (1978); Ljung,
+//! "System Identification", section 16.6 (residual analysis).
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::result::{InputCorrelation, Whiteness};
+
+/// Lags of the whiteness test.
+const LAGS: usize = 25;
+
+/// Span of the input correlation test, s, and its lags.
+const INPUT_SPAN_S: f64 = 1.0;
+const INPUT_LAGS: usize = 20;
+
+/// Fit of `model` to `measured` in %: 100*(1 - |y - yhat|/|y - mean y|). 100 is perfect, 0 is what the mean does.
+pub fn fit_percent(measured: &[f64], model: impl Iterator<Item = f64>) -> f64 {
+    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+    let (mut error, mut spread) = (0.0, 0.0);
+    for (&y, m) in measured.iter().zip(model) {
+        error += (y - m).powi(2);
+        spread += (y - mean).powi(2);
+    }
+    // A constant record has no spread: no model can be said to fit it.
+    if spread > 0.0 {
+        100.0 * (1.0 - (error / spread).sqrt())
+    } else {
+        0.0
+    }
+}
+
+/// Ljung-Box test of `residual`, of which `estimated` noise parameters were fitted.
+pub(crate) fn whiteness(residual: &[f64], estimated: usize) -> Whiteness {
+    let n = residual.len() as f64;
+    let power: f64 = residual.iter().map(|e| e * e).sum();
+    let lags = LAGS.min(residual.len() / 4);
+    let mut largest: f64 = 0.0;
+    let mut statistic = 0.0;
+    if power > 0.0 {
+        for lag in 1..=lags {
+            let r = residual
+                .iter()
+                .zip(&residual[lag..])
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / power;
+            statistic += n * (n + 2.0) * r * r / (n - lag as f64);
+            if r.abs() > largest.abs() {
+                largest = r;
+            }
+        }
+    }
+    let freedom = (lags - estimated.min(lags - 1)) as f64;
+    let p_value = ChiSquared::new(freedom).map_or(0.0, |d| d.sf(statistic));
+    Whiteness {
+        largest_autocorrelation: largest,
+        lags,
+        statistic,
+        p_value,
+        white: p_value >= 0.01,
+    }
+}
+
+/// Cross-correlation of `residual` with the past of each input. For a white residual that is independent of the
+/// input's past, each correlation times sqrt(n) is standard normal.
+pub(crate) fn input_correlation(
+    residual: &[f64],
+    inputs: &[(&'static str, &[f64])],
+    dt_s: f64,
+) -> Vec<InputCorrelation> {
+    let stride = ((INPUT_SPAN_S / dt_s) as usize / INPUT_LAGS).max(1);
+    let power: f64 = residual.iter().map(|e| e * e).sum();
+    inputs
+        .iter()
+        .map(|&(input, u)| {
+            let mean = u.iter().sum::<f64>() / u.len() as f64;
+            let mut largest_z: f64 = 0.0;
+            for lag in (0..=INPUT_LAGS)
+                .map(|i| i * stride)
+                .filter(|&l| l < residual.len())
+            {
+                let (mut cross, mut energy) = (0.0, 0.0);
+                for (e, x) in residual[lag..].iter().zip(u) {
+                    cross += e * (x - mean);
+                    energy += (x - mean) * (x - mean);
+                }
+                let norm = (power * energy).sqrt();
+                if norm > 0.0 {
+                    let z = cross / norm * (residual.len() as f64).sqrt();
+                    if z.abs() > largest_z.abs() {
+                        largest_z = z;
+                    }
+                }
+            }
+            InputCorrelation {
+                input,
+                largest_z,
+                independent: largest_z.abs() <= 3.3,
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fit_of_hand_made_series() {
+        // |y - yhat| = 1, |y - mean| = sqrt(2): 100 * (1 - 1/sqrt 2) = 29.289.
+        let fit = fit_percent(&[1.0, 2.0, 3.0], [1.0, 2.0, 4.0].into_iter());
+        assert!((fit - 29.289_321_9).abs() < 1e-6);
+        assert_eq!(fit_percent(&[1.0, 2.0, 3.0], [1.0, 2.0, 3.0].into_iter()), 100.0);
+        assert_eq!(fit_percent(&[2.0, 2.0], [2.0, 2.0].into_iter()), 0.0);
+    }
+
+    /// A period-2 series of length n has r_1 = -(n-1)/n and r_2 = (n-2)/n, so the statistic is far beyond any
+    /// chi-square point; one impulse has r = 0 at every lag.
+    #[test]
+    fn a_square_wave_is_not_white_and_an_impulse_is() {
+        let alternating: Vec<f64> = (0..400).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let w = whiteness(&alternating, 2);
+        assert!((w.largest_autocorrelation + 399.0 / 400.0).abs() < 1e-12);
+        assert!(w.p_value < 1e-9 && !w.white);
+        let mut impulse = vec![0.0; 400];
+        impulse[17] = 1.0;
+        let w = whiteness(&impulse, 2);
+        assert_eq!((w.statistic, w.p_value, w.white), (0.0, 1.0, true));
+    }
+
+    /// The residual is the input of 6 samples before: correlation 1 at that lag, so z = sqrt(n) there up to the
+    /// ends, and independence is denied. The other input is zero and says nothing.
+    #[test]
+    fn a_residual_that_repeats_an_input_is_seen() {
+        let u: Vec<f64> = (0..1000)
+            .map(|k| if k / 4 % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        let residual: Vec<f64> = (0..1000).map(|k| if k >= 6 { u[k - 6] } else { 0.0 }).collect();
+        let zero = vec![0.0; 1000];
+        let tests = input_correlation(&residual, &[("a", &u), ("b", &zero)], 1.0 / 120.0);
+        assert!((tests[0].largest_z - 1000.0_f64.sqrt()).abs() < 1.0 && !tests[0].independent);
+        assert!(tests[1].independent && tests[1].largest_z == 0.0);
+    }
+}

@@ -1,0 +1,30 @@
+//! From a recorded drive to the driver's parameters, their uncertainty, and a verdict on whether the data can
+//! carry them.
+//!
+//! Two estimators share one log, one muscle and one form of result: [`noise_model`] (the default) and
+//! [`paper`] (the published way, kept as the baseline it is compared with). Terms: *a_1, a_2, a_3, t_p, K_d,
+//! K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
+//! and a_i; the *remnant* is the part of the driver's torque that no linear model of the inputs explains.
+//!
+//! What is not here: driving (the models do that), sets of drives (the studies), and the command line.
+
+mod diagnostics;
+mod log;
+mod noise_model;
+mod options;
+mod paper;
+mod result;
+mod search;
+mod signals;
+
+pub use diagnostics::fit_percent;
+pub use log::{COLUMNS, DriveLog, LogError};
+pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};
+pub use options::{FixError, Options};
+pub use paper::{TABLE_4, identify as identify_as_published};
+pub use result::{
+    Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start,
+    Traces, Whiteness,
+};
+pub use search::Termination;
+pub use signals::Muscle;

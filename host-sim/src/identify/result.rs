@@ -1,0 +1,288 @@
+//! What an identification says, and when it says that it cannot say.
+//!
+//! **Identified**: the parameter's 95 % interval is at most 40 % as wide as its variation interval (table 4 of
+//! the paper for a_i, K_d and K_hg; the search interval for t_p; the variation interval of a_i times the
+//! default K_d + K_nms = 4 for `gain_i`), i.e. its standard error is at most 0.102 of that width; and, if the
+//! optimum is on a bound, the unbounded optimum is within three standard errors of the bound, so that the
+//! bound trims noise and does not hide a contradiction. A parameter that is not identified has no `estimate`.
+//! What the search ended on is kept in `optimum`, for those who want to see where a method would have put it.
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::search::{Bounds, Termination};
+
+/// One parameter of the driver.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Parameter {
+    /// The estimate; none where the data do not identify the parameter.
+    pub estimate: Option<f64>,
+    /// Standard error; none where the data put no bound on it at all.
+    pub standard_error: Option<f64>,
+    /// 95 % interval, cut to the range that the parameter can have.
+    pub interval_95: Option<[f64; 2]>,
+    /// Whether the data identify it.
+    pub identified: bool,
+    /// Whether the optimum lies on a bound of the search.
+    pub on_bound: bool,
+    /// Whether it was given, not estimated.
+    pub fixed: bool,
+    /// Where the search ended; none if the parameter is not part of the method's model.
+    pub optimum: Option<f64>,
+}
+
+impl Parameter {
+    /// Not part of the model.
+    pub(crate) const ABSENT: Self = Self {
+        estimate: None,
+        standard_error: None,
+        interval_95: None,
+        identified: false,
+        on_bound: false,
+        fixed: false,
+        optimum: None,
+    };
+
+    pub(crate) fn fixed(value: f64) -> Self {
+        Self {
+            estimate: Some(value),
+            standard_error: Some(0.0),
+            interval_95: Some([value, value]),
+            identified: true,
+            on_bound: false,
+            fixed: true,
+            optimum: Some(value),
+        }
+    }
+
+    /// From where the search ended, the point that it would have reached without bounds (to first order) and
+    /// the variance there.
+    pub(crate) fn estimated(
+        optimum: f64,
+        unbounded: f64,
+        variance: f64,
+        bounds: Bounds,
+        variation_width: f64,
+    ) -> Self {
+        let on_bound = bounds.touches(optimum);
+        let determined = variance.is_finite() && unbounded.is_finite();
+        let standard_error = variance.max(0.0).sqrt();
+        let identified = determined
+            && STANDARD_NORMAL_95 * standard_error <= 0.5 * WIDEST_INTERVAL_SHARE * variation_width
+            && (!on_bound || (unbounded - optimum).abs() <= 3.0 * standard_error);
+        Self {
+            estimate: identified.then_some(optimum),
+            standard_error: determined.then_some(standard_error),
+            interval_95: determined.then(|| {
+                [-1.0, 1.0].map(|s| {
+                    (unbounded + s * STANDARD_NORMAL_95 * standard_error).clamp(bounds.low, bounds.high)
+                })
+            }),
+            identified,
+            on_bound,
+            fixed: false,
+            optimum: Some(optimum),
+        }
+    }
+
+    /// The parameter times a known `factor`.
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        Self {
+            estimate: self.estimate.map(|x| x * factor),
+            standard_error: self.standard_error.map(|x| x * factor.abs()),
+            interval_95: self.interval_95.map(|i| i.map(|x| x * factor)),
+            optimum: self.optimum.map(|x| x * factor),
+            ..self
+        }
+    }
+}
+
+/// 97.5 % point of the standard normal distribution.
+pub(crate) const STANDARD_NORMAL_95: f64 = 1.959_964;
+
+/// Widest 95 % interval of an identified parameter, as a share of its variation interval.
+const WIDEST_INTERVAL_SHARE: f64 = 0.4;
+
+/// The driver's parameters, keyed as in table 4 (lower case), and the combinations that T_d alone carries.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameters {
+    /// Gain on e_y, 1/m.
+    pub a_1: Parameter,
+    /// Gain on the integral of e_y, 1/(m.s).
+    pub a_2: Parameter,
+    /// Gain on e_theta.
+    pub a_3: Parameter,
+    /// Processing delay, s.
+    pub t_p: Parameter,
+    /// Gain from target angle to torque, N.m/rad.
+    pub k_d: Parameter,
+    /// Reaction to the guidance torque, 0 (relies on it) to 1.
+    pub k_hg: Parameter,
+    /// (K_d + K_nms)*a_1, N.m/m.
+    pub gain_1: Parameter,
+    /// (K_d + K_nms)*a_2, N.m/(m.s).
+    pub gain_2: Parameter,
+    /// (K_d + K_nms)*a_3, N.m/rad.
+    pub gain_3: Parameter,
+}
+
+impl Parameters {
+    /// Every parameter with its key and unit, in the order of print.
+    pub fn list(&self) -> [(&'static str, &'static str, &Parameter); 9] {
+        [
+            ("gain_1", "N.m/m", &self.gain_1),
+            ("gain_2", "N.m/(m.s)", &self.gain_2),
+            ("gain_3", "N.m/rad", &self.gain_3),
+            ("t_p", "s", &self.t_p),
+            ("k_hg", "-", &self.k_hg),
+            ("k_d", "N.m/rad", &self.k_d),
+            ("a_1", "1/m", &self.a_1),
+            ("a_2", "1/(m.s)", &self.a_2),
+            ("a_3", "-", &self.a_3),
+        ]
+    }
+}
+
+/// A difference that the data determine although its parts they do not: along it, the loss is flat.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Combination {
+    /// Such as `gain_3 - 7.08*k_hg`.
+    pub name: String,
+    /// Estimate of the combination.
+    pub estimate: f64,
+    /// Standard error of the combination.
+    pub standard_error: f64,
+}
+
+/// Correlation of the estimation errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Correlation {
+    /// Keys of rows and columns.
+    pub names: Vec<&'static str>,
+    /// Symmetric, ones on the diagonal; none where a variance is zero or unbounded.
+    pub matrix: Vec<Vec<Option<f64>>>,
+}
+
+impl Correlation {
+    /// Of the `free` parameters that have a name, from the covariance of the errors.
+    pub(crate) fn new(names: &[Option<&'static str>], errors: &DMatrix<f64>, free: &[usize]) -> Self {
+        let shown: Vec<(usize, &'static str)> =
+            free.iter().filter_map(|&i| names[i].map(|n| (i, n))).collect();
+        let entry = |i: usize, j: usize| {
+            let c = errors[(i, j)] / (errors[(i, i)] * errors[(j, j)]).sqrt();
+            c.is_finite()
+                .then(|| if i == j { 1.0 } else { c.clamp(-1.0, 1.0) })
+        };
+        Self {
+            names: shown.iter().map(|s| s.1).collect(),
+            matrix: shown
+                .iter()
+                .map(|&(i, _)| shown.iter().map(|&(j, _)| entry(i, j)).collect())
+                .collect(),
+        }
+    }
+}
+
+/// The disturbance that the noise model estimated beside the driver: a first-order low-passed remnant and white
+/// sensor noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Remnant {
+    /// Corner of the low-pass, Hz; none if the disturbance is no low-passed one.
+    pub corner_hz: Option<f64>,
+    /// Standard deviation of the low-passed part, N.m.
+    pub sd_nm: Option<f64>,
+    /// Standard deviation of the white part, N.m.
+    pub white_sd_nm: f64,
+    /// Standard deviation of the one-step prediction error, N.m.
+    pub innovation_sd_nm: f64,
+}
+
+/// Whether the residuals are white, as they must be for the standard errors to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Whiteness {
+    /// Largest autocorrelation over the lags tested.
+    pub largest_autocorrelation: f64,
+    /// Lags tested.
+    pub lags: usize,
+    /// Ljung-Box statistic over those lags.
+    pub statistic: f64,
+    /// Probability of a larger statistic if the residuals are white.
+    pub p_value: f64,
+    /// `p_value` at least 0.01.
+    pub white: bool,
+}
+
+/// Whether the residuals are independent of an input's past: if not, the model misses something of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct InputCorrelation {
+    /// Column of the log.
+    pub input: &'static str,
+    /// Largest cross-correlation with the input of 0 to 1 s before, in standard deviations of what independence
+    /// gives.
+    pub largest_z: f64,
+    /// `largest_z` at most 3.3 (0.1 % for one lag).
+    pub independent: bool,
+}
+
+/// One start of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Start {
+    /// Delay that it began from, s.
+    pub from_t_p_s: f64,
+    /// Delay that it ended at, s.
+    pub to_t_p_s: f64,
+    /// Loss that it ended at.
+    pub loss: f64,
+}
+
+/// Signals to plot: measured and explained torque over the rows used.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Traces {
+    /// Time, s.
+    pub time_s: Vec<f64>,
+    /// Measured driver torque, N.m.
+    pub measured_nm: Vec<f64>,
+    /// Driver torque simulated from the inputs alone, N.m.
+    pub simulated_nm: Vec<f64>,
+    /// Residuals that the loss is made of, N.m: prediction errors of the noise model, measured minus simulated
+    /// of the paper's method.
+    pub residual_nm: Vec<f64>,
+}
+
+/// Result of one identification.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Identification {
+    /// `noise-model` or `paper`.
+    pub method: &'static str,
+    /// Fit of the simulated driver torque, 100*(1 - |y - yhat|/|y - mean y|), %.
+    pub fit_percent: f64,
+    /// Same, of the one-step prediction; none for the paper's method, which has no predictor.
+    pub fit_percent_predicted: Option<f64>,
+    /// Same, of the second output phi_target against the wheel angle; none for the noise model, which has none.
+    pub fit_percent_wheel_angle: Option<f64>,
+    /// The driver.
+    pub parameters: Parameters,
+    /// What is determined where single parameters are not.
+    pub combinations: Vec<Combination>,
+    /// Correlation of the errors of the free parameters.
+    pub correlation: Correlation,
+    /// The disturbance; none for the paper's method, which assumes white noise.
+    pub remnant: Option<Remnant>,
+    /// Test of the residuals.
+    pub whiteness: Whiteness,
+    /// Test of the residuals against each input.
+    pub input_correlation: Vec<InputCorrelation>,
+    /// Starts of the search; the first is the one reported.
+    pub starts: Vec<Start>,
+    /// Loss at the start and after every accepted step.
+    pub loss_history: Vec<f64>,
+    /// Why the search ended.
+    pub termination: Termination,
+    /// Rows of the log that the loss is taken over.
+    pub rows: usize,
+    /// Sentences on what the data or the log could not give.
+    pub notes: Vec<String>,
+    /// Signals to plot.
+    #[serde(skip)]
+    pub traces: Traces,
+}
