@@ -3,4 +3,5 @@
 pub mod identify;
 pub mod metrics;
 pub mod plot;
+pub mod report;
 pub mod trace;

@@ -1,6 +1,6 @@
 //! Colours, dashes and the few shapes that a figure is made of.
 
-use super::page::UNIT;
+use super::page::{PAGE_WIDTH, UNIT};
 use plotters::coord::Shift;
 use plotters::element::{DashedPathElement, PathElement};
 use plotters::prelude::{DrawingArea, DrawingBackend};
@@ -54,6 +54,10 @@ pub(super) const STYLES: [Style; 7] = [
 ];
 const LINE_WIDTH: u32 = 7;
 
+/// Beyond five page widths a line is a scribble: its dashes cannot be read, and as separate strokes they would
+/// make an SVG of megabytes. It is drawn solid.
+const LONGEST_DASHED: f64 = (5 * PAGE_WIDTH * UNIT) as f64;
+
 /// What stands for something in the legend.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Key {
@@ -104,13 +108,19 @@ pub(super) fn draw_marker<DB: DrawingBackend>(
     )
 }
 
+fn length(path: &[(i32, i32)]) -> f64 {
+    path.windows(2)
+        .map(|p| f64::hypot(f64::from(p[1].0 - p[0].0), f64::from(p[1].1 - p[0].1)))
+        .sum()
+}
+
 fn draw_path<DB: DrawingBackend>(
     area: &DrawingArea<DB, Shift>,
     path: Vec<(i32, i32)>,
     style: ShapeStyle,
     dash: Option<(i32, i32)>,
 ) -> DrawResult<DB> {
-    match dash {
+    match dash.filter(|_| length(&path) < LONGEST_DASHED) {
         None => area.draw(&PathElement::new(path, style)),
         Some((dash, gap)) => area.draw(&DashedPathElement::new(
             path,

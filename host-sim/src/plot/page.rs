@@ -9,7 +9,7 @@ use plotters::style::{FontDesc, FontFamily, FontStyle};
 /// Units of the drawing library in a point.
 pub(super) const UNIT: i32 = 4;
 
-const PAGE_WIDTH: i32 = 900;
+pub(super) const PAGE_WIDTH: i32 = 900;
 pub(super) const MARGIN: i32 = 12;
 pub(super) const TITLE_HEIGHT: i32 = 30;
 pub(super) const LEGEND_ROW: i32 = 24;
