@@ -19,7 +19,7 @@ use crate::modes::Mode;
 use crate::monitor::{Evidence, Monitor, MonitorState};
 use crate::params::{Config, Setup};
 use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
-use crate::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
+use crate::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
 use crate::vital::{Guarded, Vital, vital};
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -178,6 +178,8 @@ pub struct Ecu {
     warned_at: Option<u32>,
 }
 
+/// Spans beyond half a wrap of the clock are negative.
+const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 /// Warnings and lines of the fault history come every so many steps.
 const TURN: u32 = 100;
 /// The monitor is tested every so many steps: twice a second.
@@ -268,11 +270,15 @@ impl Ecu {
                     e_theta: lane.e_theta,
                     at,
                 };
-                if v.lane
-                    .last()
-                    .is_some_and(|last| !lane_step_is_possible(&last, &sample))
-                {
-                    return Err(Reject::Step);
+                if let Some(last) = v.lane.last() {
+                    // A span of almost a whole wrap of the clock is a step back in time: what differences
+                    // samples would take it for a gap and start anew.
+                    if at.since(last.at) > HALF_WRAP {
+                        return Err(Reject::Older);
+                    }
+                    if !lane_step_is_possible(&last, &sample) {
+                        return Err(Reject::Step);
+                    }
                 }
                 v.lane.put(sample, at);
                 self.lane_bytes = frame.full_data();

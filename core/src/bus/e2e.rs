@@ -114,6 +114,8 @@ pub enum Reject {
     Range,
     /// The value is further from the last one than a vehicle can move.
     Step,
+    /// The sample was true before the last one was.
+    Older,
 }
 
 vital! {
