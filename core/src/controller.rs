@@ -8,7 +8,7 @@ use crate::modes::{Event, Mode};
 use crate::params::Config;
 use crate::plausibility::{PlausibilityState, speeds_agree};
 use crate::quantity::{Gain, Instant, Micros, Radians, Speed, Torque, product};
-use crate::ramp::{HANDOVER, HISTORY, History, Ramp};
+use crate::ramp::{HANDOVER, HISTORY, History, Ramp, lesser};
 use crate::vital::{Guarded, vital};
 
 /// Inputs must be valid for this long in Standby before a request can engage.
@@ -453,7 +453,8 @@ impl Step<'_> {
     fn torque(&self, v: &mut Vitals, mode: Mode) -> (Torque, LimitReason) {
         let wanted = match mode {
             Mode::Active => self.guidance(v),
-            Mode::Fade | Mode::Handover => v.ramp.step(self.elapsed),
+            // A driver who pushed the torque below its ramp does not get it back.
+            Mode::Fade | Mode::Handover => lesser(v.ramp.step(self.elapsed), self.applied),
             // At once: what is behind these modes must not move the wheel for another tick.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
                 return (Torque::ZERO, LimitReason::Mode);

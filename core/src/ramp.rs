@@ -119,16 +119,19 @@ impl History {
     /// the trusted one; zero if their signs differ.
     #[must_use]
     pub fn handover_start(&self, now: Instant, suspect: Micros, applied: Torque) -> Torque {
-        let trusted = self.trusted(now, suspect);
-        if (trusted > Torque::ZERO) == (applied > Torque::ZERO) {
-            if trusted.abs() < applied.abs() {
-                trusted
-            } else {
-                applied
-            }
-        } else {
-            Torque::ZERO
-        }
+        lesser(self.trusted(now, suspect), applied)
+    }
+}
+
+/// The torque of smaller magnitude; zero if the signs differ.
+#[must_use]
+pub fn lesser(a: Torque, b: Torque) -> Torque {
+    if (a > Torque::ZERO) != (b > Torque::ZERO) {
+        Torque::ZERO
+    } else if a.abs() < b.abs() {
+        a
+    } else {
+        b
     }
 }
 
