@@ -405,7 +405,8 @@ impl Step<'_> {
         let raised = |event: &&Event| match event {
             Event::BootPassed => true,
             Event::Engage => rising && v.ready >= READY,
-            Event::Faded => v.ramp.is_done(),
+            // Late steps carry the ramp further than the reduction limit lets the torque follow.
+            Event::Faded => v.ramp.is_done() && self.applied == Torque::ZERO,
             Event::Disengage => request == Some(false) || fast_enough == Some(false),
             Event::InputLost => !inputs_ok,
             Event::BootRejected => faults.intersects(FaultSet::LOCKING),
