@@ -423,7 +423,8 @@ impl Step<'_> {
     fn enter(&self, v: &mut Vitals, mode: Mode, faults: FaultSet, history: &History) {
         v.mode = mode as u32;
         match mode {
-            Mode::Active => v.law = LawState::NEW,
+            // Both may be from before the last wrap of the clock.
+            Mode::Active => (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now)),
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
