@@ -343,7 +343,7 @@ impl Ecu {
             faults,
         };
         let mut command = self.controller.step(&mut self.state, now, v.applied, &inputs);
-        command.torque = Guidance::rounded(command.torque);
+        command.torque = Guidance::rounded(command.torque, command.limit);
         let mut guidance = self.guidance(&command, steps);
 
         let evidence = Evidence {
