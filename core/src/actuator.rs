@@ -1,23 +1,29 @@
 //! Whether the motor delivers what it is told.
 //!
 //! The delivered torque comes back with the column's sensors, a few milliseconds late, so it is compared with
-//! all that was commanded in the last 8 ms. Not kept twice: a flip here raises a fault or hides one until the
-//! next few samples.
-
-use heapless::Deque;
+//! all that was commanded in the last 8 ms. A measurement speaks for 4 ms, two periods of the column: compared
+//! with later commands, an old one would turn a silent column into a faulty motor. Not kept twice: a flip here
+//! raises a fault or hides one until the next few samples; fixed arrays, so that it can do nothing else.
 
 use crate::quantity::Torque;
 
 /// Sensor error and ripple of a motor torque.
 const MARGIN: Torque = Torque::from_nm(0.1);
-/// So many steps of disobedience are a fault.
+/// So many steps of disobedience are tolerated.
 const PATIENCE: u32 = 10;
+/// So many steps are judged by one measurement.
+const SPEAKS_FOR: u32 = 4;
+/// Commands that a measurement may be an echo of.
+const COMMANDS: usize = 8;
 
 /// The last commands, and what came of them.
 #[derive(Debug, Clone)]
 pub struct Actuator {
-    commanded: Deque<Torque, 8>,
-    delivered: Option<Torque>,
+    /// Newest first.
+    commanded: [Torque; COMMANDS],
+    delivered: Torque,
+    /// Steps that the measurement still speaks for.
+    fresh: u32,
     astray: u32,
 }
 
@@ -26,35 +32,37 @@ impl Actuator {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            commanded: Deque::new(),
-            delivered: None,
+            commanded: [Torque::ZERO; COMMANDS],
+            delivered: Torque::ZERO,
+            fresh: 0,
             astray: 0,
         }
     }
 
     /// Takes a measurement.
     pub fn deliver(&mut self, torque: Torque) {
-        self.delivered = Some(torque);
+        (self.delivered, self.fresh) = (torque, SPEAKS_FOR);
     }
 
     /// Takes the command of the last step; `false` when the motor has been away from what it was told for
-    /// 10 ms. Without a measurement there is nothing to say: its silence is a fault of the column.
+    /// more than 10 ms. Without a measurement there is nothing to say: its silence is a fault of the column.
     pub fn obeys(&mut self, commanded: Torque) -> bool {
-        if self.commanded.is_full() {
-            self.commanded.pop_front();
+        self.commanded.rotate_right(1);
+        self.commanded[0] = commanded;
+        if self.fresh > 0 {
+            self.fresh = self.fresh.saturating_sub(1);
+            let torque = i64::from(self.delivered.bits());
+            let margin = i64::from(MARGIN.bits());
+            let (low, high) = self
+                .commanded
+                .iter()
+                .fold((commanded, commanded), |(low, high), t| {
+                    (low.min(*t), high.max(*t))
+                });
+            let near = torque >= i64::from(low.bits()).saturating_sub(margin)
+                && torque <= i64::from(high.bits()).saturating_add(margin);
+            self.astray = if near { 0 } else { self.astray.saturating_add(1) };
         }
-        // There is room: the oldest has just left.
-        let _ = self.commanded.push_back(commanded);
-        let Some(delivered) = self.delivered else {
-            return true;
-        };
-        let low = self.commanded.iter().min().copied().unwrap_or(commanded);
-        let high = self.commanded.iter().max().copied().unwrap_or(commanded);
-        let margin = i64::from(MARGIN.bits());
-        let torque = i64::from(delivered.bits());
-        let near = torque >= i64::from(low.bits()).saturating_sub(margin)
-            && torque <= i64::from(high.bits()).saturating_add(margin);
-        self.astray = if near { 0 } else { self.astray.saturating_add(1) };
         self.astray <= PATIENCE
     }
 }
