@@ -421,15 +421,15 @@ impl Ecu {
         } else {
             self.warned_at = None;
         }
-        let records = self.history.records();
-        if due(0) && !records.is_empty() {
+        let total = self.history.records().count();
+        if due(0) && total > 0 {
             let turn = steps / TURN;
-            let index = (turn as usize).checked_rem(records.len()).unwrap_or(0);
-            if let Some(record) = records.get(index) {
+            let index = (turn as usize).checked_rem(total).unwrap_or(0);
+            if let Some(record) = self.history.records().nth(index) {
                 let line = FaultRecord {
                     index: index as u8,
-                    total: records.len() as u8,
-                    record: *record,
+                    total: total as u8,
+                    record,
                 };
                 let _ = frames.push(line.encode(turn as u8));
             }

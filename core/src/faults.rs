@@ -1,7 +1,5 @@
 //! What can be wrong, and its short history on the ECU.
 
-use heapless::Vec;
-
 use crate::quantity::{Instant, Micros};
 
 /// A fault, by its bit in the status frame. Classes as in `docs/safety.md`.
@@ -154,9 +152,14 @@ pub struct Record {
 }
 
 /// How often each fault appeared since power-up, and when last.
+///
+/// Not kept twice: it moves nothing. Fixed arrays, so that a flipped bit can only spoil a count or an age.
 #[derive(Debug, Clone)]
 pub struct History {
-    records: Vec<Record, 15>,
+    /// How often, by fault.
+    counts: [u8; 15],
+    /// How long ago, by fault.
+    ages_s: [u16; 15],
     present: FaultSet,
     /// Start of the running second, so that ages need no instant that could outlive a wrap of the clock.
     second: Instant,
@@ -169,7 +172,8 @@ impl History {
     #[must_use]
     pub const fn new(now: Instant) -> Self {
         Self {
-            records: Vec::new(),
+            counts: [0; 15],
+            ages_s: [0; 15],
             present: FaultSet::NONE,
             second: now,
         }
@@ -177,39 +181,34 @@ impl History {
 
     /// Takes the faults present in this step.
     pub fn step(&mut self, now: Instant, present: FaultSet) {
-        if now.since(self.second) >= SECOND {
-            self.second = now;
-            for record in &mut self.records {
-                record.age_s = record.age_s.saturating_add(1);
-            }
-        }
         let appeared = present.without(self.present);
         self.present = present;
-        if appeared == FaultSet::NONE {
+        let another_second = now.since(self.second) >= SECOND;
+        if another_second {
+            self.second = now;
+        }
+        if !another_second && appeared == FaultSet::NONE {
             return;
         }
-        for fault in Fault::ALL {
-            if !appeared.contains(fault) {
-                continue;
-            }
-            match self.records.iter_mut().find(|record| record.fault == fault) {
-                Some(record) => {
-                    record.count = record.count.saturating_add(1);
-                    record.age_s = 0;
-                }
-                // One place for each fault there is: never full.
-                None => drop(self.records.push(Record {
-                    fault,
-                    count: 1,
-                    age_s: 0,
-                })),
+        let lines = self.counts.iter_mut().zip(&mut self.ages_s);
+        for (fault, (count, age_s)) in Fault::ALL.into_iter().zip(lines) {
+            *age_s = age_s.saturating_add(u16::from(another_second));
+            if appeared.contains(fault) {
+                (*count, *age_s) = (count.saturating_add(1), 0);
             }
         }
     }
 
-    /// Every fault that ever appeared, in the order of first appearance.
-    #[must_use]
-    pub fn records(&self) -> &[Record] {
-        &self.records
+    /// Every fault that ever appeared, in the order of the bits.
+    pub fn records(&self) -> impl Iterator<Item = Record> {
+        let lines = self.counts.iter().zip(&self.ages_s);
+        let records = Fault::ALL.into_iter().zip(lines);
+        records
+            .filter(|(_, (count, _))| **count > 0)
+            .map(|(fault, (count, age_s))| Record {
+                fault,
+                count: *count,
+                age_s: *age_s,
+            })
     }
 }

@@ -4,8 +4,6 @@
 //! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/safety.md has the
 //! table). Neither ramp ever grows.
 
-use heapless::Deque;
-
 use crate::quantity::{Instant, Micros, Torque};
 use crate::vital::vital;
 
@@ -72,10 +70,12 @@ impl Ramp {
 
 /// The outputs of the last 250 ms, one every 5 ms.
 ///
-/// Not kept twice: what comes out of it can only make a handover start lower than the torque applied.
+/// Not kept twice: wherever a flipped bit puts the start of a handover, it lies between zero and the torque
+/// applied. A fixed array, so that a flip can do nothing else.
 #[derive(Debug, Clone)]
 pub struct History {
-    outputs: Deque<(Instant, Torque), 51>,
+    /// Newest first.
+    outputs: [(Instant, Torque); 51],
 }
 
 const HISTORY_STEP: Micros = Micros::from_ms(5);
@@ -85,34 +85,24 @@ impl History {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            outputs: Deque::new(),
+            outputs: [(Instant::from_us(0), Torque::ZERO); 51],
         }
     }
 
     /// Remembers an output.
     pub fn push(&mut self, now: Instant, torque: Torque) {
-        if self
-            .outputs
-            .back()
-            .is_some_and(|(at, _)| now.since(*at) < HISTORY_STEP)
-        {
-            return;
+        if now.since(self.outputs[0].0) >= HISTORY_STEP {
+            self.outputs.rotate_right(1);
+            self.outputs[0] = (now, torque);
         }
-        if self.outputs.is_full() {
-            self.outputs.pop_front();
-        }
-        // There is room: the oldest has just left.
-        let _ = self.outputs.push_back((now, torque));
     }
 
     /// The last output before `suspect` time ago: the oldest one kept if that is longer ago than the
-    /// history, zero if there is none.
+    /// history, zero if there was none.
     #[must_use]
     pub fn trusted(&self, now: Instant, suspect: Micros) -> Torque {
-        let before = self.outputs.iter().rev().find(|(at, _)| now.since(*at) > suspect);
-        before
-            .or(self.outputs.front())
-            .map_or(Torque::ZERO, |(_, torque)| *torque)
+        let before = self.outputs.iter().find(|(at, _)| now.since(*at) > suspect);
+        before.unwrap_or(&self.outputs[50]).1
     }
 
     /// Where a handover starts: the smaller of the torque applied and the torque trusted, with the sign of
