@@ -62,13 +62,13 @@ struct Slot<T> {
 }
 
 impl<T: Vital> Vital for Slot<T> {
-    fn complement(self) -> Self {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self {
-            e2e: self.e2e.complement(),
-            has: self.has.complement(),
-            fresh: self.fresh.complement(),
-            at: self.at.complement(),
-            value: self.value.complement(),
+            e2e: self.e2e.map_words(change),
+            has: change(self.has),
+            fresh: change(self.fresh),
+            at: self.at.map_words(change),
+            value: self.value.map_words(change),
         }
     }
 }

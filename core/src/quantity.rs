@@ -54,8 +54,8 @@ macro_rules! quantity {
         }
 
         impl Vital for $name {
-            fn complement(self) -> Self {
-                Self::from_bits(!self.bits())
+            fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+                Self::from_bits(self.bits().map_words(change))
             }
         }
     };
@@ -131,8 +131,8 @@ impl Micros {
 }
 
 impl Vital for Micros {
-    fn complement(self) -> Self {
-        Self(!self.0)
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self(change(self.0))
     }
 }
 
@@ -176,8 +176,8 @@ impl Instant {
 }
 
 impl Vital for Instant {
-    fn complement(self) -> Self {
-        Self(!self.0)
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self(change(self.0))
     }
 }
 

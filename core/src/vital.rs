@@ -5,28 +5,34 @@
 
 use core::hint::black_box;
 
-/// A value whose every bit can be inverted and still be a value.
+/// A value made of 32-bit words, each of which may hold any bits.
 pub trait Vital: Copy + PartialEq {
+    /// The value with every word changed, in the order of the fields.
+    #[must_use]
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self;
+
     /// The value with every bit inverted.
     #[must_use]
-    fn complement(self) -> Self;
+    fn complement(self) -> Self {
+        self.map_words(&mut |word| !word)
+    }
 }
 
 impl Vital for u32 {
-    fn complement(self) -> Self {
-        !self
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        change(self)
     }
 }
 
 impl Vital for i32 {
-    fn complement(self) -> Self {
-        !self
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        change(self.cast_unsigned()).cast_signed()
     }
 }
 
 impl<T: Vital, const N: usize> Vital for [T; N] {
-    fn complement(self) -> Self {
-        self.map(T::complement)
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        self.map(|item| item.map_words(change))
     }
 }
 
@@ -39,8 +45,8 @@ macro_rules! vital {
         $vis struct $name { $($(#[$field_doc])* $field_vis $field: $type,)* }
 
         impl $crate::vital::Vital for $name {
-            fn complement(self) -> Self {
-                Self { $($field: $crate::vital::Vital::complement(self.$field),)* }
+            fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+                Self { $($field: $crate::vital::Vital::map_words(self.$field, change),)* }
             }
         }
     };
