@@ -125,6 +125,7 @@ vital! {
         last_step: Instant,
         /// Steps, which give the counters of the frames and their turns.
         steps: u32,
+        monitor: MonitorState,
     }
 }
 
@@ -157,6 +158,7 @@ impl Vitals {
             faults: u32::from(faults.bits()),
             last_step: now,
             steps: 0,
+            monitor: MonitorState::NEW,
         }
     }
 }
@@ -166,8 +168,7 @@ impl Vitals {
 pub struct Ecu {
     controller: Controller,
     state: ControllerState,
-    monitor: Monitor,
-    monitor_state: MonitorState,
+    monitor: Guarded<Monitor>,
     vitals: Guarded<Vitals>,
     actuator: Actuator,
     history: History,
@@ -229,8 +230,7 @@ impl Ecu {
         Self {
             controller: Controller::new(setup.config),
             state,
-            monitor: setup.monitor,
-            monitor_state: MonitorState::NEW,
+            monitor: Guarded::new(setup.monitor),
             vitals: Guarded::new(Vitals::new(e2e, faults, now)),
             actuator: Actuator::new(),
             history: History::new(now),
@@ -332,6 +332,7 @@ impl Ecu {
             steps.is_multiple_of(SELF_TEST) && !self.monitor_refuses_nonsense(),
             Fault::SelfTest,
         );
+        faults.insert_if(self.monitor.get().is_none(), Fault::Memory);
         let lane = v.lane.take(now);
         // An invalid preview is the reason of a time-out, not a fault by itself: one may be a blink.
         faults.set(lane == Input::Lost && v.lane_invalid != 0, Fault::LaneInvalid);
@@ -352,7 +353,7 @@ impl Ecu {
             guidance: guidance.bytes(),
             elapsed_us: now.since(v.last_step).us(),
         };
-        let permitted = self.monitor.step(&mut self.monitor_state, &evidence);
+        let permitted = self.permits(&mut v.monitor, &evidence);
         if !permitted {
             faults.insert(Fault::Monitor);
             command = Command {
@@ -447,7 +448,14 @@ impl Ecu {
             guidance: &nonsense,
             elapsed_us: 1000,
         };
-        !self.monitor.step(&mut state, &evidence)
+        !self.permits(&mut state, &evidence)
+    }
+
+    /// Asks the monitor. One whose limits are damaged permits nothing.
+    fn permits(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
+        self.monitor
+            .get()
+            .is_some_and(|monitor| monitor.step(state, evidence))
     }
 
     /// The configuration in use, if its copies agree.

@@ -3,43 +3,49 @@
 //!
 //! A second, simpler computation in plain `i32` milli-newton-metres. It decodes the frames itself, from the
 //! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
-//! module: a mistake there must not repeat itself here.
+//! module: a mistake there must not repeat itself here. It shares how memory is guarded, and nothing else.
 //!
 //! What it refuses: a torque beyond the limit, growing too fast, in a mode without torque, against a driver
 //! who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for.
 //! The last is coarse (proportional part and rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for
 //! 20 ms, or while the torque falls: the envelope may still be bringing an honest change about.
 
-/// Limits in mN.m and per unit; immutable.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Monitor {
-    /// L.
-    pub(crate) limit_mnm: i32,
-    /// Largest growth in one millisecond.
-    pub(crate) growth_mnm_per_ms: i32,
-    /// Law, mN.m per m, per rad, per m/s, per rad/s.
-    pub(crate) gains_mnm: [i32; 4],
+use crate::vital::vital;
+
+vital! {
+    /// Limits in mN.m and per unit; immutable.
+    pub struct Monitor {
+        /// L.
+        pub(crate) limit_mnm: i32,
+        /// Largest growth in one millisecond.
+        pub(crate) growth_mnm_per_ms: i32,
+        /// Law, mN.m per m, per rad, per m/s, per rad/s.
+        pub(crate) gains_mnm: [i32; 4],
+    }
 }
 
-/// What the monitor remembers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MonitorState {
-    torque_mnm: i32,
-    driver_mnm: i32,
-    lane: Lane,
-    /// An older lane sample, for rates.
-    before: Lane,
-    astray_ms: i32,
-    permitted: bool,
+vital! {
+    /// What the monitor remembers.
+    pub struct MonitorState {
+        torque_mnm: i32,
+        driver_mnm: i32,
+        lane: Lane,
+        /// An older lane sample, for rates.
+        before: Lane,
+        astray_ms: i32,
+        /// 1 after the first disagreement.
+        withdrawn: i32,
+    }
 }
 
-/// Lane errors as the monitor reads them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Lane {
-    e_y_mm: i32,
-    e_theta_urad: i32,
-    /// Since it was true.
-    age_us: i32,
+vital! {
+    /// Lane errors as the monitor reads them.
+    struct Lane {
+        e_y_mm: i32,
+        e_theta_urad: i32,
+        /// Since it was true.
+        age_us: i32,
+    }
 }
 
 /// A frame with the time since the last step in mind: what the monitor is shown every millisecond.
@@ -89,7 +95,7 @@ impl MonitorState {
             age_us: 0,
         },
         astray_ms: 0,
-        permitted: true,
+        withdrawn: 0,
     };
 }
 
@@ -111,13 +117,14 @@ impl Monitor {
             .growth_mnm_per_ms
             .saturating_mul(elapsed_us.clamp(1000, 2000))
             / 1000;
-        state.permitted &= torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
+        let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed.saturating_add(TOLERANCE_MNM)
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
             && self.leaves_the_driver_in_charge(torque, state.driver_mnm)
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
         state.torque_mnm = torque;
-        state.permitted
+        state.withdrawn |= i32::from(!agrees);
+        state.withdrawn == 0
     }
 
     /// `abs(T) <= L + 3*(0.8 - opposing)`.
