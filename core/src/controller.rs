@@ -101,7 +101,7 @@ pub struct Command {
 
 vital! {
     /// Everything that a flipped bit must not change unseen.
-    struct Vitals {
+    pub(crate) struct Vitals {
         /// A [`Mode`] code.
         mode: u32,
         /// 1 while the last request was high.
@@ -168,26 +168,32 @@ impl Vitals {
 /// What the controller remembers from step to step.
 #[derive(Debug, Clone)]
 pub struct ControllerState {
-    vitals: Guarded<Vitals>,
+    pub(crate) vitals: Guarded<Vitals>,
     history: History,
+    /// What the law is made to ask for (see `ecu::injection`).
+    #[cfg(feature = "fault-injection")]
+    pub(crate) forced_law: Option<Torque>,
 }
 
 impl ControllerState {
     /// At power-up: Boot.
     #[must_use]
     pub fn new(now: Instant) -> Self {
-        Self {
-            vitals: Guarded::new(Vitals::new(Mode::Boot, now)),
-            history: History::new(),
-        }
+        Self::with(Mode::Boot, now)
     }
 
     /// Guidance active from the start, as the paper's studies of driver models have it. Not for a vehicle.
     #[must_use]
     pub fn engaged(now: Instant) -> Self {
+        Self::with(Mode::Active, now)
+    }
+
+    fn with(mode: Mode, now: Instant) -> Self {
         Self {
-            vitals: Guarded::new(Vitals::new(Mode::Active, now)),
+            vitals: Guarded::new(Vitals::new(mode, now)),
             history: History::new(),
+            #[cfg(feature = "fault-injection")]
+            forced_law: None,
         }
     }
 
@@ -213,7 +219,7 @@ impl ControllerState {
 /// The whole control law with its limits; immutable.
 #[derive(Debug, Clone, Copy)]
 pub struct Controller {
-    config: Guarded<Config>,
+    pub(crate) config: Guarded<Config>,
 }
 
 impl Controller {
@@ -249,6 +255,8 @@ impl Controller {
             applied,
             inputs,
             elapsed: now.since(vitals.last_step),
+            #[cfg(feature = "fault-injection")]
+            forced_law: state.forced_law,
         };
         let command = step.run(&mut vitals, &mut state.history);
         vitals.last_step = now;
@@ -265,6 +273,8 @@ struct Step<'a> {
     applied: Torque,
     inputs: &'a Inputs,
     elapsed: Micros,
+    #[cfg(feature = "fault-injection")]
+    forced_law: Option<Torque>,
 }
 
 impl Step<'_> {
@@ -493,6 +503,8 @@ impl Step<'_> {
             return Torque::ZERO;
         };
         let asked = self.config.law.step(&mut v.law, self.now, sample);
+        #[cfg(feature = "fault-injection")]
+        let asked = self.forced_law.unwrap_or(asked);
         // A share: more than all or less than nothing is a host's mistake.
         let authority = request.authority.max(Gain::ZERO).min(Gain::ONE);
         Torque::from_wide(product(authority.bits(), asked.bits()))

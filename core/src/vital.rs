@@ -80,6 +80,13 @@ impl<T: Vital> Guarded<T> {
         (value == inverted.complement()).then_some(value)
     }
 
+    /// Changes the words of both copies apart, as faults do.
+    #[cfg(feature = "fault-injection")]
+    pub(crate) fn change_copies(&mut self, change: &mut impl FnMut(u32) -> u32) {
+        self.value = self.value.map_words(change);
+        self.inverted = self.inverted.map_words(change);
+    }
+
     /// Replaces both copies.
     pub fn set(&mut self, value: T) {
         *self = Self::new(value);

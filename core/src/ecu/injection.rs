@@ -1,0 +1,80 @@
+//! Faults from inside, for campaigns and tests: bits of the vital memory, a law that lies, a monitor that
+//! always agrees. Faults on the bus need nothing of this: they are injected as bytes.
+//!
+//! Only with the feature `fault-injection`, which no product image has. With nothing injected an ECU of such
+//! a build behaves as any other, bit for bit.
+
+use super::Ecu;
+use crate::quantity::Torque;
+use crate::vital::{Guarded, Vital};
+
+/// Faults held until they are taken back.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Injected {
+    pub(super) monitor_agrees: bool,
+}
+
+/// Where a bit of the vital memory lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Region {
+    /// Gains, limits and margins.
+    Config,
+    /// What the controller remembers: mode, law, envelope, plausibility, ramp.
+    Controller,
+    /// Inputs, the torque applied, faults, and what the monitor remembers.
+    Ecu,
+    /// The monitor's limits.
+    Monitor,
+}
+
+impl Region {
+    /// Every region.
+    pub const ALL: [Self; 4] = [Self::Config, Self::Controller, Self::Ecu, Self::Monitor];
+}
+
+impl Ecu {
+    /// Number of bits in a region, both copies counted.
+    #[must_use]
+    pub fn vital_bits(&self, region: Region) -> usize {
+        // A bit that does not exist flips nothing and counts them all.
+        self.clone().flip(region, usize::MAX)
+    }
+
+    /// Flips one bit, 0 to [`Ecu::vital_bits`] exclusive, of one of the copies; others are ignored.
+    pub fn flip_bit(&mut self, region: Region, bit: usize) {
+        self.flip(region, bit);
+    }
+
+    /// Replaces the torque that the law asks for, until `None`.
+    pub fn force_law(&mut self, torque: Option<Torque>) {
+        self.state.forced_law = torque;
+    }
+
+    /// Makes the monitor agree with everything.
+    pub fn hold_monitor(&mut self, agrees: bool) {
+        self.injected.monitor_agrees = agrees;
+    }
+
+    fn flip(&mut self, region: Region, bit: usize) -> usize {
+        match region {
+            Region::Config => flip(&mut self.controller.config, bit),
+            Region::Controller => flip(&mut self.state.vitals, bit),
+            Region::Ecu => flip(&mut self.vitals, bit),
+            Region::Monitor => flip(&mut self.monitor, bit),
+        }
+    }
+}
+
+/// Flips a bit and returns how many there are.
+fn flip<T: Vital>(guarded: &mut Guarded<T>, bit: usize) -> usize {
+    let mut first = 0_usize;
+    guarded.change_copies(&mut |word| {
+        let mask = bit
+            .checked_sub(first)
+            .filter(|at| *at < 32)
+            .map_or(0, |at| 1_u32.wrapping_shl(at as u32));
+        first = first.saturating_add(32);
+        word ^ mask
+    });
+    first
+}
