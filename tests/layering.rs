@@ -58,7 +58,7 @@ fn the_blocks_of_the_core_do_not_know_each_other() {
                 continue;
             }
             let needle = format!("crate::{other}");
-            // The monitor uses nothing of the rest, and only the step and the parameters name it.
+            // The monitor uses nothing of the rest but the way memory is guarded.
             let needle = if place == "monitor.rs" { "crate::" } else { &needle };
             if other.is_empty() {
                 continue;
@@ -70,6 +70,7 @@ fn the_blocks_of_the_core_do_not_know_each_other() {
                         .next()
                         .unwrap()
                         .contains(&format!("core/src/{place}"))
+                        && !hit.contains("use crate::vital::vital;")
                 })
                 .collect();
             assert_eq!(hits, Vec::<String>::new(), "{place} must not use {needle}");
