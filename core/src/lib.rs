@@ -25,6 +25,7 @@ pub mod ecu;
 pub mod envelope;
 pub mod faults;
 pub mod law;
+pub mod lockstep;
 pub mod modes;
 pub mod monitor;
 pub mod params;

@@ -2,6 +2,7 @@
 
 pub mod identify;
 pub mod metrics;
+pub mod pil;
 pub mod plot;
 pub mod report;
 pub mod trace;

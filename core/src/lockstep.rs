@@ -1,0 +1,209 @@
+//! What a lock-step run carries beside the frames of the bus: the records of a binary pipe, how the run starts,
+//! the cost of a step. Both ends use this file: the simulator and the lock-step image.
+//!
+//! A *tick* is any number of frames and then one [`SimTime`](crate::bus::messages::SimTime), at which the ECU
+//! receives them all and steps. The image answers with the frames of that step and then its [`StepCost`].
+//! Over SLCAN the frames are lines, over a pipe they are records. A run may begin with the parameters and a
+//! [`Start`]; without them the ECU boots at the first tick with the paper's parameters, as the product does.
+//!
+//! Not part of a product image, and not in `core/haptic.dbc`: no vehicle's bus carries these.
+
+use crate::bus::Frame;
+use crate::bus::messages::ResetCause;
+use crate::ecu::{Boot, Ecu};
+use crate::params::{ParamError, Params, Setup, VehicleParams};
+use crate::quantity::Instant;
+
+/// Bytes of a record: identifier (little-endian), length, eight data bytes.
+pub const RECORD_LEN: usize = 11;
+
+/// A frame as a record. Bytes past the frame's length are zero.
+#[must_use]
+pub fn to_record(frame: &Frame) -> [u8; RECORD_LEN] {
+    let mut record = [0; RECORD_LEN];
+    let data = frame.data();
+    let head = frame.id().to_le_bytes().into_iter().chain([data.len() as u8]);
+    for (to, from) in record.iter_mut().zip(head.chain(data.iter().copied())) {
+        *to = from;
+    }
+    record
+}
+
+/// The frame of a record, or `None` if the identifier or the length is none of a classic frame.
+#[must_use]
+pub fn from_record(record: &[u8; RECORD_LEN]) -> Option<Frame> {
+    let [low, high, len, data @ ..] = record;
+    Frame::new(u16::from_le_bytes([*low, *high]), data.get(..usize::from(*len))?)
+}
+
+/// How many parameters a set has.
+pub const PARAMETERS: usize = 15;
+/// Identifier of the first parameter's frame; the others follow.
+const PARAMETER_ID: u16 = 0x7E0;
+
+/// The places of the parameters, in the order of their frames.
+fn places(params: &mut Params) -> [&mut f64; PARAMETERS] {
+    // Named one by one, so that a new parameter does not compile until it is sent too.
+    let Params {
+        k_1,
+        a_1,
+        a_2,
+        a_3,
+        a_4,
+        rate_corner_hz,
+        torque_limit_nm,
+        wind_up_nm_per_s,
+        reduction_nm_per_s,
+        least_speed_mps,
+        vehicle:
+            VehicleParams {
+                curvature_gain_1pm,
+                stability_factor_s2pm2,
+                aligning_gain_nms2pm,
+                column_damping_nms,
+                far_time_s,
+            },
+    } = params;
+    [
+        k_1,
+        a_1,
+        a_2,
+        a_3,
+        a_4,
+        rate_corner_hz,
+        torque_limit_nm,
+        wind_up_nm_per_s,
+        reduction_nm_per_s,
+        least_speed_mps,
+        curvature_gain_1pm,
+        stability_factor_s2pm2,
+        aligning_gain_nms2pm,
+        column_damping_nms,
+        far_time_s,
+    ]
+}
+
+/// The frames that give the image its parameters. Eight bytes: an `f64`, little-endian.
+#[must_use]
+pub fn parameter_frames(params: &Params) -> [Frame; PARAMETERS] {
+    let mut params = *params;
+    let mut id = PARAMETER_ID;
+    places(&mut params).map(|value| {
+        let frame = Frame::full(id, value.to_le_bytes());
+        id = id.wrapping_add(1);
+        frame
+    })
+}
+
+/// Takes one parameter from its frame. False: not a parameter's frame.
+pub fn set_parameter(params: &mut Params, frame: &Frame) -> bool {
+    let index = usize::from(frame.id().wrapping_sub(PARAMETER_ID));
+    match (places(params).into_iter().nth(index), frame.full_data()) {
+        (Some(place), Some(data)) => {
+            *place = f64::from_le_bytes(data);
+            true
+        }
+        _ => false,
+    }
+}
+
+/// How the ECU of a run comes up, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Start {
+    /// In what state.
+    pub state: StartState,
+    /// The clock at that moment.
+    pub at: Instant,
+}
+
+/// In what state an ECU comes up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StartState {
+    /// As a product does, with good parameters.
+    Boot(Boot),
+    /// As a product whose parameters are damaged.
+    WithoutParameters(Boot),
+    /// Guiding, with every sender trusted, as in the paper's studies.
+    Engaged,
+}
+
+impl Start {
+    /// Identifier.
+    const ID: u16 = 0x7EF;
+
+    /// Byte 0: state, 1: reset cause, 2: recent resets; 4..7: clock, us, little-endian.
+    #[must_use]
+    pub fn encode(self) -> Frame {
+        let (code, boot) = match self.state {
+            StartState::Boot(boot) => (0, boot),
+            StartState::WithoutParameters(boot) => (1, boot),
+            StartState::Engaged => (2, Boot::default()),
+        };
+        let [a, b, c, d] = self.at.us().to_le_bytes();
+        let data = [code, boot.reset as u8, boot.recent_resets, 0, a, b, c, d];
+        Frame::full(Self::ID, data)
+    }
+
+    /// The start, if this is such a frame and says one.
+    #[must_use]
+    pub fn decode(frame: &Frame) -> Option<Self> {
+        let [code, reset, recent_resets, _, a, b, c, d] = frame.full_data()?;
+        if frame.id() != Self::ID {
+            return None;
+        }
+        let boot = Boot {
+            reset: ResetCause::from_code(i64::from(reset))?,
+            recent_resets,
+        };
+        Some(Self {
+            state: match code {
+                0 => StartState::Boot(boot),
+                1 => StartState::WithoutParameters(boot),
+                2 => StartState::Engaged,
+                _ => return None,
+            },
+            at: Instant::from_us(u32::from_le_bytes([a, b, c, d])),
+        })
+    }
+
+    /// The ECU that comes up so, the same on both ends.
+    ///
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn ecu(self, params: &Params) -> Result<Ecu, ParamError> {
+        let setup = Setup::new(params)?;
+        Ok(match self.state {
+            StartState::Boot(boot) => Ecu::new(Some(&setup), boot, self.at),
+            StartState::WithoutParameters(boot) => Ecu::new(None, boot, self.at),
+            StartState::Engaged => Ecu::engaged(&setup, self.at),
+        })
+    }
+}
+
+/// What one step cost the target, in cycles of its counter: every `Ecu::receive` of the tick and `Ecu::step`.
+/// Ends the answer to a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StepCost {
+    /// Counter cycles.
+    pub cycles: u32,
+}
+
+impl StepCost {
+    /// Identifier.
+    const ID: u16 = 0x7F1;
+
+    /// Bytes 0..3: cycles, little-endian.
+    #[must_use]
+    pub fn encode(self) -> Frame {
+        Frame::full(Self::ID, u64::from(self.cycles).to_le_bytes())
+    }
+
+    /// The cost, if this is such a frame.
+    #[must_use]
+    pub fn decode(frame: &Frame) -> Option<Self> {
+        let [a, b, c, d, ..] = frame.full_data()?;
+        (frame.id() == Self::ID).then(|| Self {
+            cycles: u32::from_le_bytes([a, b, c, d]),
+        })
+    }
+}

@@ -1,0 +1,174 @@
+//! The controller driven tick by tick: it steps when a `SimTime` frame arrives, and answers with the frames of
+//! that step. The simulator compares them with its own controller's, so time here is the simulator's.
+//!
+//! QEMU's semihosting arguments choose the channel at start; the frames are the same on both:
+//! - `slcan`: the board's CAN bus, as an outside client such as python-can would drive it;
+//! - `fifo`: binary records on QEMU's standard input and output, for long runs.
+//!
+//! How a run starts and how an answer ends: `haptic_core::lockstep`.
+
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod fifo;
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("lockstep runs on a target: `cargo run --release -- pil`");
+}
+
+#[cfg(target_os = "none")]
+mod target {
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use embedded_can::nb::Can;
+    use embedded_hal_nb::nb;
+    use haptic_core::bus::Frame;
+    use haptic_core::bus::messages::SimTime;
+    use haptic_core::ecu::{Boot, Ecu};
+    use haptic_core::lockstep::{Start, StartState, StepCost, set_parameter};
+    use haptic_core::params::Params;
+    use haptic_core::quantity::{Instant, Micros};
+    use haptic_firmware::boards::{Board, ThisBoard};
+    use heapless::Vec;
+
+    use crate::fifo::{self, Fifo};
+
+    /// Most frames of one tick; a full bus at 500 kbit/s carries 4 a millisecond.
+    const FRAMES_PER_TICK: usize = 64;
+
+    /// A client that is silent for so long is gone: the machine must not outlive it.
+    const IDLE: Micros = Micros::from_ms(60_000);
+
+    #[entry]
+    fn main() -> ! {
+        let mut board = ThisBoard::start();
+        let mut buffer = [0; 128];
+        let arguments = fifo::command_line(&mut buffer);
+        let has = |word| arguments.split(' ').any(|argument| argument == word);
+        let mut run = Run::NEW;
+        defmt::info!(
+            "lockstep on {=str}, arguments: {=str}",
+            ThisBoard::NAME,
+            arguments
+        );
+        if has("fifo") {
+            let mut fifo = Fifo::open();
+            while let Ok(frame) = nb::block!(fifo.receive()) {
+                run.take(frame, &mut fifo);
+            }
+        } else {
+            serve(&mut board, &mut run);
+        }
+        defmt::info!(
+            "end of the run: {=u32} steps, {=u32} frames rejected",
+            run.steps,
+            run.rejected
+        );
+        exit(EXIT_SUCCESS)
+    }
+
+    /// A run on the bus port, from the client's opening of the channel to its closing.
+    fn serve(board: &mut ThisBoard, run: &mut Run) {
+        let mut last = None;
+        board.start_tick();
+        loop {
+            match (board.can().receive(), last) {
+                (Ok(frame), _) => {
+                    last = Some(ThisBoard::now());
+                    run.take(frame, board.can());
+                }
+                (Err(_), Some(_)) if !board.can().is_open() => return,
+                (Err(_), Some(at)) if ThisBoard::now().since(at) > IDLE => {
+                    panic!("the client left the channel open and is silent")
+                }
+                (Err(_), _) => board.sleep(),
+            }
+        }
+    }
+
+    /// One run: the controller and the frames of the tick under way.
+    struct Run {
+        params: Params,
+        ecu: Option<Ecu>,
+        frames: Vec<Frame, FRAMES_PER_TICK>,
+        steps: u32,
+        rejected: u32,
+    }
+
+    impl Run {
+        const NEW: Self = Self {
+            params: Params::PAPER,
+            ecu: None,
+            frames: Vec::new(),
+            steps: 0,
+            rejected: 0,
+        };
+
+        fn take(&mut self, frame: Frame, can: &mut impl Can<Frame = Frame>) {
+            if let Some(SimTime(now)) = SimTime::decode(&frame) {
+                self.tick(now, can);
+            } else if let Some(start) = Start::decode(&frame) {
+                self.ecu = Some(start_ecu(start, &self.params));
+            } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
+                panic!("more than {FRAMES_PER_TICK} frames in one tick");
+            }
+        }
+
+        fn tick(&mut self, now: Instant, can: &mut impl Can<Frame = Frame>) {
+            let boot = Start {
+                state: StartState::Boot(Boot::default()),
+                at: now,
+            };
+            let ecu = self.ecu.get_or_insert_with(|| start_ecu(boot, &self.params));
+            let start = ThisBoard::cycles();
+            for frame in &self.frames {
+                if ecu.receive(frame, now).is_err() {
+                    self.rejected = self.rejected.wrapping_add(1);
+                }
+            }
+            let step = ecu.step(now);
+            let cycles = ThisBoard::cycles().wrapping_sub(start);
+            self.frames.clear();
+            self.steps = self.steps.wrapping_add(1);
+            send(can, &step.guidance);
+            for frame in &step.others {
+                send(can, frame);
+            }
+            send(can, &StepCost { cycles }.encode());
+        }
+    }
+
+    fn start_ecu(start: Start, params: &Params) -> Ecu {
+        match start.ecu(params) {
+            Ok(ecu) => ecu,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    fn send(can: &mut impl Can<Frame = Frame>, frame: &Frame) {
+        if nb::block!(can.transmit(frame)).is_err() {
+            panic!("an answer could not be sent");
+        }
+    }
+
+    fn exit(status: debug::ExitStatus) -> ! {
+        loop {
+            debug::exit(status);
+        }
+    }
+
+    #[panic_handler]
+    fn panic(info: &core::panic::PanicInfo) -> ! {
+        ThisBoard::zero_torque();
+        defmt::error!("panic: {}", defmt::Display2Format(info));
+        exit(EXIT_FAILURE)
+    }
+
+    #[exception]
+    unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+        ThisBoard::zero_torque();
+        defmt::error!("fault at {=u32:#010x}", frame.pc());
+        exit(EXIT_FAILURE)
+    }
+}

@@ -1,0 +1,267 @@
+//! The reference board: ARM MPS2+ with the AN386 image (Cortex-M4F, 25 MHz), as QEMU's `mps2-an386`.
+//!
+//! - UART0: the CAN bus, as SLCAN. UART1: the log. Both transmit at 25 MHz / 16 = 1.5625 Mbaud.
+//! - SysTick: the 1 kHz tick. FPGAIO counter: microseconds. CMSDK timer 0: cycles. LED 0: status.
+//!
+//! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART and timer. The actuator
+//! sits on the bus and takes 30 ms without a frame as zero torque (`bus::messages::TIMEOUT`), so zero torque
+//! here is a silent bus.
+
+use core::convert::Infallible;
+
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{NVIC, Peripherals, SCB, SYST};
+use embedded_hal::digital::{self, OutputPin};
+use embedded_hal_nb::nb;
+use embedded_hal_nb::serial::{self, Read, Write};
+use haptic_core::quantity::Instant;
+use volatile_register::{RO, RW};
+
+use super::Board;
+use crate::slcan_can::SlcanCan;
+
+const CORE_CLOCK_HZ: u32 = 25_000_000;
+const TICK_HZ: u32 = 1000;
+
+/// The board's peripherals, taken.
+pub struct Mps2An386 {
+    can: SlcanCan<Uart>,
+    led: Led,
+    systick: SYST,
+}
+
+impl Board for Mps2An386 {
+    type Can = SlcanCan<Uart>;
+    type Status = Led;
+
+    const NAME: &'static str = "mps2-an386";
+
+    fn start() -> Self {
+        cortex_m::interrupt::disable();
+        let cortex = Peripherals::take().expect("the board is started once");
+        FPGAIO.get().write_prescale(CORE_CLOCK_HZ / 1_000_000 - 1);
+        TIMER0.get().run();
+        UART1.get().start(TRANSMIT);
+        UART0.get().start(TRANSMIT | RECEIVE | INTERRUPTS);
+        for irq in [Irq::Uart0Receive, Irq::Uart0Transmit] {
+            // SAFETY: interrupts are masked for good, so unmasking one in the NVIC only lets it wake the core.
+            unsafe { NVIC::unmask(irq) };
+        }
+        Self {
+            can: SlcanCan::new(Uart(UART0)),
+            led: Led,
+            systick: cortex.SYST,
+        }
+    }
+
+    fn can(&mut self) -> &mut Self::Can {
+        &mut self.can
+    }
+
+    fn status(&mut self) -> &mut Self::Status {
+        &mut self.led
+    }
+
+    fn now() -> Instant {
+        Instant::from_us(FPGAIO.get().counter.read())
+    }
+
+    fn cycles() -> u32 {
+        // The timer counts down.
+        !TIMER0.get().value.read()
+    }
+
+    fn start_tick(&mut self) {
+        self.systick.set_clock_source(SystClkSource::Core);
+        self.systick.set_reload(CORE_CLOCK_HZ / TICK_HZ - 1);
+        self.systick.clear_current();
+        self.systick.enable_interrupt();
+        self.systick.enable_counter();
+    }
+
+    fn tick(&mut self) -> bool {
+        self.systick.has_wrapped()
+    }
+
+    fn sleep(&mut self) {
+        cortex_m::asm::wfi();
+        // Cleared before the caller looks for work, so that what arrives after that pends anew.
+        SCB::clear_pendst();
+        UART0.get().clear_interrupts();
+        NVIC::unpend(Irq::Uart0Receive);
+        NVIC::unpend(Irq::Uart0Transmit);
+    }
+
+    fn zero_torque() {
+        UART0.get().start(RECEIVE);
+        FPGAIO.get().write_led(0);
+    }
+
+    fn log(bytes: &[u8]) {
+        for byte in bytes {
+            let _ = nb::block!(UART1.get().send(*byte));
+        }
+    }
+}
+
+/// Interrupts of AN386, table 3-5.
+#[derive(Clone, Copy)]
+enum Irq {
+    Uart0Receive = 0,
+    Uart0Transmit = 1,
+}
+
+// SAFETY: the numbers are those of the board and below the M4's 240.
+unsafe impl InterruptNumber for Irq {
+    fn number(self) -> u16 {
+        self as u16
+    }
+}
+
+/// A block of registers at its address.
+#[derive(Debug, Clone, Copy)]
+struct At<T>(*const T);
+
+impl<T> At<T> {
+    const fn get(&self) -> &'static T {
+        // SAFETY: the constants below are the only values; each is the address of such a block on this board,
+        // aligned and always mapped, and its registers are only accessed as volatile.
+        unsafe { &*self.0 }
+    }
+}
+
+const TIMER0: At<TimerBlock> = At(0x4000_0000 as *const _);
+const UART0: At<UartBlock> = At(0x4000_4000 as *const _);
+const UART1: At<UartBlock> = At(0x4000_5000 as *const _);
+const FPGAIO: At<FpgaIoBlock> = At(0x4002_8000 as *const _);
+
+/// CMSDK timer: counts down at the core clock.
+#[repr(C)]
+struct TimerBlock {
+    ctrl: RW<u32>,
+    value: RO<u32>,
+    reload: RW<u32>,
+}
+
+impl TimerBlock {
+    fn run(&self) {
+        // SAFETY: counts from the largest value, no interrupt.
+        unsafe {
+            self.reload.write(u32::MAX);
+            self.ctrl.write(1);
+        }
+    }
+}
+
+/// The board's input and output block, as far as it is used.
+#[repr(C)]
+struct FpgaIoBlock {
+    led: RW<u32>,
+    _reserved: [u32; 5],
+    counter: RO<u32>,
+    prescale: RW<u32>,
+}
+
+impl FpgaIoBlock {
+    fn write_led(&self, on: u32) {
+        // SAFETY: switches lights.
+        unsafe { self.led.write(on) }
+    }
+
+    fn write_prescale(&self, reload: u32) {
+        // SAFETY: sets the rate of the counter.
+        unsafe { self.prescale.write(reload) }
+    }
+}
+
+/// CMSDK UART: one byte of buffer in each direction.
+#[repr(C)]
+struct UartBlock {
+    data: RW<u32>,
+    state: RO<u32>,
+    ctrl: RW<u32>,
+    interrupts: RW<u32>,
+    baud_divider: RW<u32>,
+}
+
+/// Control: enable the transmitter, the receiver, the interrupts of both.
+const TRANSMIT: u32 = 1;
+const RECEIVE: u32 = 1 << 1;
+const INTERRUPTS: u32 = 0b11 << 2;
+/// State: the transmit buffer is full, the receive buffer is full.
+const TX_FULL: u32 = 1;
+const RX_FULL: u32 = 1 << 1;
+
+impl UartBlock {
+    fn start(&self, control: u32) {
+        // SAFETY: 16 is the least divider that the UART takes.
+        unsafe {
+            self.baud_divider.write(16);
+            self.ctrl.write(control);
+        }
+    }
+
+    fn clear_interrupts(&self) {
+        // SAFETY: writing ones clears both.
+        unsafe { self.interrupts.write(0b11) }
+    }
+
+    fn send(&self, byte: u8) -> nb::Result<(), Infallible> {
+        if self.state.read() & TX_FULL != 0 {
+            return Err(nb::Error::WouldBlock);
+        }
+        // SAFETY: the buffer has room.
+        unsafe { self.data.write(u32::from(byte)) };
+        Ok(())
+    }
+}
+
+/// UART0, of which there is one owner.
+pub struct Uart(At<UartBlock>);
+
+impl serial::ErrorType for Uart {
+    type Error = Infallible;
+}
+
+impl Read<u8> for Uart {
+    fn read(&mut self) -> nb::Result<u8, Infallible> {
+        let uart = self.0.get();
+        if uart.state.read() & RX_FULL == 0 {
+            return Err(nb::Error::WouldBlock);
+        }
+        Ok(uart.data.read() as u8)
+    }
+}
+
+impl Write<u8> for Uart {
+    fn write(&mut self, byte: u8) -> nb::Result<(), Infallible> {
+        self.0.get().send(byte)
+    }
+
+    fn flush(&mut self) -> nb::Result<(), Infallible> {
+        match self.0.get().state.read() & TX_FULL {
+            0 => Ok(()),
+            _ => Err(nb::Error::WouldBlock),
+        }
+    }
+}
+
+/// LED 0, active high.
+pub struct Led;
+
+impl digital::ErrorType for Led {
+    type Error = Infallible;
+}
+
+impl OutputPin for Led {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        FPGAIO.get().write_led(0);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        FPGAIO.get().write_led(1);
+        Ok(())
+    }
+}

@@ -1,0 +1,22 @@
+//! The skin around `haptic-core` on a Cortex-M: clock, bus, tick and log. It carries bytes to the controller
+//! and from it, and decides nothing.
+//!
+//! - [`slcan_can`]: a serial port as a CAN controller (`embedded-can`), by SLCAN.
+//! - `boards`: the [`boards::Board`] trait and one file per board; a feature of the same name chooses it.
+//! - `log`: defmt over the board's log port.
+//!
+//! Images (`src/bin`): `steering-ecu`, the product; `lockstep`, the same controller driven tick by tick by a
+//! simulator; `gate`, which links only if the controller cannot panic.
+//!
+//! The program is one loop with interrupts masked: a tick or a byte makes its interrupt pending, which wakes
+//! the core from `wfi` and runs no handler. So nothing is shared, nothing is preempted, and the longest turn
+//! of the loop bounds the jitter.
+
+#![cfg_attr(target_os = "none", no_std)]
+
+pub mod slcan_can;
+
+#[cfg(target_os = "none")]
+pub mod boards;
+#[cfg(target_os = "none")]
+pub mod log;

@@ -1,0 +1,47 @@
+//! Builds the lock-step image and finds its ELF.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::PilError;
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+const BOARD: &str = "mps2-an386";
+
+/// Builds the image with cargo, from the sources that this program was built from, and returns its ELF.
+///
+/// # Errors
+/// The sources, cargo or the Rust target are missing, or the build fails.
+pub fn build() -> Result<PathBuf, PilError> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    if !root.join("firmware/Cargo.toml").is_file() {
+        return Err(PilError(format!(
+            "the firmware's sources are not at {}: run from the repository that this program was built in",
+            root.display()
+        )));
+    }
+    // The cargo that runs this program, so that both use one toolchain.
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(&cargo)
+        .current_dir(&root)
+        .args(["build", "--release", "-p", "haptic-firmware", "--bin", "lockstep"])
+        .args(["--target", TARGET, "--features", BOARD])
+        .arg("--message-format=json-render-diagnostics")
+        .stderr(Stdio::piped())
+        .output()
+        .map_err(|e| PilError(format!("cargo does not start: {e}")))?;
+    if !output.status.success() {
+        let text = String::from_utf8_lossy(&output.stderr);
+        if text.contains("can't find crate for `core`") {
+            return Err(PilError(format!(
+                "the Rust target is missing: rustup target add {TARGET}"
+            )));
+        }
+        return Err(PilError(format!("the lock-step image does not build:\n{text}")));
+    }
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from))
+        .ok_or_else(|| PilError("cargo names no executable for the lock-step image".into()))
+}

@@ -1,0 +1,253 @@
+//! Reads the target's answers and compares them with what the host's controller said.
+
+use std::fmt;
+use std::io::Read;
+use std::process::ChildStdout;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::{Guidance, Message};
+use haptic_core::lockstep::StepCost;
+use haptic_core::quantity::Instant;
+use serde::Serialize;
+
+use super::link::Decoder;
+use super::qemu::{Qemu, instructions};
+use super::{Channel, PilError, Report};
+
+/// Longest wait for the next bytes of a target that owes an answer. Starting takes a tenth of a second.
+const SILENCE: Duration = Duration::from_secs(20);
+/// Longest wait for a target to quit after its run.
+const EXIT: Duration = Duration::from_secs(5);
+
+/// Most frames of one answer: guidance, a warning, a line of the fault history.
+const ANSWER_MAX: usize = 3;
+
+/// What the host's controller answered at a tick. No allocation: there is one each step.
+pub(super) struct Expected {
+    now: Instant,
+    answer: [Option<Frame>; ANSWER_MAX],
+}
+
+impl Expected {
+    pub(super) fn new(now: Instant, answer: &[Frame]) -> Self {
+        assert!(
+            answer.len() <= ANSWER_MAX,
+            "a step answers with {ANSWER_MAX} frames at most"
+        );
+        Self {
+            now,
+            answer: std::array::from_fn(|i| answer.get(i).copied()),
+        }
+    }
+}
+
+/// A tick at which the two controllers differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mismatch {
+    /// Number of the step, from 0.
+    pub step: u64,
+    /// Time of the tick.
+    pub now: Instant,
+    /// The host's frame, if it sent one.
+    pub host: Option<Frame>,
+    /// The target's.
+    pub target: Option<Frame>,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "first difference at step {}, {} us:", self.step, self.now.us())?;
+        writeln!(f, "  host   {}", Decoded(self.host))?;
+        write!(f, "  target {}", Decoded(self.target))
+    }
+}
+
+/// A frame's bytes and, if it is a guidance frame, its signals.
+struct Decoded(Option<Frame>);
+
+impl fmt::Display for Decoded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(frame) = self.0 else {
+            return write!(f, "no frame");
+        };
+        write!(f, "{:03X} {:02X?}", frame.id(), frame.data())?;
+        let data = match <[u8; 8]>::try_from(frame.data()) {
+            Ok(data) if frame.id() == Guidance::ID => data,
+            _ => return Ok(()),
+        };
+        let counter = data[1] & 0x0F;
+        let crc = if Guidance::PROTECTION.is_intact(&data) {
+            "good"
+        } else {
+            "bad"
+        };
+        match Guidance::unpack(u64::from_le_bytes(data)) {
+            Some(guidance) => write!(
+                f,
+                ": torque {:.6} N.m, limit {:?}, mode {:?}, faults {:?}, counter {counter}, CRC {crc}",
+                guidance.torque.nm(),
+                guidance.limit,
+                guidance.mode,
+                guidance.faults
+            ),
+            None => write!(f, ": a signal is out of range, counter {counter}, CRC {crc}"),
+        }
+    }
+}
+
+/// Instructions that the target spent on the ticks of a run: all frames received, and the step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Instructions {
+    /// The most of any tick.
+    pub worst: u32,
+    /// Number of that tick, from 0.
+    pub worst_step: u64,
+    /// The mean.
+    pub mean: f64,
+}
+
+pub(super) struct Judge {
+    qemu: Qemu,
+    bytes: Receiver<Vec<u8>>,
+    decoder: Decoder,
+    pending: std::vec::IntoIter<u8>,
+    count: bool,
+    report: Report,
+}
+
+impl Judge {
+    pub(super) fn new(qemu: Qemu, output: ChildStdout, channel_kind: Channel, count: bool) -> Self {
+        Self {
+            qemu,
+            bytes: pump(output),
+            decoder: Decoder::new(channel_kind),
+            pending: Vec::new().into_iter(),
+            count,
+            report: Report {
+                channel: channel_kind,
+                steps: 0,
+                frames_compared: 0,
+                mismatches: 0,
+                steps_per_second: 0.0,
+                instructions: None,
+                first_mismatch: None,
+            },
+        }
+    }
+
+    /// Compares until nothing more is expected. Ends the machine.
+    pub(super) fn run(mut self, expected: &Receiver<Expected>) -> Result<Report, PilError> {
+        let mut start = None;
+        let mut total = 0_u64;
+        for expected in expected {
+            let start = *start.get_or_insert_with(std::time::Instant::now);
+            total += u64::from(self.step(&expected)?);
+            self.report.steps += 1;
+            self.report.steps_per_second = self.report.steps as f64 / start.elapsed().as_secs_f64();
+        }
+        if let Some(instructions) = &mut self.report.instructions {
+            instructions.mean = total as f64 / self.report.steps as f64;
+        }
+        match self.qemu.wait(EXIT) {
+            Some(status) if status.success() => {}
+            Some(_) => return Err(self.gone("failed at the end of the run")),
+            None => return Err(self.gone("does not end")),
+        }
+        if self.report.mismatches == 0 {
+            self.qemu.discard_log();
+        }
+        Ok(self.report)
+    }
+
+    /// Compares one answer. Returns the instructions of the step.
+    fn step(&mut self, expected: &Expected) -> Result<u32, PilError> {
+        let mut host = expected.answer.iter().flatten().copied();
+        let cycles = loop {
+            let frame = self.frame()?;
+            if let Some(StepCost { cycles }) = StepCost::decode(&frame) {
+                break cycles;
+            }
+            self.compare(expected.now, host.next(), Some(frame));
+        };
+        for missing in host {
+            self.compare(expected.now, Some(missing), None);
+        }
+        Ok(self.account(cycles))
+    }
+
+    fn compare(&mut self, now: Instant, host: Option<Frame>, target: Option<Frame>) {
+        let report = &mut self.report;
+        report.frames_compared += 1;
+        if target != host {
+            report.mismatches += 1;
+            report.first_mismatch.get_or_insert(Mismatch {
+                step: report.steps,
+                now,
+                host,
+                target,
+            });
+        }
+    }
+
+    /// Instructions of a step; without counting, cycles mean nothing.
+    fn account(&mut self, cycles: u32) -> u32 {
+        if !self.count {
+            return 0;
+        }
+        let spent = instructions(cycles);
+        let counted = self.report.instructions.get_or_insert_default();
+        if spent > counted.worst {
+            counted.worst = spent;
+            counted.worst_step = self.report.steps;
+        }
+        spent
+    }
+
+    /// The next frame from the target.
+    fn frame(&mut self) -> Result<Frame, PilError> {
+        loop {
+            for byte in self.pending.by_ref() {
+                match self.decoder.push(byte) {
+                    Ok(Some(frame)) => return Ok(frame),
+                    Ok(None) => {}
+                    Err(what) => return Err(self.gone(&format!("answered with {what}"))),
+                }
+            }
+            self.pending = match self.bytes.recv_timeout(SILENCE) {
+                Ok(bytes) => bytes.into_iter(),
+                Err(RecvTimeoutError::Timeout) => {
+                    return Err(self.gone(&format!("was silent for {} s", SILENCE.as_secs())));
+                }
+                Err(RecvTimeoutError::Disconnected) => return Err(self.gone("quit")),
+            };
+        }
+    }
+
+    fn gone(&mut self, what: &str) -> PilError {
+        let status = self
+            .qemu
+            .wait(Duration::from_millis(500))
+            .map_or(String::new(), |status| format!(" ({status})"));
+        PilError(format!(
+            "the target {what} after {} steps{status}; its log: cargo xtask log {}",
+            self.report.steps,
+            self.qemu.log().display()
+        ))
+    }
+}
+
+/// Reads on a thread of its own, so that waiting for bytes can have a limit.
+fn pump(mut output: ChildStdout) -> Receiver<Vec<u8>> {
+    let (to, from) = channel();
+    std::thread::spawn(move || {
+        let mut buffer = [0; 65536];
+        while let Ok(n @ 1..) = output.read(&mut buffer) {
+            if to.send(buffer[..n].to_vec()).is_err() {
+                return;
+            }
+        }
+    });
+    from
+}

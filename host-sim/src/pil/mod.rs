@@ -1,0 +1,234 @@
+//! Processor in the loop: the same frames to the controller of this host and to the ELF in QEMU, and every
+//! frame of their answers compared byte for byte.
+//!
+//! The closed loop runs here with its own `Ecu`; whoever runs it reports each tick with [`Pil::tick`]. The
+//! target gets the frames of the tick and then the time, steps, and answers with its own. Since both
+//! controllers must answer the same, the host need not wait: over the pipe (*fifo*) thousands of ticks are
+//! under way at once, over SLCAN one, as an outside client of the bus would do it.
+//!
+//! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`link`]: frames as bytes.
+//! - [`judge`]: reads the answers, on its own thread.
+//!
+//! Not here: the plant and the scenario.
+
+pub mod image;
+pub mod judge;
+mod link;
+pub mod qemu;
+
+use std::fmt;
+use std::io::{BufWriter, Write};
+use std::process::ChildStdin;
+use std::str::FromStr;
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::SimTime;
+use haptic_core::lockstep::{Start, parameter_frames};
+use haptic_core::params::Params;
+use haptic_core::quantity::Instant;
+use serde::Serialize;
+
+use judge::{Expected, Judge};
+pub use judge::{Instructions, Mismatch};
+use qemu::Qemu;
+
+/// How frames reach the target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Channel {
+    /// Binary records on pipes, by semihosting: fast.
+    Fifo,
+    /// SLCAN lines on the board's bus port: what an outside client does.
+    Slcan,
+}
+
+impl Channel {
+    /// Ticks under way at once. The pipe's are many more than one write buffer holds.
+    const fn window(self) -> usize {
+        match self {
+            Self::Fifo => 4096,
+            Self::Slcan => 0,
+        }
+    }
+}
+
+impl fmt::Display for Channel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fifo => "fifo",
+            Self::Slcan => "slcan",
+        })
+    }
+}
+
+impl FromStr for Channel {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "fifo" => Ok(Self::Fifo),
+            "slcan" => Ok(Self::Slcan),
+            _ => Err(format!("channel '{text}' is neither fifo nor slcan")),
+        }
+    }
+}
+
+/// What went wrong, in one line, with what to do about it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PilError(pub String);
+
+impl fmt::Display for PilError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for PilError {}
+
+/// What a run showed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// How frames reached the target.
+    pub channel: Channel,
+    /// Steps of the controller, 1 ms each.
+    pub steps: u64,
+    /// Frames of the answers compared: a torque frame each step, and what goes with some.
+    pub frames_compared: u64,
+    /// Frames that differed in a byte, or that only one controller sent.
+    pub mismatches: u64,
+    /// Steps in a second of wall time, from the first tick on.
+    pub steps_per_second: f64,
+    /// What a step cost the target, if it was counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instructions: Option<Instructions>,
+    /// The first difference.
+    #[serde(skip)]
+    pub first_mismatch: Option<Mismatch>,
+}
+
+/// A run under way. Dropping it ends the target.
+pub struct Pil {
+    /// None once the run is over: closing it tells the target so.
+    input: Option<BufWriter<ChildStdin>>,
+    expected: Option<SyncSender<Expected>>,
+    judge: Option<JoinHandle<Result<Report, PilError>>>,
+    channel: Channel,
+}
+
+impl Pil {
+    /// Builds the image, starts it in QEMU, and starts its controller as the host's ([`Start::ecu`]). With
+    /// `count`, the target counts its instructions.
+    ///
+    /// # Errors
+    /// What is missing or fails on the way to a running image.
+    pub fn start(channel: Channel, params: &Params, start: Start, count: bool) -> Result<Self, PilError> {
+        let elf = image::build()?;
+        let (qemu, input, output) = Qemu::start(&elf, channel, count)?;
+        let (expected, expectations) = sync_channel(channel.window());
+        let judge = Judge::new(qemu, output, channel, count);
+        let mut pil = Self {
+            input: Some(BufWriter::new(input)),
+            expected: Some(expected),
+            judge: Some(std::thread::spawn(move || judge.run(&expectations))),
+            channel,
+        };
+        pil.greet(params, start)?;
+        Ok(pil)
+    }
+
+    fn greet(&mut self, params: &Params, start: Start) -> Result<(), PilError> {
+        if self.channel == Channel::Slcan {
+            self.write(link::OPEN)?;
+        }
+        for frame in parameter_frames(params) {
+            self.send(&frame)?;
+        }
+        self.send(&start.encode())
+    }
+
+    /// Reports one tick of the host's loop: the frames that its ECU received at `now`, in order, and the frames
+    /// that it then answered with: guidance first, then the others of its step.
+    ///
+    /// # Errors
+    /// Why the target stopped answering. A wrong answer is no error: the report counts it.
+    pub fn tick(&mut self, now: Instant, frames: &[Frame], answer: &[Frame]) -> Result<(), PilError> {
+        let Some(sender) = &self.expected else {
+            return Err(self.failure());
+        };
+        let sent = match sender.try_send(Expected::new(now, answer)) {
+            // Wait for answers, which cannot come to what still lies in the buffer.
+            Err(TrySendError::Full(expected)) => {
+                let flushed = self.input.as_mut().map_or(Ok(()), Write::flush);
+                flushed.is_ok() && sender.send(expected).is_ok()
+            }
+            result => result.is_ok(),
+        };
+        if !sent {
+            return Err(self.failure());
+        }
+        for frame in frames {
+            self.send(frame)?;
+        }
+        self.send(&SimTime(now).encode())
+    }
+
+    /// Waits for the last answers and ends the target.
+    ///
+    /// # Errors
+    /// Why the target stopped answering.
+    pub fn finish(mut self) -> Result<Report, PilError> {
+        self.end()
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), PilError> {
+        let bytes = link::encode(self.channel, frame);
+        self.write(&bytes)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PilError> {
+        match self.input.as_mut().map(|input| input.write_all(bytes)) {
+            Some(Ok(())) => Ok(()),
+            _ => Err(self.failure()),
+        }
+    }
+
+    /// Why the other end is gone: the judge knows.
+    fn failure(&mut self) -> PilError {
+        match self.end() {
+            Err(error) => error,
+            Ok(report) => PilError(format!(
+                "the target ended the run by itself after {} steps",
+                report.steps
+            )),
+        }
+    }
+
+    /// Says that no more is expected, closes the target's input, and takes the judge's word.
+    fn end(&mut self) -> Result<Report, PilError> {
+        self.expected = None;
+        if let Some(mut input) = self.input.take()
+            && self.channel == Channel::Slcan
+        {
+            // Lost only if the target is gone, which the judge will say.
+            let _ = input.write_all(link::CLOSE);
+        }
+        let judge = self
+            .judge
+            .take()
+            .ok_or_else(|| PilError("the run is over".into()))?;
+        judge
+            .join()
+            .unwrap_or_else(|_| Err(PilError("the thread that reads the target panicked".into())))
+    }
+}
+
+impl Drop for Pil {
+    fn drop(&mut self) {
+        if self.judge.is_some() {
+            // An error elsewhere broke the run off: what the judge found is of no interest, only that QEMU ends.
+            let _ = self.end();
+        }
+    }
+}

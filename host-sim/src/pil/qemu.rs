@@ -1,0 +1,119 @@
+//! The machine: one QEMU process, killed when its owner is dropped.
+//!
+//! The bytes of the channel travel on the process's own standard input and output: by semihosting for the fifo,
+//! as the board's UART for SLCAN. So when this program dies in whatever way, the fifo's image reads the end of
+//! its input and quits; a terminal's interrupt reaches QEMU as well as this program.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{Channel, PilError};
+
+const PROGRAM: &str = "qemu-system-arm";
+
+/// Nanoseconds of the target's clock in one instruction, and in one cycle of its 25 MHz counter, when QEMU
+/// counts instructions with `-icount shift=10`.
+const NS_PER_INSTRUCTION: u64 = 1 << 10;
+const NS_PER_CYCLE: u64 = 40;
+
+/// Instructions in a span of counter cycles, to the nearest.
+#[must_use]
+pub fn instructions(cycles: u32) -> u32 {
+    let ns = u64::from(cycles) * NS_PER_CYCLE;
+    u32::try_from((ns + NS_PER_INSTRUCTION / 2) / NS_PER_INSTRUCTION).unwrap_or(u32::MAX)
+}
+
+/// A running machine.
+pub struct Qemu {
+    child: Child,
+    log: PathBuf,
+}
+
+impl Qemu {
+    /// Starts the lock-step image. Its log goes, still encoded, to a file beside the ELF.
+    ///
+    /// # Errors
+    /// QEMU is not installed or does not start.
+    pub fn start(
+        elf: &Path,
+        channel: Channel,
+        count: bool,
+    ) -> Result<(Self, ChildStdin, ChildStdout), PilError> {
+        let log = elf.with_file_name(format!("lockstep-{channel}-{}.log", std::process::id()));
+        let mut command = Command::new(PROGRAM);
+        command.args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none"]);
+        command.arg("-serial").arg(match channel {
+            Channel::Fifo => "null",
+            Channel::Slcan => "stdio",
+        });
+        command.arg("-serial").arg(format!("file:{}", log.display()));
+        command
+            .arg("-semihosting-config")
+            .arg(format!("enable=on,target=native,arg=lockstep,arg={channel}"));
+        if count {
+            command.args(["-icount", "shift=10"]);
+        }
+        command.arg("-kernel").arg(elf);
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|e| match e.kind() {
+                std::io::ErrorKind::NotFound => {
+                    PilError(format!("{PROGRAM} is missing: apt-get install {PROGRAM}"))
+                }
+                _ => PilError(format!("{PROGRAM} does not start: {e}")),
+            })?;
+        let pipes = child.stdin.take().zip(child.stdout.take());
+        let qemu = Self { child, log };
+        let (input, output) = pipes.ok_or_else(|| PilError(format!("{PROGRAM} has no pipes")))?;
+        Ok((qemu, input, output))
+    }
+
+    /// Where the encoded log is.
+    #[must_use]
+    pub fn log(&self) -> &Path {
+        &self.log
+    }
+
+    /// Waits for the machine to quit by itself; None if it does not within `limit`.
+    pub fn wait(&mut self, limit: Duration) -> Option<ExitStatus> {
+        let start = Instant::now();
+        while start.elapsed() < limit {
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return Some(status);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        None
+    }
+
+    /// The run went well: nobody will ask for its log.
+    pub fn discard_log(&self) {
+        let _ = std::fs::remove_file(&self.log);
+    }
+}
+
+impl Drop for Qemu {
+    fn drop(&mut self) {
+        // Both fail only for a process that is gone already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::instructions;
+
+    /// At `shift=10` an instruction lasts 1024 ns, 25.6 cycles of 40 ns.
+    #[test]
+    fn cycles_are_whole_instructions() {
+        assert_eq!(instructions(0), 0);
+        assert_eq!(instructions(26), 1);
+        assert_eq!(instructions(256), 10);
+        assert_eq!(instructions(25_600), 1000);
+        assert_eq!(instructions(u32::MAX), 167_772_160);
+    }
+}
