@@ -174,8 +174,9 @@ impl Envelope {
             let margin = sum(toward, self.override_from);
             let shrunk = i64::from(self.absolute.bits())
                 .saturating_add(product(self.override_slope.bits(), margin.bits()));
-            // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway.
-            Torque::from_wide(shrunk.clamp(0, i64::from(self.absolute.bits())))
+            // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway. Not
+            // `clamp`, which panics where its bounds are out of order.
+            Torque::from_wide(shrunk.min(i64::from(self.absolute.bits())).max(0))
         };
         (bound(driver.opposite()).opposite(), bound(driver))
     }
