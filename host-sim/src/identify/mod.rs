@@ -2,7 +2,8 @@
 //! carry them.
 //!
 //! Two estimators share one log, one muscle and one form of result: [`noise_model`] (the default) and
-//! [`paper`] (the published way, kept as the baseline it is compared with). Terms: *a_1, a_2, a_3, t_p, K_d,
+//! [`paper`] (the published way, kept as the baseline it is compared with); [`tracking`] follows a driver who
+//! changes. Terms: *a_1, a_2, a_3, t_p, K_d,
 //! K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
 //! and a_i; the *remnant* is the part of the driver's torque that no linear model of the inputs explains.
 //!
@@ -16,6 +17,7 @@ mod paper;
 mod result;
 mod search;
 mod signals;
+mod tracking;
 
 pub use diagnostics::fit_percent;
 pub use log::{COLUMNS, DriveLog, LogError};
@@ -28,3 +30,4 @@ pub use result::{
 };
 pub use search::Termination;
 pub use signals::Muscle;
+pub use tracking::{Course, Tracking, WANDERING_PER_ROOT_S, track};

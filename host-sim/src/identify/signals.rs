@@ -158,6 +158,14 @@ impl Delay {
         let input = u0 + self.fraction * (u1 - u0);
         (value, (value - input) * self.per_t_nms)
     }
+
+    /// `u(t_k - t_p)` itself and its derivative with respect to t_p.
+    #[inline]
+    pub(crate) fn read_raw(&self, u: &[f64], k: usize, dt_s: f64) -> (f64, f64) {
+        let j = k - self.samples;
+        let (u0, u1) = (u[j], u[(j + 1).min(u.len() - 1)]);
+        (u0 + self.fraction * (u1 - u0), (u0 - u1) / dt_s)
+    }
 }
 
 /// Corners of the straight lines that have, between samples, the area of the parabolas through them.
