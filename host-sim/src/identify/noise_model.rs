@@ -68,6 +68,9 @@ const START_CORNERS_HZ: [f64; 2] = [0.5, 5.0];
 /// Expected improvement, as a share of the loss, below which the search ends. With tens of thousands of rows
 /// this leaves the estimate within two hundredths of a standard error of the optimum.
 const TOLERANCE: f64 = 1e-8;
+/// Prediction errors below this, N.m, are those of interpolation in a record without noise: no sensor resolves
+/// them, and no share of them is worth an iteration.
+const SMALLEST_ERROR_NM: f64 = 1e-5;
 
 /// Identifies the driver of `log`.
 pub fn identify(log: &DriveLog, options: &Options) -> Identification {
@@ -194,7 +197,7 @@ impl<'a> Problem<'a> {
         });
         Quadratic {
             loss: 0.5 * loss,
-            scale: 0.5 * loss,
+            scale: 0.5 * loss.max(SMALLEST_ERROR_NM.powi(2) * (self.signals.len() - self.first_row) as f64),
             gradient: DVector::from_fn(COUNT, |i, _| if i < N { gradient[i] } else { 0.0 }),
             hessian: DMatrix::from_fn(COUNT, COUNT, |i, j| {
                 if i.max(j) < N {
@@ -262,8 +265,15 @@ impl<'a> Problem<'a> {
         let rows = self.signals.len() - self.first_row;
         let variance = 2.0 * optimum.quadratic.loss / rows.saturating_sub(free.len()).max(1) as f64;
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
-        // Where the search would have gone without bounds.
-        let pull = pull_of_bounds(&errors, &optimum.quadratic.gradient, variance);
+        // Where the search would have gone without bounds, if it came to rest on one.
+        let held = [K_HG, T_P]
+            .into_iter()
+            .any(|i| self.is_free(i) && self.bounds[i].touches(p[i]));
+        let pull = if held {
+            pull_of_bounds(&errors, &optimum.quadratic.gradient, variance)
+        } else {
+            DVector::zeros(COUNT)
+        };
         let parameter = |i: usize| {
             if self.is_free(i) {
                 Parameter::estimated(
