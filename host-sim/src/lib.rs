@@ -1,7 +1,9 @@
 //! The world around the controller, and the workbench that studies it.
 
 pub mod identify;
+pub mod input;
 pub mod metrics;
+pub mod models;
 pub mod pil;
 pub mod plot;
 pub mod report;

@@ -1,0 +1,58 @@
+//! Input that a person wrote (course, scenario, options), and what is wrong with it.
+
+use std::fmt::{self, Display};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// Bad input: which file or option, and what is wrong with it. Never a fault of the program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputError {
+    source: String,
+    message: String,
+}
+
+impl InputError {
+    /// `source` names the file or option, `message` the field, its value and its range.
+    pub fn new(source: impl Display, message: impl Display) -> Self {
+        Self {
+            source: source.to_string(),
+            message: message.to_string().trim_end().to_string(),
+        }
+    }
+}
+
+impl Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.source, self.message)
+    }
+}
+
+impl std::error::Error for InputError {}
+
+/// Text of a file.
+///
+/// # Errors
+/// Names the file and what the system says of it.
+pub fn read(path: &Path) -> Result<String, InputError> {
+    std::fs::read_to_string(path).map_err(|e| InputError::new(path.display(), e))
+}
+
+/// Refuses a value outside `range`, and NaN, in a sentence that names field, value and range.
+///
+/// # Errors
+/// The sentence, without the file.
+pub fn in_range(field: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> Result<(), String> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    let unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
+    Err(format!(
+        "{field} = {value}{unit} is outside {} to {}{unit}",
+        range.start(),
+        range.end()
+    ))
+}

@@ -1,0 +1,316 @@
+//! The centreline as a curve to project onto.
+//!
+//! The course is cut into cells, each with its exact position, heading and curvature at its middle. Inside a
+//! cell the clothoid is its Taylor expansion about the middle, so a projection needs no trigonometry: cells
+//! are short enough (`MAX_CELL_M`, `MAX_CELL_TURN_RAD`) that the terms left out stay below 1e-9 m. The foot
+//! of the perpendicular is found by Newton's method, starting from where the same point was last seen: a
+//! `Tracker` walks forward with its point, so a course may cross itself.
+
+use super::{Course, Segment};
+
+/// Longest cell, m.
+const MAX_CELL_M: f64 = 1.0;
+/// Largest change of heading within a cell, rad. Half of it is the largest angle in the expansion, whose
+/// first neglected terms are of fifth order: 0.0025^4 * 0.5 m / 120 is 2e-13 m.
+const MAX_CELL_TURN_RAD: f64 = 0.005;
+/// A Newton step below this ends the search, m. Convergence is quadratic with a factor below 1 per metre, so
+/// the foot is then within 1e-8 m along the curve, and its distance within 1e-16 m.
+const CONVERGED_M: f64 = 1e-4;
+/// A point that needs more steps has left the region where its perpendicular is unique.
+const MAX_NEWTON_STEPS: usize = 20;
+/// The projection is refused where 1 - curvature * offset falls below this: so close to the centre of the
+/// curve that the foot of the perpendicular is not unique any more.
+const MIN_DETERMINANT: f64 = 0.1;
+/// How far beyond its ends the centreline is continued, m: enough for the step that finds the end.
+const OVERRUN_M: f64 = 2.0;
+
+/// A piece of the centreline, expanded about its middle.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// Arc length at the middle, m.
+    s_m: f64,
+    /// Half the arc length, m.
+    half_m: f64,
+    x_m: f64,
+    y_m: f64,
+    /// Unit tangent.
+    tangent: [f64; 2],
+    heading_rad: f64,
+    curvature_1pm: f64,
+    /// Change of curvature with arc length, 1/m^2.
+    curvature_slope_1pm2: f64,
+}
+
+/// A course turned into a curve.
+#[derive(Debug, Clone)]
+pub struct Centreline {
+    cells: Vec<Cell>,
+    length_m: f64,
+    lane_width_m: f64,
+}
+
+/// The foot of the perpendicular from a point to the centreline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Foot {
+    /// Arc length, m. May lie up to 2 m beyond the ends of the course.
+    pub s_m: f64,
+    /// Signed distance of the point from the centreline, m, positive when the point lies to the left.
+    pub offset_m: f64,
+    /// Heading of the centreline, rad, not wrapped: it counts full turns.
+    pub heading_rad: f64,
+    /// Curvature of the centreline, 1/m, left positive.
+    pub curvature_1pm: f64,
+}
+
+/// Where a moving point was last projected, and how far it had come since the time before.
+#[derive(Debug, Clone, Copy)]
+pub struct Tracker {
+    cell: usize,
+    s_m: f64,
+    advance_m: f64,
+}
+
+impl Centreline {
+    /// Starts at the origin, heading along x.
+    pub fn new(course: &Course) -> Self {
+        let mut cells = Vec::new();
+        let (mut x, mut y, mut heading, mut s) = (0.0, 0.0, 0.0, 0.0);
+        for segment in course.segments() {
+            let Segment {
+                length_m,
+                curvature_start_1pm: start,
+                curvature_end_1pm: end,
+            } = *segment;
+            let turn = start.abs().max(end.abs()) * length_m;
+            let count = (length_m / MAX_CELL_M)
+                .max(turn / MAX_CELL_TURN_RAD)
+                .ceil()
+                .max(1.0);
+            let half_m = 0.5 * length_m / count;
+            let slope = (end - start) / length_m;
+            for i in 0..count as usize {
+                let middle = (2 * i + 1) as f64 * half_m;
+                let curvature = start + slope * middle;
+                let entry_curvature = curvature - slope * half_m;
+                let (dx, dy) = arc(heading, entry_curvature, slope, half_m);
+                let heading_mid = heading + (entry_curvature + 0.5 * slope * half_m) * half_m;
+                cells.push(Cell {
+                    s_m: s + middle,
+                    half_m,
+                    x_m: x + dx,
+                    y_m: y + dy,
+                    tangent: [heading_mid.cos(), heading_mid.sin()],
+                    heading_rad: heading_mid,
+                    curvature_1pm: curvature,
+                    curvature_slope_1pm2: slope,
+                });
+                let (dx2, dy2) = arc(heading_mid, curvature, slope, half_m);
+                (x, y) = (x + dx + dx2, y + dy + dy2);
+                heading = heading_mid + (curvature + 0.5 * slope * half_m) * half_m;
+            }
+            s += length_m;
+        }
+        Self {
+            cells,
+            length_m: s,
+            lane_width_m: course.lane_width_m(),
+        }
+    }
+
+    /// Arc length of the whole course, m.
+    pub fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
+    /// Width of the lane whose middle is the centreline, m.
+    pub fn lane_width_m(&self) -> f64 {
+        self.lane_width_m
+    }
+
+    /// A tracker for a point that is first seen near arc length `s_m`.
+    pub fn tracker(&self, s_m: f64) -> Tracker {
+        let cell = self
+            .cells
+            .partition_point(|c| c.s_m + c.half_m < s_m)
+            .min(self.cells.len() - 1);
+        Tracker {
+            cell,
+            s_m,
+            advance_m: 0.0,
+        }
+    }
+
+    /// The foot of the perpendicular from `(x_m, y_m)` that continues the tracker's last one; distances are
+    /// within 1e-8 m. `None` where there is no unique foot nearby: more than 2 m beyond the ends, or close
+    /// to the centre of curvature.
+    #[inline]
+    pub fn project(&self, x_m: f64, y_m: f64, tracker: &mut Tracker) -> Option<Foot> {
+        let mut s = tracker.s_m + tracker.advance_m;
+        let mut index = tracker.cell;
+        for _ in 0..MAX_NEWTON_STEPS {
+            let mut cell = &self.cells[index];
+            while s > cell.s_m + cell.half_m && index + 1 < self.cells.len() {
+                index += 1;
+                cell = &self.cells[index];
+            }
+            while s < cell.s_m - cell.half_m && index > 0 {
+                index -= 1;
+                cell = &self.cells[index];
+            }
+            let sigma = s - cell.s_m;
+            let (k0, k1) = (cell.curvature_1pm, cell.curvature_slope_1pm2);
+            // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
+            let theta = sigma * (k0 + 0.5 * k1 * sigma);
+            let sigma2 = sigma * sigma;
+            let along =
+                sigma - sigma2 * sigma * (k0 * k0 / 6.0 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
+            let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - k0 * k0 * k0 * sigma2 / 24.0);
+            let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
+            let [tx, ty] = cell.tangent;
+            let (dx, dy) = (x_m - cell.x_m, y_m - cell.y_m);
+            let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
+            let distance_to_foot = ahead * cos + left * sin;
+            let offset_m = left * cos - ahead * sin;
+            let curvature = k0 + k1 * sigma;
+            let determinant = 1.0 - curvature * offset_m;
+            if determinant.is_nan() || determinant < MIN_DETERMINANT {
+                return None;
+            }
+            let step = distance_to_foot / determinant;
+            s += step;
+            if step.abs() < CONVERGED_M {
+                if s < -OVERRUN_M || s > self.length_m + OVERRUN_M {
+                    return None;
+                }
+                *tracker = Tracker {
+                    cell: index,
+                    s_m: s,
+                    advance_m: s - tracker.s_m,
+                };
+                return Some(Foot {
+                    s_m: s,
+                    offset_m,
+                    heading_rad: cell.heading_rad + theta + curvature * step,
+                    curvature_1pm: curvature,
+                });
+            }
+            s = s.clamp(-OVERRUN_M, self.length_m + OVERRUN_M);
+        }
+        None
+    }
+}
+
+/// Displacement along a clothoid that starts with `heading` and `curvature`: Gauss-Legendre with five points,
+/// exact to rounding for the small turn of half a cell.
+fn arc(heading: f64, curvature: f64, slope: f64, length: f64) -> (f64, f64) {
+    const NODES: [(f64, f64); 5] = [
+        (0.0, 0.568_888_888_888_888_9),
+        (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+        (-0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+        (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+        (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    ];
+    let half = 0.5 * length;
+    NODES.iter().fold((0.0, 0.0), |(x, y), (node, weight)| {
+        let s = half * (1.0 + node);
+        let theta = heading + s * (curvature + 0.5 * slope * s);
+        (x + half * weight * theta.cos(), y + half * weight * theta.sin())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn centreline(text: &str) -> Centreline {
+        Centreline::new(&Course::from_toml("t.toml", text).unwrap())
+    }
+
+    /// Projects a point near arc length `s`, as a fresh tracker sees it.
+    fn foot(line: &Centreline, x: f64, y: f64, s: f64) -> Option<Foot> {
+        line.project(x, y, &mut line.tracker(s))
+    }
+
+    #[test]
+    fn a_circle_is_a_circle() {
+        let radius = 50.0;
+        let line = centreline("[[segment]]\nlength = 300\ncurvature = 0.02");
+        for (s, offset) in [(0.0, 0.0), (10.0, 3.0), (77.7, -4.0), (299.0, 0.5), (150.0, 20.0)] {
+            let angle: f64 = s / radius;
+            let (x, y) = (
+                (radius - offset) * angle.sin(),
+                radius - (radius - offset) * angle.cos(),
+            );
+            let found = foot(&line, x, y, s - 3.0).unwrap();
+            assert!((found.s_m - s).abs() < 1e-8, "{found:?}");
+            assert!((found.offset_m - offset).abs() < 1e-9, "{found:?}");
+            assert!((found.heading_rad - angle).abs() < 1e-9, "{found:?}");
+            assert_eq!(found.curvature_1pm, 0.02);
+        }
+    }
+
+    #[test]
+    fn a_clothoid_ends_where_the_fresnel_integrals_say() {
+        // Curvature pi*s/a^2 gives x = a*C(s/a), y = a*S(s/a); C(1), S(1) from Abramowitz and Stegun, table 7.7.
+        let (c1, s1) = (0.779_893_400_376_822_8, 0.438_259_147_390_354_8);
+        let a = 100.0;
+        let end_curvature = std::f64::consts::PI / a;
+        let line = centreline(&format!(
+            "[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = {end_curvature}\n\
+             [[segment]]\nlength = 10"
+        ));
+        let found = foot(&line, a * c1, a * s1, 99.0).unwrap();
+        assert!((found.s_m - 100.0).abs() < 1e-8, "{found:?}");
+        assert!(found.offset_m.abs() < 1e-9, "{found:?}");
+        assert!(
+            (found.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-9,
+            "{found:?}"
+        );
+    }
+
+    /// Points at known arc length and offset of a sharp S-bend, by brute-force quadrature (midpoint rule with
+    /// 1e-5 m steps).
+    #[test]
+    fn a_point_beside_any_clothoid_projects_back() {
+        let line = centreline(
+            "[[segment]]\nlength = 8\ncurvature_start = -0.1\ncurvature_end = 0.1\n\
+             [[segment]]\nlength = 12\ncurvature = 0.1",
+        );
+        let curvature = |s: f64| if s < 8.0 { -0.1 + 0.2 * s / 8.0 } else { 0.1 };
+        let ds = 1e-5;
+        let (mut x, mut y, mut heading) = (0.0, 0.0, 0.0_f64);
+        let mut tracker = line.tracker(0.0);
+        for i in 0..2_000_000_u32 {
+            let s = f64::from(i) * ds;
+            if i % 50_021 == 0 {
+                let offset = 3.0 * (f64::from(i) * 1e-4).sin();
+                let (px, py) = (x - offset * heading.sin(), y + offset * heading.cos());
+                let found = line.project(px, py, &mut tracker).unwrap();
+                assert!((found.s_m - s).abs() < 1e-8, "{s}: {found:?}");
+                assert!((found.offset_m - offset).abs() < 1e-8, "{s}, {offset}: {found:?}");
+                assert!((found.heading_rad - heading).abs() < 1e-8, "{s}: {found:?}");
+            }
+            let middle = heading + 0.5 * ds * curvature(s + 0.25 * ds);
+            x += ds * middle.cos();
+            y += ds * middle.sin();
+            heading += ds * curvature(s + 0.5 * ds);
+        }
+    }
+
+    #[test]
+    fn a_point_without_a_foot_is_refused() {
+        let line = centreline("[[segment]]\nlength = 30\ncurvature = 0.1");
+        // The centre of the circle is (0, 10): every point of the arc is equally near.
+        assert_eq!(foot(&line, 0.0, 10.0, 5.0), None);
+        let straight = centreline("[[segment]]\nlength = 30");
+        assert_eq!(foot(&straight, 33.0, 0.0, 29.0), None, "3 m beyond the end");
+        assert_eq!(foot(&straight, -3.0, 0.0, 1.0), None, "3 m before the start");
+        assert_eq!(foot(&straight, f64::NAN, 0.0, 1.0), None);
+        let beyond = foot(&straight, 31.0, 0.5, 29.0).unwrap();
+        assert_eq!(
+            (beyond.s_m, beyond.offset_m),
+            (31.0, 0.5),
+            "the end itself can be overrun"
+        );
+    }
+}
