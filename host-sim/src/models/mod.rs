@@ -1,10 +1,16 @@
-//! The world: road, vehicle with steering column, driver.
+//! The world: road, vehicle with steering column, driver, sensors.
 //!
 //! Every model is deterministic, in SI units and ISO 8855 signs (x forward, y left, yaw counter-clockwise),
 //! and knows nothing of the controller, of studies or of the command line. Equation and table numbers are
 //! those of Wang, Zheng, Nacpil and Nakano, DOI 10.1049/itr2.12163.
 
+pub mod driver;
+pub mod plant;
 pub mod road;
+pub mod sensors;
+pub mod vehicle;
 
-/// One step of the simulation, s. The control period of the ECU, and the grid of every delay and hold.
+/// One step of the simulation, s: the control period of the ECU, and the grid of every delay and hold.
 pub const STEP_S: f64 = 1e-3;
+/// Steps per second.
+pub const STEPS_PER_SECOND: u32 = 1000;

@@ -1,0 +1,264 @@
+//! The driver: vision with two points (7), an exact reaction delay, and an arm (8) whose gains can change.
+//!
+//! The arm's differential equation is part of `plant`; here are its gains, the target angle that it follows,
+//! and the remnant, the part of a human's torque that no model explains. Terms: *near* and *far* point, `e_y`
+//! and `e_theta` as in section 2.4; a positive error asks for a positive angle.
+
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::STEP_S;
+use crate::input::in_range;
+
+/// Tables 4 and 8. The gains of the arm depend on the condition and are given apart ([`ArmGains`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriverParameters {
+    /// a1, target angle per lateral error at the near point, rad/m.
+    pub a1: f64,
+    /// a2, target angle per integral of that error, rad/(m.s).
+    pub a2: f64,
+    /// a3, target angle per yaw error at the far point.
+    pub a3: f64,
+    /// t_p, processing delay, s, at least one step.
+    pub t_p: f64,
+    /// t_n, look-ahead time of the near point, s.
+    pub t_n: f64,
+    /// t_f, look-ahead time of the far point, s.
+    pub t_f: f64,
+    /// t_nms, time constant of the arm, s.
+    pub t_nms: f64,
+    /// K_nms, reflex gain, N.m/rad.
+    pub k_nms: f64,
+    /// Standard deviation of the remnant, N.m; 0 switches it off.
+    pub remnant_sd_nm: f64,
+    /// Corner of the first-order low-pass that colours the remnant, Hz.
+    pub remnant_corner_hz: f64,
+}
+
+/// How the arm weighs vision against the guidance torque.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ArmGains {
+    /// K_d, torque per target angle, N.m/rad.
+    pub k_d: f64,
+    /// K_hg, share of the guidance torque that the arm works against; near 0 the driver relies on it.
+    pub k_hg: f64,
+}
+
+impl ArmGains {
+    /// Without guidance, or once the driver has understood that it failed.
+    pub const MANUAL: Self = Self { k_d: 4.0, k_hg: 0.0 };
+}
+
+impl Default for DriverParameters {
+    /// Driver 1 of table 7 with table 8, without remnant.
+    fn default() -> Self {
+        Self {
+            a1: 0.1,
+            a2: 0.05,
+            a3: 3.7,
+            t_p: 0.1,
+            t_n: 0.3,
+            t_f: 1.0,
+            t_nms: 0.1,
+            k_nms: 1.0,
+            remnant_sd_nm: 0.0,
+            remnant_corner_hz: 0.5,
+        }
+    }
+}
+
+impl DriverParameters {
+    /// Whether every value is in the range that the model is meant for.
+    ///
+    /// # Errors
+    /// The first field out of range, with its value and range.
+    pub fn check(&self) -> Result<(), String> {
+        in_range("a1", self.a1, 0.0..=10.0, "rad/m")?;
+        in_range("a2", self.a2, 0.0..=10.0, "rad/(m.s)")?;
+        in_range("a3", self.a3, 0.0..=100.0, "")?;
+        in_range("t_p", self.t_p, STEP_S..=2.0, "s")?;
+        in_range("t_n", self.t_n, 0.0..=5.0, "s")?;
+        in_range("t_f", self.t_f, 0.0..=5.0, "s")?;
+        in_range("t_nms", self.t_nms, 0.01..=2.0, "s")?;
+        in_range("K_nms", self.k_nms, 0.0..=100.0, "N.m/rad")?;
+        in_range("remnant_sd", self.remnant_sd_nm, 0.0..=5.0, "N.m")?;
+        in_range("remnant_corner", self.remnant_corner_hz, 0.01..=100.0, "Hz")
+    }
+}
+
+/// Equation (7) with its delay: errors in, delayed target angle out.
+#[derive(Debug, Clone)]
+pub struct Vision {
+    a1: f64,
+    a2: f64,
+    a3: f64,
+    integral: f64,
+    last_e_y_m: f64,
+    delay: Delay,
+}
+
+impl Vision {
+    /// A driver at rest.
+    pub fn new(parameters: &DriverParameters) -> Self {
+        Self {
+            a1: parameters.a1,
+            a2: parameters.a2,
+            a3: parameters.a3,
+            integral: 0.0,
+            last_e_y_m: 0.0,
+            delay: Delay::new(parameters.t_p),
+        }
+    }
+
+    /// Takes the errors of this step; returns phi_target at the end of the step, rad.
+    #[inline]
+    pub fn step(&mut self, e_y_m: f64, e_theta_rad: f64) -> f64 {
+        self.integral += 0.5 * STEP_S * (e_y_m + self.last_e_y_m);
+        self.last_e_y_m = e_y_m;
+        self.delay
+            .step(self.a1 * e_y_m + self.a2 * self.integral + self.a3 * e_theta_rad)
+    }
+}
+
+/// A pure delay of at least one step, linear between samples; zero before the first.
+#[derive(Debug, Clone)]
+struct Delay {
+    ring: Vec<f64>,
+    mask: usize,
+    next: usize,
+    whole: usize,
+    fraction: f64,
+}
+
+impl Delay {
+    fn new(delay_s: f64) -> Self {
+        let steps = delay_s / STEP_S;
+        let whole = steps.floor() as usize;
+        let size = (whole + 1).next_power_of_two();
+        Self {
+            ring: vec![0.0; size],
+            mask: size - 1,
+            next: 0,
+            whole,
+            fraction: steps - steps.floor(),
+        }
+    }
+
+    /// Takes the input at this step, returns the output one step later: so a delay of one step returns it.
+    #[inline]
+    fn step(&mut self, input: f64) -> f64 {
+        self.ring[self.next & self.mask] = input;
+        self.next = self.next.wrapping_add(1);
+        let newer = self.ring[self.next.wrapping_sub(self.whole) & self.mask];
+        let older = self.ring[self.next.wrapping_sub(self.whole + 1) & self.mask];
+        newer + self.fraction * (older - newer)
+    }
+}
+
+/// Coloured noise: white Gaussian noise through a first-order low-pass, exact at the steps and held between.
+#[derive(Debug, Clone)]
+pub struct Remnant {
+    decay: f64,
+    scale_nm: f64,
+    value_nm: f64,
+    generator: Xoshiro256PlusPlus,
+}
+
+impl Remnant {
+    /// Starts at zero; its standard deviation reaches the given one after a few time constants.
+    pub fn new(parameters: &DriverParameters, seed: u64) -> Self {
+        let decay = (-std::f64::consts::TAU * parameters.remnant_corner_hz * STEP_S).exp();
+        Self {
+            decay,
+            scale_nm: parameters.remnant_sd_nm * (1.0 - decay * decay).sqrt(),
+            value_nm: 0.0,
+            generator: Xoshiro256PlusPlus::seed_from_u64(seed),
+        }
+    }
+
+    /// The torque of this step, N.m.
+    #[inline]
+    pub fn step(&mut self) -> f64 {
+        if self.scale_nm == 0.0 {
+            return 0.0;
+        }
+        let white: f64 = StandardNormal.sample(&mut self.generator);
+        self.value_nm = self.decay * self.value_nm + self.scale_nm * white;
+        self.value_nm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_delay_is_exact_for_whole_and_broken_steps() {
+        for (delay_s, steps) in [
+            (0.001, 1.0),
+            (0.3, 300.0),
+            (0.1234, 123.4),
+            (0.0015, 1.5),
+            (0.5, 500.0),
+        ] {
+            let mut delay = Delay::new(delay_s);
+            for k in 0..2000_u32 {
+                let output = delay.step(f64::from(k) + 1.0);
+                // The input is the line k + 1 from step 0 on, zero before; the output is one step ahead.
+                let expected = f64::from(k) + 2.0 - steps;
+                if expected >= 1.0 {
+                    assert!(
+                        (output - expected).abs() < 1e-9,
+                        "{delay_s} s, step {k}: {output}"
+                    );
+                } else if expected <= 0.0 {
+                    assert_eq!(output, 0.0, "{delay_s} s, step {k}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn vision_weighs_error_integral_and_yaw() {
+        let parameters = DriverParameters {
+            t_p: 0.001,
+            ..Default::default()
+        };
+        let mut vision = Vision::new(&parameters);
+        let mut target = 0.0;
+        for _ in 0..2001 {
+            target = vision.step(0.4, -0.02);
+        }
+        // 0.1*0.4 + 0.05*(0.4*2 s + the first half step, 0.0002) - 3.7*0.02
+        assert!(
+            (target - (0.04 + 0.05 * 0.8002 - 0.074)).abs() < 1e-12,
+            "{target}"
+        );
+    }
+
+    #[test]
+    fn the_remnant_has_its_spread_and_its_colour() {
+        let parameters = DriverParameters {
+            remnant_sd_nm: 0.1,
+            ..Default::default()
+        };
+        let mut remnant = Remnant::new(&parameters, 7);
+        let values: Vec<f64> = (0..2_000_000).map(|_| remnant.step()).collect();
+        let mean_product = |lag: usize| {
+            values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / (values.len() - lag) as f64
+        };
+        // 2000 s hold some 3000 independent values: the variance is known to 3 %.
+        assert!((mean_product(0) / 0.01 - 1.0).abs() < 0.1, "{}", mean_product(0));
+        // One time constant, 1/(2*pi*0.5 Hz) = 318 ms, later the correlation is 1/e.
+        let correlation = mean_product(318) / mean_product(0);
+        assert!((correlation - 0.3679).abs() < 0.05, "{correlation}");
+        assert_eq!(
+            Remnant::new(&parameters, 7).step(),
+            values[0],
+            "a seed fixes the noise"
+        );
+        assert_ne!(Remnant::new(&parameters, 8).step(), values[0]);
+    }
+}
