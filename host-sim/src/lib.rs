@@ -1,5 +1,7 @@
 //! The world around the controller, and the workbench that studies it.
 
+pub mod closed_loop;
+pub mod guidance;
 pub mod identify;
 pub mod input;
 pub mod metrics;
@@ -7,4 +9,5 @@ pub mod models;
 pub mod pil;
 pub mod plot;
 pub mod report;
+pub mod scenario;
 pub mod trace;

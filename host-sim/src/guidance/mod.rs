@@ -1,0 +1,88 @@
+//! Who gives the guidance torque in a closed loop: the seat that a controller takes.
+//!
+//! - [`OverBus`]: the shipping ECU behind its bus frames, with the paper's sensors.
+//! - [`Direct`]: the shipping controller, fed past the bus with full resolution every step.
+//! - [`FloatLaw`]: a float64 evaluation of equation (9), the reference that the others are held against.
+//! - [`NoGuidance`]: manual driving.
+//!
+//! Not here: the failure of the guidance; the loop takes the torque away, whoever gave it.
+
+mod direct;
+mod float_law;
+mod over_bus;
+
+use haptic_core::bus::Frame;
+use haptic_core::quantity::Instant;
+
+pub use direct::Direct;
+pub use float_law::FloatLaw;
+pub use over_bus::OverBus;
+
+/// Lane errors at the guidance's own points, as they truly are.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LaneErrors {
+    /// e_y', m.
+    pub e_y_m: f64,
+    /// e_theta', rad.
+    pub e_theta_rad: f64,
+}
+
+/// What a guidance may look at in one step: the truth, before any sensor.
+#[derive(Debug, Clone, Copy)]
+pub struct View {
+    /// Number of the step; one is 1 ms.
+    pub step: u32,
+    /// The lane errors, in steps in which the guidance looks at the road.
+    pub lane: Option<LaneErrors>,
+    /// Driver torque on the column, N.m.
+    pub driver_torque_nm: f64,
+    /// Wheel angle, rad.
+    pub wheel_angle_rad: f64,
+}
+
+/// The torque that a guidance applies until the next step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Applied {
+    /// T_h, N.m.
+    pub torque_nm: f64,
+    /// Whether a limit held it back.
+    pub limited: bool,
+}
+
+/// The seat of the controller.
+pub trait Guidance {
+    /// Whether the lane errors are asked for at this step.
+    fn looks_at_road(&self, step: u32) -> bool;
+
+    /// One step of 1 ms.
+    fn step(&mut self, view: &View) -> Applied;
+
+    /// The frames that went to the ECU in the last step, in order of sending.
+    fn frames_in(&self) -> &[Frame] {
+        &[]
+    }
+
+    /// The frame that came from the ECU in the last step.
+    fn frame_out(&self) -> Option<&Frame> {
+        None
+    }
+}
+
+/// Manual driving: no torque, ever.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoGuidance;
+
+impl Guidance for NoGuidance {
+    fn looks_at_road(&self, _step: u32) -> bool {
+        false
+    }
+
+    fn step(&mut self, _view: &View) -> Applied {
+        Applied::default()
+    }
+}
+
+/// The ECU's clock at a step; it wraps every 71.6 minutes, as the real one does.
+fn instant(step: u32) -> Instant {
+    Instant::from_us(step.wrapping_mul(1000))
+}
