@@ -64,8 +64,8 @@ pub struct Cycle<'a> {
     pub applied_torque_nm: f64,
     /// The frames that went to the ECU, in order of sending.
     pub frames_in: &'a [Frame],
-    /// The frame that came from it.
-    pub frame_out: Option<&'a Frame>,
+    /// The frames that came from it, the guidance frame first.
+    pub frames_out: &'a [Frame],
 }
 
 /// Sees every step of a run.
@@ -105,11 +105,11 @@ pub fn observe<O: Observer>(
     observer: &mut O,
 ) -> Result<Run, String> {
     scenario.check()?;
-    let config = scenario.config()?;
+    let setup = scenario.setup()?;
     Ok(match (scenario.condition, scenario.sensors) {
         (Condition::Manual, _) => drive(scenario, centreline, &mut NoGuidance, observer),
-        (_, Sensors::Exact) => drive(scenario, centreline, &mut Direct::new(config), observer),
-        (_, Sensors::Paper) => drive(scenario, centreline, &mut OverBus::new(config), observer),
+        (_, Sensors::Exact) => drive(scenario, centreline, &mut Direct::new(&setup), observer),
+        (_, Sensors::Paper) => drive(scenario, centreline, &mut OverBus::new(&setup), observer),
     })
 }
 
@@ -141,6 +141,7 @@ pub fn drive<G: Guidance, O: Observer>(
         samples: Vec::with_capacity(samples as usize + 1),
     };
     let mut target_now_rad = 0.0;
+    let mut motor_torque_nm = 0.0;
     let mut step = 0_u32;
     let ending = loop {
         let last_s_m = trace.samples.last().map_or(0.0, |sample: &Sample| sample.s_m);
@@ -167,6 +168,8 @@ pub fn drive<G: Guidance, O: Observer>(
             lane: lane.filter(|_| looks),
             driver_torque_nm: plant.arm_torque_nm() + remnant_nm,
             wheel_angle_rad: plant.wheel_angle_rad(),
+            motor_torque_nm,
+            speed_mps: v,
         };
         let given = guidance.step(&view);
         let applied = if step < failure_step {
@@ -179,7 +182,7 @@ pub fn drive<G: Guidance, O: Observer>(
             given,
             applied_torque_nm: applied.torque_nm,
             frames_in: guidance.frames_in(),
-            frame_out: guidance.frame_out(),
+            frames_out: guidance.frames_out(),
         });
         if let Some(camera_errors) = lane.filter(|_| is_sample) {
             let [x, y] = plant.position_m();
@@ -204,6 +207,7 @@ pub fn drive<G: Guidance, O: Observer>(
         };
         plant.step(transition, &input);
         target_now_rad = target_next_rad;
+        motor_torque_nm = applied.torque_nm;
         step += 1;
     };
     Run {

@@ -1,15 +1,16 @@
 //! The shipping controller without its bus: full resolution every step, so that what is seen is the law and
 //! the envelope alone.
 
-use haptic_core::controller::{Controller, ControllerState, Inputs};
+use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Request};
 use haptic_core::envelope::LimitReason;
+use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
-use haptic_core::params::Config;
-use haptic_core::quantity::{Metres, Radians};
+use haptic_core::params::Setup;
+use haptic_core::quantity::{Gain, Metres, Radians, Speed, Torque};
 
 use super::{Applied, Guidance, View};
 
-/// The shipping controller, fed directly.
+/// The shipping controller, fed directly and active from the start.
 #[derive(Debug, Clone)]
 pub struct Direct {
     controller: Controller,
@@ -18,10 +19,10 @@ pub struct Direct {
 
 impl Direct {
     /// A controller that has seen nothing yet.
-    pub fn new(config: Config) -> Self {
+    pub fn new(setup: &Setup) -> Self {
         Self {
-            controller: Controller::new(config),
-            state: ControllerState::NEW,
+            controller: Controller::new(setup.config),
+            state: ControllerState::engaged(super::instant(0)),
         }
     }
 }
@@ -34,12 +35,27 @@ impl Guidance for Direct {
     #[inline]
     fn step(&mut self, view: &View) -> Applied {
         let now = super::instant(view.step);
-        let lane = view.lane.map(|errors| LaneSample {
-            e_y: Metres::from_m(errors.e_y_m),
-            e_theta: Radians::from_rad(errors.e_theta_rad),
-            at: now,
-        });
-        let command = self.controller.step(&mut self.state, now, &Inputs { lane });
+        let inputs = Inputs {
+            lane: view.lane.map_or(Input::Lost, |errors| {
+                Input::New(LaneSample {
+                    e_y: Metres::from_m(errors.e_y_m),
+                    e_theta: Radians::from_rad(errors.e_theta_rad),
+                    at: now,
+                })
+            }),
+            column: Input::New(Column {
+                driver_torque: Torque::from_nm(view.driver_torque_nm),
+                wheel_angle: Radians::from_rad(view.wheel_angle_rad),
+            }),
+            speeds: Input::New([Speed::from_mps(view.speed_mps); 2]),
+            request: Input::New(Request {
+                engage: 1,
+                authority: Gain::ONE,
+            }),
+            faults: FaultSet::NONE,
+        };
+        let applied = Torque::from_nm(view.motor_torque_nm);
+        let command = self.controller.step(&mut self.state, now, applied, &inputs);
         Applied {
             torque_nm: command.torque.nm(),
             limited: command.limit != LimitReason::None,

@@ -38,6 +38,10 @@ pub struct View {
     pub driver_torque_nm: f64,
     /// Wheel angle, rad.
     pub wheel_angle_rad: f64,
+    /// Guidance torque really applied since the last step, N.m.
+    pub motor_torque_nm: f64,
+    /// Speed, m/s.
+    pub speed_mps: f64,
 }
 
 /// The torque that a guidance applies until the next step.
@@ -62,9 +66,9 @@ pub trait Guidance {
         &[]
     }
 
-    /// The frame that came from the ECU in the last step.
-    fn frame_out(&self) -> Option<&Frame> {
-        None
+    /// The frames that came from the ECU in the last step, the guidance frame first.
+    fn frames_out(&self) -> &[Frame] {
+        &[]
     }
 }
 

@@ -6,55 +6,88 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Column, Guidance as GuidanceMessage, LanePreview, Message};
+use haptic_core::bus::messages::{
+    Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Vehicle,
+};
 use haptic_core::ecu::Ecu;
 use haptic_core::envelope::LimitReason;
-use haptic_core::params::Config;
-use haptic_core::quantity::{Metres, Micros, Radians, Torque};
+use haptic_core::params::Setup;
+use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
+use heapless::Vec;
 
 use super::{Applied, Guidance, View};
 use crate::models::sensors;
 
 /// The column's sensors send every 2 ms.
 const COLUMN_PERIOD_STEPS: u32 = 2;
-/// At most a lane preview and a column frame in one step.
-const MAX_FRAMES: usize = 2;
+/// Speeds and the host's demand come every 10 ms.
+const HOST_PERIOD_STEPS: u32 = 10;
+/// One frame of each sender in a step.
+const MAX_FRAMES: usize = 4;
+/// The guidance frame, a warning and a line of the fault history.
+const MAX_ANSWERS: usize = 3;
 
-/// The ECU, its sensors and its actuator on one bus.
+/// The ECU, its sensors and its actuator on one bus. Every sender is trusted and the guidance active from the
+/// start, as the paper's studies have it.
 #[derive(Debug, Clone)]
 pub struct OverBus {
     ecu: Ecu,
     lane_counter: u8,
-    column_counter: u8,
-    sent: [Frame; MAX_FRAMES],
-    sent_count: usize,
-    answer: Option<Frame>,
+    sent: Vec<Frame, MAX_FRAMES>,
+    answers: Vec<Frame, MAX_ANSWERS>,
     actuator: ReceiverState,
     applied: Applied,
 }
 
 impl OverBus {
     /// A bus on which nothing was sent yet.
-    pub fn new(config: Config) -> Self {
-        let empty = Column::default().encode(0);
+    pub fn new(setup: &Setup) -> Self {
         Self {
-            ecu: Ecu::new(config),
+            ecu: Ecu::engaged(setup, super::instant(0)),
             lane_counter: 0,
-            column_counter: 0,
-            sent: [empty; MAX_FRAMES],
-            sent_count: 0,
-            answer: None,
-            actuator: ReceiverState::NEW,
+            sent: Vec::new(),
+            answers: Vec::new(),
+            actuator: ReceiverState::TRUSTED,
             applied: Applied::default(),
         }
     }
 
-    fn send(&mut self, frame: Frame, view: &View) {
-        self.sent[self.sent_count] = frame;
-        self.sent_count += 1;
-        // The ECU judges the frame by itself and keeps the last good one; the first two of a new sender are
-        // refused by design, so a refusal is no fault of the loop.
-        let _ = self.ecu.receive(&frame, super::instant(view.step));
+    /// The frames that the senders put on the bus in this step.
+    fn send(&mut self, view: &View) {
+        self.sent.clear();
+        // MAX_FRAMES has a place for each of the four, so no push fails.
+        if let Some(errors) = view.lane {
+            let preview = LanePreview {
+                e_y: Metres::from_m(errors.e_y_m),
+                e_theta: Radians::from_rad(errors.e_theta_rad),
+                age: Micros::from_us(0),
+                valid: true,
+            };
+            let _ = self.sent.push(preview.encode(self.lane_counter));
+            self.lane_counter = self.lane_counter.wrapping_add(1);
+        }
+        if view.step.is_multiple_of(COLUMN_PERIOD_STEPS) {
+            let column = Column {
+                driver_torque: Torque::from_nm(sensors::torque_nm(view.driver_torque_nm)),
+                wheel_angle: Radians::from_rad(sensors::wheel_angle_rad(view.wheel_angle_rad)),
+                motor_torque: Torque::from_nm(view.motor_torque_nm),
+            };
+            let _ = self
+                .sent
+                .push(column.encode((view.step / COLUMN_PERIOD_STEPS) as u8));
+        }
+        if view.step.is_multiple_of(HOST_PERIOD_STEPS) {
+            let counter = (view.step / HOST_PERIOD_STEPS) as u8;
+            let vehicle = Vehicle {
+                speeds: [Speed::from_mps(view.speed_mps); 2],
+            };
+            let _ = self.sent.push(vehicle.encode(counter));
+            let demand = Demand {
+                engage: true,
+                authority: Gain::ONE,
+            };
+            let _ = self.sent.push(demand.encode(counter));
+        }
     }
 }
 
@@ -65,41 +98,31 @@ impl Guidance for OverBus {
 
     #[inline]
     fn step(&mut self, view: &View) -> Applied {
-        self.sent_count = 0;
-        if let Some(errors) = view.lane {
-            let preview = LanePreview {
-                e_y: Metres::from_m(errors.e_y_m),
-                e_theta: Radians::from_rad(errors.e_theta_rad),
-                age: Micros::from_us(0),
-                valid: true,
-            };
-            self.send(preview.encode(self.lane_counter), view);
-            self.lane_counter = self.lane_counter.wrapping_add(1);
+        let now = super::instant(view.step);
+        self.send(view);
+        for frame in &self.sent {
+            // The ECU judges by itself, keeps the last good frame and reports what it misses.
+            let _ = self.ecu.receive(frame, now);
         }
-        if view.step.is_multiple_of(COLUMN_PERIOD_STEPS) {
-            let column = Column {
-                driver_torque: Torque::from_nm(sensors::torque_nm(view.driver_torque_nm)),
-                wheel_angle: Radians::from_rad(sensors::wheel_angle_rad(view.wheel_angle_rad)),
-            };
-            self.send(column.encode(self.column_counter), view);
-            self.column_counter = self.column_counter.wrapping_add(1);
-        }
-        let frame = self.ecu.step(super::instant(view.step)).guidance;
-        self.answer = Some(frame);
-        if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &frame) {
+        let step = self.ecu.step(now);
+        self.answers.clear();
+        // MAX_ANSWERS has a place for each.
+        let _ = self.answers.push(step.guidance);
+        let _ = self.answers.extend_from_slice(&step.others);
+        if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &step.guidance) {
             self.applied = Applied {
                 torque_nm: guidance.torque.nm(),
-                limited: guidance.limit == LimitReason::Absolute,
+                limited: guidance.limit != LimitReason::None,
             };
         }
         self.applied
     }
 
     fn frames_in(&self) -> &[Frame] {
-        &self.sent[..self.sent_count]
+        &self.sent
     }
 
-    fn frame_out(&self) -> Option<&Frame> {
-        self.answer.as_ref()
+    fn frames_out(&self) -> &[Frame] {
+        &self.answers
     }
 }

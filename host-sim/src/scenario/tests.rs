@@ -1,0 +1,139 @@
+//! What a scenario file may say, and how it is refused.
+
+use std::path::Path;
+
+use super::*;
+
+fn parse(text: &str) -> Result<Scenario, InputError> {
+    Scenario::from_toml("s.toml", text, Path::new(""))
+}
+
+#[test]
+fn an_empty_file_is_tables_4_8_and_9() {
+    let s = parse("").unwrap();
+    assert_eq!(s, Scenario::default());
+    let d = s.driver;
+    assert_eq!((d.a1, d.a2, d.a3), (0.1, 0.05, 3.7));
+    assert_eq!((d.t_n, d.t_f, d.t_nms, d.k_nms), (0.3, 1.0, 0.1, 1.0));
+    let g = s.guidance;
+    assert_eq!(
+        (g.controller.k_1, g.controller.a_1, g.controller.a_2),
+        (0.25, 2.0, 0.05)
+    );
+    assert_eq!(
+        (g.controller.a_3, g.controller.a_4, g.t_n, g.t_f),
+        (40.0, 1.0, 0.3, 0.7)
+    );
+    let v = s.vehicle;
+    assert_eq!((v.m, v.i, v.l_f, v.l_r), (1100.0, 2940.0, 1.0, 1.635));
+    assert_eq!(
+        (v.k_f, v.k_r, v.k_s, v.e_t),
+        (53_300.0, 117_000.0, 48_510.0, 0.026)
+    );
+    assert_eq!((v.b_s, v.j_s, v.k_t), (0.57, 0.11, 1.0 / 17.0));
+    assert_eq!((s.gains.k_d, s.gains.k_hg, s.speed_kmh), (3.0, 0.5, 60.0));
+}
+
+#[test]
+fn every_field_can_be_set() {
+    let s = parse(
+        "course = 'paper-course'\nspeed = 80\ncondition = 'high'\nsensors = 'exact'\nseed = 9\n\
+         [driver]\nt_p = 0.3\nK_hg = 0.25\nremnant_sd = 0.1\n[vehicle]\nm = 1500\nI = 3000\n\
+         [guidance]\nK_1 = 0.5\na2 = 0.1\nt_f = 0.8\ntorque_limit_nm = 3\n\
+         [failure]\nkind = 'torque'\ntime = 50",
+    )
+    .unwrap();
+    assert_eq!((s.speed_kmh, s.sensors, s.seed), (80.0, Sensors::Exact, 9));
+    assert_eq!((s.driver.t_p, s.driver.remnant_sd_nm), (0.3, 0.1));
+    assert_eq!(
+        (s.gains.k_d, s.gains.k_hg, s.condition),
+        (2.0, 0.25, Condition::Custom)
+    );
+    assert_eq!((s.vehicle.m, s.vehicle.i), (1500.0, 3000.0));
+    assert_eq!(
+        (
+            s.guidance.controller.k_1,
+            s.guidance.controller.a_2,
+            s.guidance.t_f
+        ),
+        (0.5, 0.1, 0.8)
+    );
+    assert_eq!(s.failure.at_s(), Some(50.0));
+    assert_eq!(
+        parse("condition = 'low'").unwrap().gains,
+        ArmGains { k_d: 4.0, k_hg: 1.0 }
+    );
+    assert_eq!(
+        parse("[driver]\nK_d = 2\nK_hg = 0").unwrap().condition,
+        Condition::High
+    );
+}
+
+#[test]
+fn every_bad_field_is_named_with_its_value_and_range() {
+    let cases = [
+        ("sped = 50", "sped"),
+        ("[driver]\nkd = 3", "kd"),
+        ("[guidance]\nt_x = 3", "t_x"),
+        ("[failure]\nwhen = 3", "when"),
+        ("[vehicle]\nmass = 3", "mass"),
+        ("speed = 0", "speed = 0 km/h is outside 20 to 250 km/h"),
+        ("speed = nan", "speed = NaN"),
+        ("speed = 'fast'", "line 1"),
+        ("condition = 'custom'", "custom"),
+        ("sensors = 'perfect'", "perfect"),
+        ("[failure]\nkind = 'brakes'", "brakes"),
+        ("[driver]\nt_p = 0", "driver.t_p = 0 s is outside 0.001 to 2 s"),
+        (
+            "[driver]\nK_d = -1",
+            "driver.K_d = -1 N.m/rad is outside 0 to 50 N.m/rad",
+        ),
+        ("[driver]\nremnant_sd = -1", "driver.remnant_sd = -1"),
+        ("[vehicle]\nm = 0", "vehicle.m = 0 kg"),
+        ("[guidance]\nK_1 = 50", "guidance.k_1 = 50"),
+        ("[guidance]\nt_n = -0.1", "guidance.t_n = -0.1"),
+        ("[failure]\ntime = -3", "failure.time = -3"),
+        (
+            "[driver]\nt_f = 5\n[guidance]\nt_f = 5.5",
+            "guidance.t_f = 5.5 s is outside 0 to 5 s",
+        ),
+    ];
+    for (text, expected) in cases {
+        let error = parse(text).unwrap_err().to_string();
+        assert!(error.starts_with("s.toml: "), "{error}");
+        assert!(
+            error.contains(expected),
+            "{text:?} gave {error:?}, not {expected:?}"
+        );
+    }
+    assert!(
+        parse("course = 'nowhere.toml'")
+            .unwrap_err()
+            .to_string()
+            .starts_with("nowhere.toml: ")
+    );
+}
+
+#[test]
+fn a_course_shorter_than_the_look_ahead_is_refused() {
+    let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength = {length}")).unwrap();
+    // 1.0 s at 60 km/h is 16.667 m.
+    let short = Scenario {
+        course: course(16.6),
+        ..Default::default()
+    }
+    .check()
+    .unwrap_err();
+    assert!(
+        short.contains("16.6 m long") && short.contains("16.7 m"),
+        "{short}"
+    );
+    assert_eq!(
+        Scenario {
+            course: course(16.7),
+            ..Default::default()
+        }
+        .check(),
+        Ok(())
+    );
+}
