@@ -1,0 +1,527 @@
+//! The ECU from its frames: how it comes up, what each class of fault makes of it, and when.
+
+mod rig;
+
+use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
+use haptic_core::bus::{Frame, Reject};
+use haptic_core::ecu::{Boot, Ecu, Step};
+use haptic_core::envelope::LimitReason;
+use haptic_core::faults::{Fault, FaultSet};
+use haptic_core::modes::Mode;
+use haptic_core::params::Setup;
+use haptic_core::quantity::{Instant, Micros, Torque};
+use rig::Rig;
+
+const LANE: usize = 0;
+const COLUMN: usize = 1;
+const VEHICLE: usize = 2;
+const DEMAND: usize = 3;
+/// The resolution of the torque on the bus.
+const BUS_LSB: f64 = 1.0 / 4096.0;
+
+/// The signals of a frame, read without a receiver's history.
+fn read<M: Message>(frame: &Frame) -> Option<M> {
+    (frame.id() == M::ID).then(|| {
+        let bytes = frame.data().try_into().unwrap();
+        assert!(M::PROTECTION.is_intact(&bytes));
+        M::unpack(u64::from_le_bytes(bytes)).unwrap()
+    })
+}
+
+fn warns(step: &Step) -> bool {
+    step.others.iter().any(|frame| read::<Warning>(frame).is_some())
+}
+
+#[test]
+fn boot_standby_and_a_rising_edge_after_500_ms() {
+    let mut rig = Rig::paper();
+    rig.curve(1.0);
+    rig.engage = true;
+    let first = rig.tick();
+    assert_eq!(
+        (first.command.mode, first.command.torque),
+        (Mode::Standby, Torque::ZERO)
+    );
+    // A request that was high from the start is no edge.
+    assert_eq!(rig.run(1500).command.mode, Mode::Standby);
+    rig.engage = false;
+    rig.run(20);
+    rig.engage = true;
+    let (_, step) = rig.run_until(11, |step| step.command.mode == Mode::Active);
+    // From zero, at 4 mN.m per step.
+    let mut last = step.command.torque.nm();
+    assert!((0.0..=0.004).contains(&last), "{last}");
+    for _ in 0..240 {
+        let torque = rig.tick().command.torque.nm();
+        assert!(torque - last <= 0.004 && torque > last, "{last} to {torque}");
+        last = torque;
+    }
+    assert!((0.9..=0.968).contains(&last), "{last} N.m after 242 ms");
+    assert!((rig.run(50).command.torque.nm() - 1.0).abs() < 0.001);
+}
+
+#[test]
+fn an_edge_before_500_ms_of_valid_data_is_lost() {
+    for (ready_ms, engages) in [(480, false), (560, true)] {
+        let mut rig = Rig::paper();
+        rig.run(100);
+        rig.silent[LANE] = true;
+        // Lost after 31 ms; trusted again with the third clean frame, which comes within 24 ms.
+        rig.run(60);
+        rig.silent[LANE] = false;
+        rig.run(ready_ms);
+        rig.engage = true;
+        assert_eq!(rig.run(300).command.mode == Mode::Active, engages, "{ready_ms}");
+    }
+}
+
+#[test]
+fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
+    let faults = [
+        (LANE, Fault::LaneTimeout),
+        (COLUMN, Fault::ColumnTimeout),
+        (VEHICLE, Fault::SpeedTimeout),
+        (DEMAND, Fault::CommandTimeout),
+    ];
+    for (sender, fault) in faults {
+        for torque in [1.5, -1.5] {
+            let mut rig = Rig::active_in_curve(torque);
+            // Up to the step with this sender's last frame.
+            let period = [8, 2, 10, 10][sender];
+            while rig.ticks % period != 0 {
+                rig.tick();
+            }
+            rig.tick();
+            let held = rig.applied;
+            rig.silent[sender] = true;
+            for _ in 0..30 {
+                assert_eq!(rig.tick().command.mode, Mode::Active, "{fault:?}");
+            }
+            for k in 1..=2000 {
+                let step = rig.tick();
+                assert_eq!(step.command.mode, Mode::Handover, "{fault:?} {k}");
+                assert!(step.command.warning && step.command.faults.contains(fault));
+                assert_eq!(warns(&step), k % 100 == 1, "a warning at once, then every 100 ms");
+                let expected = held * (1.0 - f64::from(k) / 2000.0);
+                let got = step.command.torque.nm();
+                assert!(
+                    (got - expected).abs() <= 2.0 * BUS_LSB,
+                    "{k}: {got}, not {expected}"
+                );
+            }
+            assert_eq!(rig.applied, 0.0);
+            // Ready again, but nothing re-engages by itself.
+            rig.silent[sender] = false;
+            let after = rig.run(1500);
+            assert_eq!(
+                (after.command.mode, after.command.torque),
+                (Mode::Standby, Torque::ZERO)
+            );
+            assert_eq!(after.command.faults, FaultSet::NONE);
+        }
+    }
+}
+
+#[test]
+fn a_handover_starts_from_the_torque_before_the_silence() {
+    // The law asks for more and more while the lane is silent; the torque of before is what is trusted.
+    let mut rig = Rig::active_in_curve(1.0);
+    while rig.ticks % 8 != 0 {
+        rig.tick();
+    }
+    let trusted = rig.applied;
+    rig.curve(1.2);
+    rig.tick();
+    rig.silent[LANE] = true;
+    rig.run(30);
+    assert!(rig.applied > 1.08, "{}", rig.applied);
+    // The reduction limit brings it down to the ramp at 8 mN.m per step.
+    let before = rig.applied;
+    assert!((rig.tick().command.torque.nm() - (before - 0.008)).abs() <= BUS_LSB);
+    for k in 2..=2000 {
+        let got = rig.tick().command.torque.nm();
+        let ramp = trusted * (1.0 - f64::from(k) / 2000.0);
+        // At most 5 ms of history lie between two remembered outputs.
+        assert!(k < 100 || (got - ramp).abs() <= 0.01, "{k}: {got}, not {ramp}");
+    }
+}
+
+#[test]
+fn a_silence_of_20_ms_is_no_fault() {
+    for sender in [LANE, COLUMN, VEHICLE, DEMAND] {
+        let mut rig = Rig::active_in_curve(1.0);
+        rig.silent[sender] = true;
+        rig.run(16);
+        rig.silent[sender] = false;
+        let after = rig.run(300);
+        assert_eq!(after.command.mode, Mode::Active);
+        assert_eq!(after.command.faults, FaultSet::NONE);
+    }
+}
+
+#[test]
+fn one_bad_frame_is_rejected_and_the_last_good_one_stays() {
+    for (what, wanted) in [
+        ("crc", Reject::Crc),
+        ("length", Reject::Length),
+        ("repeat", Reject::Repeated),
+    ] {
+        let mut rig = Rig::active_in_curve(1.0);
+        let before = rig.applied;
+        let good = rig.frame(LANE);
+        let bad = match what {
+            "crc" => {
+                let mut bytes: [u8; 8] = good.data().try_into().unwrap();
+                bytes[5] ^= 0x10;
+                Frame::new(good.id(), &bytes).unwrap()
+            }
+            "length" => Frame::new(good.id(), &good.data()[..7]).unwrap(),
+            _ => {
+                rig.send(&good).unwrap();
+                good
+            }
+        };
+        assert_eq!(rig.send(&bad), Err(wanted));
+        assert_eq!(rig.run(100).command.mode, Mode::Active);
+        assert!((rig.applied - before).abs() < 0.001, "{what}");
+    }
+    // Another message's frame under this identifier, and a frame of no interest.
+    let mut rig = Rig::active_in_curve(1.0);
+    let column = rig.frame(COLUMN);
+    let masked = Frame::new(0x100, column.data()).unwrap();
+    assert_eq!(rig.send(&masked), Err(Reject::Crc));
+    assert_eq!(rig.send(&Frame::new(0x555, &[1, 2, 3]).unwrap()), Ok(()));
+}
+
+#[test]
+fn a_resumed_sender_shows_three_clean_frames() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.silent[LANE] = true;
+    rig.run(100);
+    rig.silent[LANE] = false;
+    rig.rejects.clear();
+    rig.run(50);
+    assert_eq!(rig.rejects, [Reject::NotTrusted, Reject::NotTrusted]);
+}
+
+#[test]
+fn a_jump_of_the_lane_or_the_speed_is_rejected_and_becomes_a_fault_when_it_stays() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.lane.e_y = haptic_core::quantity::Metres::from_m(rig.lane.e_y.m() - 0.5);
+    rig.rejects.clear();
+    let (ms, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    assert!(ms <= 31 + 8, "{ms}");
+    assert!(step.command.faults.contains(Fault::LaneTimeout));
+    assert!(rig.rejects.len() >= 3 && rig.rejects.iter().all(|r| *r == Reject::Step));
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.speeds = [rig::SPEED + 1.5; 2];
+    let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    assert!(step.command.faults.contains(Fault::SpeedTimeout));
+}
+
+#[test]
+fn a_sample_older_than_the_last_is_rejected() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.run(8);
+    let fresh = rig.frame(LANE);
+    assert_eq!(rig.send(&fresh), Ok(()));
+    rig.lane.age = Micros::from_us(100);
+    let older = rig.frame(LANE);
+    assert_eq!(rig.send(&older), Err(Reject::Older));
+    // Ages that wander by less than a period are no fault.
+    for k in 0..100 {
+        rig.lane.age = Micros::from_ms(k % 5);
+        assert_eq!(rig.run(8).command.mode, Mode::Active);
+    }
+    assert!((rig.applied - 1.0).abs() < 0.001);
+}
+
+#[test]
+fn an_invalid_preview_is_the_reason_of_its_time_out() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.lane.valid = false;
+    rig.run(16);
+    rig.lane.valid = true;
+    // A blink.
+    assert_eq!(rig.run(100).command.faults, FaultSet::NONE);
+    rig.lane.valid = false;
+    let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    assert!(step.command.faults.contains(Fault::LaneInvalid));
+}
+
+#[test]
+fn speeds_that_disagree_and_speeds_too_low() {
+    for (apart, expected) in [(1.99, Mode::Active), (2.0, Mode::Handover)] {
+        let mut rig = Rig::active_in_curve(1.0);
+        // No jump: the second source drifts away.
+        for k in 1..=20 {
+            rig.speeds[1] = rig::SPEED + apart * f64::from(k) / 20.0;
+            rig.run(10);
+        }
+        // Both round to the bus's 2^-8 m/s.
+        rig.speeds = [16.0, 16.0 + apart];
+        let step = rig.run(10);
+        assert_eq!(step.command.mode, expected, "{apart}");
+        let implausible = step.command.faults.contains(Fault::SpeedImplausible);
+        assert_eq!(implausible, expected == Mode::Handover);
+    }
+    let mut rig = Rig::active_in_curve(0.0);
+    for k in 0..=130 {
+        rig.speeds = [rig::SPEED - 0.1 * f64::from(k); 2];
+        rig.run(10);
+    }
+    let step = rig.tick();
+    assert_eq!(step.command.mode, Mode::Standby, "slower than 5 m/s, class A");
+    assert_eq!(step.command.faults, FaultSet::NONE);
+}
+
+#[test]
+fn a_disengagement_fades_at_4_nm_per_s() {
+    let mut rig = Rig::active_in_curve(1.5);
+    rig.engage = false;
+    let (_, first) = rig.run_until(11, |step| step.command.mode == Mode::Fade);
+    let mut torque = first.command.torque.nm();
+    for k in 2..=374 {
+        let next = rig.tick().command.torque.nm();
+        assert!(
+            (torque - next - 0.004).abs() <= BUS_LSB,
+            "{k}: {torque} to {next}"
+        );
+        torque = next;
+    }
+    let (ms, _) = rig.run_until(5, |step| step.command.mode == Mode::Standby);
+    assert!(ms >= 2 && rig.applied == 0.0);
+    // A request in mid-fade is no use either.
+    let mut rig = Rig::active_in_curve(1.5);
+    rig.engage = false;
+    rig.run(30);
+    rig.engage = true;
+    assert_eq!(rig.run(1000).command.mode, Mode::Standby);
+}
+
+#[test]
+fn a_handover_becomes_a_fade_when_the_driver_switches_off() {
+    let mut rig = Rig::active_in_curve(1.5);
+    rig.silent[LANE] = true;
+    rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    rig.engage = false;
+    rig.run_until(11, |step| step.command.mode == Mode::Fade);
+    rig.run_until(400, |step| step.command.mode == Mode::Standby);
+}
+
+#[test]
+fn what_the_driver_pushes_away_in_a_handover_does_not_come_back() {
+    let mut rig = Rig::active_in_curve(1.5);
+    rig.silent[LANE] = true;
+    rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    // 2.4 N.m against the torque leaves 5 - 3*(2.4 - 0.8) = 0.2 N.m.
+    rig.driver = Some(-2.4);
+    rig.run_until(3, |step| step.command.limit == LimitReason::DriverOverride);
+    assert!((rig.applied - 0.2).abs() <= BUS_LSB, "{}", rig.applied);
+    rig.driver = None;
+    let mut last = rig.applied;
+    for _ in 0..2000 {
+        let torque = rig.tick().command.torque.nm();
+        assert!(torque <= last, "{last} to {torque}");
+        last = torque;
+    }
+    assert_eq!(last, 0.0);
+}
+
+#[test]
+fn late_and_early_steps() {
+    let run = |spans: &[u32]| {
+        let mut rig = Rig::active_in_curve(1.0);
+        for span in spans {
+            rig.tick_after(*span);
+        }
+        rig.tick().command
+    };
+    let fault = |command: &haptic_core::controller::Command| command.faults.contains(Fault::Deadline);
+    for tolerated in [
+        &[2_500, 2_500][..],
+        &[2_501, 1_000, 2_501],
+        &[10_000],
+        &[499, 499, 499, 1000],
+        &[500, 500, 500, 500],
+    ] {
+        assert!(!fault(&run(tolerated)), "{tolerated:?}");
+    }
+    for fatal in [
+        &[2_501, 2_501][..],
+        &[10_001],
+        &[499, 499, 499, 499],
+        &[0, 0, 0, 0],
+    ] {
+        let command = run(fatal);
+        assert!(fault(&command), "{fatal:?}");
+        assert_eq!((command.mode, command.torque), (Mode::Fault, Torque::ZERO));
+    }
+}
+
+#[test]
+fn a_motor_that_does_not_obey() {
+    let motors: [fn(f64) -> f64; 3] = [|t| t / 2.0, |_| 0.0, |t| -t];
+    for motor in motors {
+        let mut rig = Rig::active_in_curve(1.0);
+        rig.motor = motor;
+        let (ms, step) = rig.run_until(20, |step| step.command.mode == Mode::Fault);
+        assert!(step.command.faults.contains(Fault::Actuator) && step.command.torque == Torque::ZERO);
+        assert!((10..=20).contains(&ms), "{ms}");
+        // Latched, with an obedient motor too.
+        rig.motor = |t| t;
+        rig.engage = false;
+        rig.run(50);
+        rig.engage = true;
+        assert_eq!(rig.run(1500).command.mode, Mode::Fault);
+    }
+    // Within the margin of 0.1 N.m there is nothing to say; one that ignores zero is found in Standby too.
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.motor = |t| t + 0.099;
+    assert_eq!(rig.run(200).command.mode, Mode::Active);
+    let mut rig = Rig::paper();
+    rig.motor = |_| 0.11;
+    rig.run(30);
+    assert_eq!(rig.tick().command.mode, Mode::Fault);
+}
+
+#[test]
+fn the_driver_who_opposes_wins_in_the_same_step() {
+    let mut rig = Rig::active_in_curve(1.5);
+    rig.driver = Some(-2.47);
+    while rig.ticks % 2 != 0 {
+        rig.tick();
+    }
+    let step = rig.tick();
+    assert_eq!(step.command.torque, Torque::ZERO);
+    assert_eq!(
+        (step.command.limit, step.command.mode),
+        (LimitReason::DriverOverride, Mode::Active)
+    );
+}
+
+#[test]
+fn no_parameters_or_a_reset_loop_lock() {
+    let boots = [
+        (true, 3, Fault::ResetLoop),
+        (false, 0, Fault::Parameters),
+        (true, 200, Fault::ResetLoop),
+    ];
+    for (good, recent_resets, fault) in boots {
+        let boot = Boot {
+            reset: ResetCause::Watchdog,
+            recent_resets,
+        };
+        let mut rig = Rig::new(good.then_some(&Setup::PAPER), boot);
+        rig.curve(1.0);
+        let first = rig.tick();
+        assert_eq!(first.command.mode, Mode::Locked);
+        assert!(first.command.faults.contains(fault) && first.command.warning && warns(&first));
+        assert_eq!(
+            read::<Guidance>(&first.guidance).unwrap().reset,
+            ResetCause::Watchdog
+        );
+        rig.run(600);
+        rig.engage = true;
+        let last = rig.run(600);
+        assert_eq!(
+            (last.command.mode, last.command.torque),
+            (Mode::Locked, Torque::ZERO)
+        );
+    }
+    let boot = Boot {
+        reset: ResetCause::BrownOut,
+        recent_resets: 2,
+    };
+    let mut rig = Rig::new(Some(&Setup::PAPER), boot);
+    let step = rig.tick();
+    assert_eq!(step.command.mode, Mode::Standby);
+    assert_eq!(
+        read::<Guidance>(&step.guidance).unwrap().reset,
+        ResetCause::BrownOut
+    );
+}
+
+#[test]
+fn a_monitor_stuck_at_ok_is_found_within_a_second() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.ecu.hold_monitor(true);
+    let (ms, step) = rig.run_until(1000, |step| step.command.mode == Mode::Fault);
+    assert!(ms <= 512 && step.command.faults.contains(Fault::SelfTest), "{ms}");
+    assert_eq!(step.command.torque, Torque::ZERO);
+}
+
+#[test]
+fn a_law_that_lies_meets_the_limits_and_then_the_monitor() {
+    for lie in [5.0, -5.0, 127.0] {
+        let mut rig = Rig::active_in_curve(0.0);
+        rig.ecu.force_law(Some(Torque::from_nm(lie)));
+        let (ms, step) = rig.run_until(200, |step| {
+            assert!(step.command.torque.nm().abs() < 0.4);
+            step.command.mode == Mode::Fault
+        });
+        // 0.3 N.m of band at 4 mN.m per ms, and 20 ms of patience.
+        assert!((90..=100).contains(&ms), "{ms}");
+        assert!(step.command.faults.contains(Fault::Monitor) && !step.permitted);
+        assert_eq!(
+            (step.command.limit, step.command.torque),
+            (LimitReason::Monitor, Torque::ZERO)
+        );
+        rig.ecu.force_law(None);
+        let after = rig.run(500);
+        assert_eq!(
+            (after.command.mode, after.command.torque),
+            (Mode::Fault, Torque::ZERO)
+        );
+    }
+}
+
+#[test]
+fn the_history_goes_round_with_counts_and_ages() {
+    let mut rig = Rig::active_in_curve(0.0);
+    for _ in 0..3 {
+        rig.silent[LANE] = true;
+        rig.run(100);
+        rig.silent[LANE] = false;
+        rig.run(100);
+    }
+    rig.silent[VEHICLE] = true;
+    rig.run(100);
+    rig.silent[VEHICLE] = false;
+    rig.run(4_500);
+    let mut lines: Vec<_> = (0..400)
+        .flat_map(|_| rig.tick().others)
+        .filter_map(|frame| read::<FaultRecord>(&frame))
+        .collect();
+    lines.sort_by_key(|line| line.index);
+    let read = |line: &FaultRecord| (line.index, line.total, line.record.fault, line.record.count);
+    // At power-up nothing is heard yet: each input was missing once before its first frames.
+    assert_eq!(
+        lines.iter().map(read).collect::<Vec<_>>(),
+        [
+            (0, 4, Fault::LaneTimeout, 4),
+            (1, 4, Fault::ColumnTimeout, 1),
+            (2, 4, Fault::SpeedTimeout, 2),
+            (3, 4, Fault::CommandTimeout, 1),
+        ]
+    );
+    // Lane 5.0 to 5.4 s ago, speed 4.5 to 4.9 s, the others since power-up, 7.2 to 7.6 s: whole seconds.
+    let ages: Vec<u16> = lines.iter().map(|line| line.record.age_s).collect();
+    for (age, least) in ages.iter().zip([4, 7, 4, 7]) {
+        assert!((least..=least + 1).contains(age), "{ages:?}");
+    }
+}
+
+#[test]
+fn engaged_from_the_start_for_studies() {
+    let now = Instant::from_us(0);
+    let mut ecu = Ecu::engaged(&Setup::PAPER, now);
+    let mut rig = Rig::paper();
+    rig.engage = true;
+    for sender in 0..4 {
+        let frame = rig.frame(sender);
+        assert_eq!(ecu.receive(&frame, now), Ok(()));
+    }
+    assert_eq!(ecu.step(now.after(Micros::from_ms(1))).command.mode, Mode::Active);
+    assert_eq!(ecu.config(), Some(Setup::PAPER.config));
+}
