@@ -16,6 +16,7 @@ use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torqu
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;
 
+#[derive(Clone)]
 /// Bench state; public fields are what a test turns.
 pub(crate) struct Rig {
     pub(crate) ecu: Ecu,

@@ -1,0 +1,91 @@
+//! Every bit of the vital memory flipped, one at a time, in each mode with a torque and in Standby: Fault and no
+//! torque in the next step. And the guard itself, on a value of its own.
+
+mod rig;
+
+use haptic_core::ecu::injection::Region;
+use haptic_core::faults::Fault;
+use haptic_core::modes::Mode;
+use haptic_core::quantity::Torque;
+use haptic_core::vital::{Guarded, Vital};
+use rig::Rig;
+
+fn rigs() -> Vec<Rig> {
+    let standby = Rig::paper();
+    let active = Rig::active_in_curve(1.0);
+    let mut fade = active.clone();
+    fade.engage = false;
+    let mut handover = active.clone();
+    handover.silent[0] = true;
+    let mut rigs = vec![standby, active, fade, handover];
+    for rig in &mut rigs {
+        rig.run(50);
+    }
+    rigs
+}
+
+#[test]
+fn every_flip_ends_in_fault_within_a_step() {
+    let mut flips = 0;
+    for (rig, mode) in rigs()
+        .into_iter()
+        .zip([Mode::Standby, Mode::Active, Mode::Fade, Mode::Handover])
+    {
+        assert_eq!(rig.clone().tick().command.mode, mode);
+        for region in Region::ALL {
+            let bits = rig.ecu.vital_bits(region);
+            // Both copies of at least six words.
+            assert!(
+                bits >= 2 * 6 * 32 && bits.is_multiple_of(64),
+                "{region:?}: {bits}"
+            );
+            for bit in 0..bits {
+                let mut rig = rig.clone();
+                rig.ecu.flip_bit(region, bit);
+                let step = rig.tick();
+                let at = format!("{mode:?} {region:?} {bit}");
+                assert_eq!(
+                    (step.command.mode, step.command.torque),
+                    (Mode::Fault, Torque::ZERO),
+                    "{at}"
+                );
+                assert!(
+                    step.command.faults.contains(Fault::Memory) && step.command.warning,
+                    "{at}"
+                );
+                // Latched, whatever comes.
+                assert_eq!(rig.tick().command.mode, Mode::Fault, "{at}");
+                flips += 1;
+            }
+            // A bit that is not there changes nothing.
+            let mut rig = rig.clone();
+            rig.ecu.flip_bit(region, bits);
+            assert_eq!(rig.tick().command.mode, mode);
+        }
+    }
+    println!("{flips} flips");
+}
+
+#[test]
+fn a_flip_before_a_frame_arrives_is_found_too() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.ecu.flip_bit(Region::Ecu, 3);
+    let frame = rig.frame(0);
+    assert_eq!(rig.send(&frame), Ok(()));
+    assert_eq!(rig.tick().command.mode, Mode::Fault);
+}
+
+#[test]
+fn the_guard_holds_a_value_and_its_inverse() {
+    for word in [0_u32, 1, 0xDEAD_BEEF, u32::MAX] {
+        assert_eq!([word, 7].complement(), [!word, !7]);
+        let mut guarded = Guarded::new(word);
+        assert_eq!(guarded.get(), Some(word));
+        guarded.set(!word);
+        assert_eq!(guarded.get(), Some(!word));
+    }
+    assert_eq!((-1_i32).complement(), 0);
+    // 1 N.m is 2^24; its inverse is -2^24 - 1.
+    let inverse = Torque::from_nm(1.0).complement();
+    assert_eq!(inverse.nm(), -1.0 - 1.0 / 16_777_216.0);
+}

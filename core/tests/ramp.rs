@@ -1,0 +1,128 @@
+//! The ways to zero against hand values: linear, never growing, started from what can be trusted.
+
+use haptic_core::quantity::{Instant, Micros, Torque};
+use haptic_core::ramp::{HANDOVER, History, Ramp, lesser};
+
+/// The resolution of a torque, N.m.
+const LSB: f64 = 1.0 / 16_777_216.0;
+
+fn nm(torque: f64) -> Torque {
+    Torque::from_nm(torque)
+}
+
+#[test]
+fn a_handover_is_a_straight_line_of_two_seconds() {
+    for start in [5.0, 0.47, LSB, 0.0, -LSB, -3.2] {
+        let start = nm(start).nm();
+        let mut ramp = Ramp::over(nm(start), HANDOVER);
+        for k in 1..=2000 {
+            assert!(!ramp.is_done(), "{k}");
+            let torque = ramp.step(Micros::from_ms(1)).nm();
+            let expected = start * f64::from(2000 - k) / 2000.0;
+            // Cut toward zero.
+            assert!(
+                torque.abs() <= expected.abs() && (torque - expected).abs() < LSB,
+                "{k}: {torque}"
+            );
+        }
+        assert!(ramp.is_done());
+        assert_eq!(ramp.step(Micros::from_ms(1)), Torque::ZERO);
+        assert_eq!(ramp.step(Micros::from_us(u32::MAX)), Torque::ZERO);
+    }
+}
+
+#[test]
+fn a_fade_falls_at_its_rate() {
+    for (start, ms) in [(2.0, 500), (-2.0, 500), (0.4, 100), (0.004, 1), (5.0, 1250)] {
+        let mut ramp = Ramp::at_rate(nm(start), nm(4.0));
+        let mut steps = 0;
+        while !ramp.is_done() {
+            let torque = ramp.step(Micros::from_ms(1)).nm();
+            steps += 1;
+            let expected = (start.abs() - 0.004 * f64::from(steps)).max(0.0) * start.signum();
+            // A microsecond of rounding in the length.
+            assert!(
+                (torque - expected).abs() <= 4.1e-6,
+                "{steps}: {torque}, not {expected}"
+            );
+        }
+        // The length is rounded up to whole microseconds, so one step more than the exact time may be needed.
+        assert!(steps == ms || steps == ms + 1, "{start}: {steps}");
+    }
+    let mut nothing = Ramp::at_rate(Torque::ZERO, nm(4.0));
+    assert_eq!(nothing.step(Micros::from_ms(1)), Torque::ZERO);
+    assert!(nothing.is_done() && Ramp::NONE.is_done());
+}
+
+#[test]
+fn the_lesser_of_two_torques() {
+    for (a, b, expected) in [
+        (1.0, 2.0, 1.0),
+        (2.0, 1.0, 1.0),
+        (-1.0, -2.0, -1.0),
+        (-2.0, -1.0, -1.0),
+        (1.0, -1.0, 0.0),
+        (-1.0, 1.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (1.0, 0.0, 0.0),
+        (0.0, -1.0, 0.0),
+        (-1.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0),
+    ] {
+        assert_eq!(lesser(nm(a), nm(b)), nm(expected), "{a} {b}");
+    }
+}
+
+/// Outputs of 1, 2, 3 .. mN.m, one per millisecond from just before the clock wraps; the last is `ms` mN.m.
+fn rising(ms: u32) -> (History, Instant) {
+    let start = Instant::from_us(u32::MAX - 20_000);
+    let mut history = History::default();
+    for k in 1..=ms {
+        let now = start.after(Micros::from_ms(k));
+        history.push(now, nm(f64::from(k) * 1e-3));
+    }
+    (history, start.after(Micros::from_ms(ms)))
+}
+
+#[test]
+fn trusted_is_the_last_output_kept_before_the_suspect_time() {
+    let (history, last) = rising(400);
+    let now = last.after(Micros::from_ms(1));
+    for suspect_ms in [0, 1, 7, 30, 100, 249, 250] {
+        let got = history.trusted(now, Micros::from_ms(suspect_ms)).nm() * 1e3;
+        // Before 401 - suspect ms, and by no more than the 5 ms between two kept ones.
+        let newest = f64::from(400 - suspect_ms);
+        assert!(
+            got <= newest + 1e-3 && got > newest - 5.1,
+            "{suspect_ms}: {got} mN.m"
+        );
+    }
+    // Further back than anything kept: the oldest, 50 times 5 ms before the newest.
+    let oldest = history.trusted(now, Micros::from_ms(100_000)).nm() * 1e3;
+    assert!((145.0..=150.1).contains(&oldest), "{oldest}");
+}
+
+#[test]
+fn a_history_shorter_than_the_suspect_time_trusts_no_torque() {
+    assert_eq!(
+        History::new().trusted(Instant::from_us(77), Micros::from_ms(1)),
+        Torque::ZERO
+    );
+    let (history, last) = rising(100);
+    assert_eq!(history.trusted(last, Micros::from_ms(120)), Torque::ZERO);
+    assert_eq!(
+        history.handover_start(last, Micros::from_ms(120), nm(0.1)),
+        Torque::ZERO
+    );
+}
+
+#[test]
+fn a_handover_starts_at_the_lesser_of_trusted_and_applied() {
+    let (history, now) = rising(400);
+    let trusted = history.trusted(now, Micros::from_ms(30));
+    assert!((0.36..0.37).contains(&trusted.nm()), "{}", trusted.nm());
+    let start = |applied: f64| history.handover_start(now, Micros::from_ms(30), nm(applied));
+    assert_eq!(start(0.4), trusted);
+    assert_eq!(start(0.1), nm(0.1));
+    assert_eq!(start(-0.4), Torque::ZERO);
+}
