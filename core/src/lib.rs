@@ -32,4 +32,5 @@ pub mod params;
 pub mod plausibility;
 pub mod quantity;
 pub mod ramp;
+pub mod stored;
 pub mod vital;

@@ -1,0 +1,155 @@
+//! Parameter blocks against a CRC and a layout written a second time, and every way a copy can be spoilt.
+
+use haptic_core::params::{Params, Setup, VehicleParams};
+use haptic_core::stored::{BYTES, Stored, load, save};
+
+/// CRC-32 bit by bit (ISO-HDLC).
+fn crc32(bytes: &[u8]) -> u32 {
+    let mut crc = u32::MAX;
+    for byte in bytes {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = (crc >> 1) ^ if crc & 1 == 1 { 0xEDB8_8320 } else { 0 };
+        }
+    }
+    !crc
+}
+
+/// A block by the table in `stored.rs`.
+fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
+    let mut bytes = [version.to_le_bytes(), sequence.to_le_bytes()].concat();
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    bytes.extend(crc32(&bytes).to_le_bytes());
+    bytes
+}
+
+/// A different value in each field.
+const VALUES: [f64; 15] = [
+    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.02, 0.001, 1.25, 0.5, 0.75,
+];
+
+fn params() -> Params {
+    Params {
+        k_1: 0.5,
+        a_1: 1.5,
+        a_2: 0.25,
+        a_3: 20.0,
+        a_4: 2.0,
+        rate_corner_hz: 9.0,
+        torque_limit_nm: 3.0,
+        wind_up_nm_per_s: 3.5,
+        reduction_nm_per_s: 7.0,
+        least_speed_mps: 6.0,
+        vehicle: VehicleParams {
+            curvature_gain_1pm: 0.02,
+            stability_factor_s2pm2: 0.001,
+            aligning_gain_nms2pm: 1.25,
+            column_damping_nms: 0.5,
+            far_time_s: 0.75,
+        },
+    }
+}
+
+fn found(params: Params, sequence: u32, copy: usize) -> Option<Stored> {
+    Some(Stored {
+        params,
+        sequence,
+        copy,
+    })
+}
+
+#[test]
+fn the_layout_is_the_documented_one() {
+    assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
+    let bytes = save(&params(), 0x0102_0304);
+    assert_eq!(bytes.to_vec(), block(1, 0x0102_0304, &VALUES));
+    assert_eq!(bytes.len(), 132);
+    assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
+}
+
+#[test]
+fn the_newer_good_copy_counts() {
+    let (old, new) = (Params::PAPER, params());
+    for (first, second) in [(1, 2), (u32::MAX, 0), (u32::MAX - 5, 7)] {
+        let (a, b) = (save(&old, first), save(&new, second));
+        assert_eq!(load([&a, &b]), found(new, second, 1));
+        assert_eq!(load([&b, &a]), found(new, second, 0));
+        assert_eq!(load([&a, &[0xFF; BYTES]]), found(old, first, 0));
+        assert_eq!(load([&[0; BYTES], &a]), found(old, first, 1));
+    }
+    // The same number twice: the first.
+    assert_eq!(load([&save(&old, 9), &save(&new, 9)]), found(old, 9, 0));
+}
+
+#[test]
+fn every_flipped_bit_and_every_truncation_falls_back_on_the_other_copy() {
+    let (old, new) = (save(&Params::PAPER, 1), save(&params(), 2));
+    let falls_back = |spoilt: &[u8]| {
+        assert_eq!(load([&old, spoilt]), found(Params::PAPER, 1, 0));
+        assert_eq!(load([spoilt, &old]), found(Params::PAPER, 1, 1));
+        assert_eq!(load([spoilt, spoilt]), None);
+    };
+    for bit in 0..8 * BYTES {
+        let mut spoilt = new;
+        spoilt[bit / 8] ^= 1 << (bit % 8);
+        falls_back(&spoilt);
+    }
+    for length in 0..BYTES {
+        falls_back(&new[..length]);
+        // Erased flash behind what was written.
+        let mut cut = [0xFF; BYTES];
+        cut[..length].copy_from_slice(&new[..length]);
+        falls_back(&cut);
+    }
+    falls_back(&[&new[..], &[0]].concat());
+}
+
+#[test]
+fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
+    // Copy 0 holds set 1, copy 1 set 2; set 3 goes over set 1.
+    let (one, two, three) = (save(&params(), 1), save(&Params::PAPER, 2), save(&params(), 3));
+    for written in 0..=BYTES {
+        let mut copy = one;
+        copy[..written].copy_from_slice(&three[..written]);
+        let expected = if copy == three {
+            found(params(), 3, 0)
+        } else {
+            found(Params::PAPER, 2, 1)
+        };
+        assert_eq!(load([&copy, &two]), expected, "{written}");
+    }
+}
+
+#[test]
+fn other_versions_and_values_out_of_range_are_no_good() {
+    assert_eq!(load([&block(2, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(1, 1, &VALUES[..14]), &[]]), None);
+    let ranges_end = [
+        (0, 4.1),
+        (5, 0.4),
+        (6, 5.01),
+        (7, 4.01),
+        (8, 3.99),
+        (9, 0.49),
+        (10, 0.2),
+        (11, -0.1),
+        (12, 21.0),
+        (13, 10.1),
+        (14, f64::NAN),
+    ];
+    for (index, value) in ranges_end {
+        let mut values = VALUES;
+        values[index] = value;
+        assert_eq!(load([&block(1, 1, &values), &[]]), None, "value {index}");
+    }
+}
+
+#[test]
+fn absurd_values_within_range_are_accepted() {
+    let mut values = VALUES;
+    values[..5].fill(0.0);
+    values[6] = 0.1;
+    let stored = load([&block(1, 1, &values), &[]]).unwrap();
+    assert_eq!(stored.params.torque_limit_nm, 0.1);
+    assert!(Setup::new(&stored.params).is_ok());
+}
