@@ -88,7 +88,7 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
             let mut rig = Rig::active_in_curve(torque);
             // Up to the step with this sender's last frame.
             let period = [8, 2, 10, 10][sender];
-            while rig.ticks % period != 0 {
+            while !rig.ticks.is_multiple_of(period) {
                 rig.tick();
             }
             rig.tick();
@@ -126,7 +126,7 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
 fn a_handover_starts_from_the_torque_before_the_silence() {
     // The law asks for more and more while the lane is silent; the torque of before is what is trusted.
     let mut rig = Rig::active_in_curve(1.0);
-    while rig.ticks % 8 != 0 {
+    while !rig.ticks.is_multiple_of(8) {
         rig.tick();
     }
     let trusted = rig.applied;
@@ -389,7 +389,7 @@ fn a_motor_that_does_not_obey() {
 fn the_driver_who_opposes_wins_in_the_same_step() {
     let mut rig = Rig::active_in_curve(1.5);
     rig.driver = Some(-2.47);
-    while rig.ticks % 2 != 0 {
+    while !rig.ticks.is_multiple_of(2) {
         rig.tick();
     }
     let step = rig.tick();
