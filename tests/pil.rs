@@ -79,6 +79,7 @@ impl World {
             let demand = Demand {
                 engage: in_cycle > 2500,
                 authority: Gain::from_si(1.0),
+                probe: in_cycle > 3000,
             };
             frames.push(demand.encode((k / 10) as u8));
         }
@@ -120,7 +121,12 @@ fn run(channel: Channel, steps: u32, host: &Params, target: &Params, count: bool
         let step = ecu.step(now);
         world.motor = step.command.torque;
         guiding += u32::from(step.command.torque != Torque::ZERO);
-        let answer: Vec<Frame> = [step.guidance].into_iter().chain(step.others).collect();
+        let advice = ecu.advise();
+        let answer: Vec<Frame> = [step.guidance]
+            .into_iter()
+            .chain(step.others)
+            .chain(advice)
+            .collect();
         pil.tick(now, &frames, &answer).unwrap();
     }
     (pil.finish().unwrap(), guiding)

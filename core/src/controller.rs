@@ -7,6 +7,7 @@ use crate::law::{LaneSample, LawState};
 use crate::modes::{Event, Mode};
 use crate::params::Config;
 use crate::plausibility::{PlausibilityState, speeds_agree};
+use crate::probe::ProbeState;
 use crate::quantity::{Gain, Instant, Micros, Radians, Speed, Torque, product};
 use crate::ramp::{HANDOVER, HISTORY, History, Ramp, lesser};
 use crate::vital::{Guarded, vital};
@@ -66,6 +67,8 @@ vital! {
         pub engage: u32,
         /// Share of the law's torque to apply, 0 to 1; saturates there.
         pub authority: Gain,
+        /// 1: the probe is wanted on top of it.
+        pub probe: u32,
     }
 }
 
@@ -89,6 +92,8 @@ pub struct Inputs {
 pub struct Command {
     /// T_h, the guidance torque to apply.
     pub torque: Torque,
+    /// The part of it that is the probe, while there is one.
+    pub probe: Option<Torque>,
     /// Which limit held it back.
     pub limit: LimitReason,
     /// The mode it belongs to.
@@ -122,6 +127,9 @@ vital! {
         envelope: EnvelopeState,
         plausibility: PlausibilityState,
         ramp: Ramp,
+        probe: ProbeState,
+        /// The part of the torque applied that is the probe.
+        probe_applied: Torque,
     }
 }
 
@@ -157,6 +165,8 @@ impl Vitals {
             envelope: EnvelopeState::new(now),
             plausibility: PlausibilityState::NEW,
             ramp: Ramp::NONE,
+            probe: ProbeState::SILENT,
+            probe_applied: Torque::ZERO,
         }
     }
 
@@ -208,6 +218,7 @@ impl ControllerState {
         self.vitals.set(vitals);
         Command {
             torque: Torque::ZERO,
+            probe: None,
             limit: LimitReason::Mode,
             mode: Mode::Fault,
             faults,
@@ -261,7 +272,7 @@ impl Controller {
         let command = step.run(&mut vitals, &mut state.history);
         vitals.last_step = now;
         state.vitals.set(vitals);
-        state.history.push(now, command.torque);
+        state.history.push(now, without(command.torque, command.probe));
         command
     }
 }
@@ -290,10 +301,12 @@ impl Step<'_> {
         if mode != before {
             self.enter(v, mode, faults, history);
         }
-        let (torque, limit) = self.torque(v, mode);
+        let (torque, probe, limit) = self.torque(v, mode);
+        v.probe_applied = probe.unwrap_or(Torque::ZERO);
         let warning = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked);
         Command {
             torque,
+            probe,
             limit,
             mode,
             faults,
@@ -432,13 +445,16 @@ impl Step<'_> {
 
     fn enter(&self, v: &mut Vitals, mode: Mode, faults: FaultSet, history: &History) {
         v.mode = mode as u32;
+        v.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.
             Mode::Active => (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now)),
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
-                v.ramp = Ramp::over(history.handover_start(self.now, suspect, self.applied), HANDOVER);
+                // Half a wave of the probe must not stand in the wheel for two seconds.
+                let applied = without(self.applied, Some(v.probe_applied));
+                v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), HANDOVER);
             }
             _ => {}
         }
@@ -462,14 +478,19 @@ impl Step<'_> {
             .max(silent(Fault::CommandTimeout, v.silence.request))
     }
 
-    fn torque(&self, v: &mut Vitals, mode: Mode) -> (Torque, LimitReason) {
-        let wanted = match mode {
-            Mode::Active => self.guidance(v),
+    /// The torque, the part of it that is the probe, and what limited it.
+    fn torque(&self, v: &mut Vitals, mode: Mode) -> (Torque, Option<Torque>, LimitReason) {
+        let (wanted, probe) = match mode {
+            Mode::Active => {
+                let guidance = self.guidance(v);
+                let probe = self.probe(v);
+                (with(guidance, probe), probe)
+            }
             // A driver who pushed the torque below its ramp does not get it back.
-            Mode::Fade | Mode::Handover => lesser(v.ramp.step(self.elapsed), self.applied),
+            Mode::Fade | Mode::Handover => (lesser(v.ramp.step(self.elapsed), self.applied), None),
             // At once: what is behind these modes must not move the wheel for another tick.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
-                return (Torque::ZERO, LimitReason::Mode);
+                return (Torque::ZERO, None, LimitReason::Mode);
             }
         };
         // Without a column there is no override to judge; without a column there is also no Active.
@@ -487,14 +508,18 @@ impl Step<'_> {
             .config
             .envelope
             .step(&mut v.envelope, self.now, wanted, &situation);
-        (
-            torque,
-            if limit == LimitReason::None && mode != Mode::Active {
-                LimitReason::Mode
-            } else {
-                limit
-            },
-        )
+        match limit {
+            LimitReason::None if mode != Mode::Active => (torque, probe, LimitReason::Mode),
+            LimitReason::None => (torque, probe, limit),
+            // Where a limit acts, no more may count as guidance than was applied.
+            _ => (torque, probe.map(|probe| common_part(probe, torque)), limit),
+        }
+    }
+
+    /// The probe's torque, while it is wanted or on its way out.
+    fn probe(&self, v: &mut Vitals) -> Option<Torque> {
+        let wanted = self.inputs.request.value().is_some_and(|r| r.probe != 0);
+        self.config.probe.step(&mut v.probe, self.elapsed, wanted)
     }
 
     /// The law's torque, scaled by the authority.
@@ -509,4 +534,18 @@ impl Step<'_> {
         let authority = request.authority.max(Gain::ZERO).min(Gain::ONE);
         Torque::from_wide(product(authority.bits(), asked.bits()))
     }
+}
+
+fn with(guidance: Torque, probe: Option<Torque>) -> Torque {
+    let probe = probe.unwrap_or(Torque::ZERO);
+    Torque::from_wide(i64::from(guidance.bits()).saturating_add(i64::from(probe.bits())))
+}
+
+fn without(torque: Torque, probe: Option<Torque>) -> Torque {
+    with(torque, probe.map(Torque::opposite))
+}
+
+/// As much of `part` as `whole` can hold.
+fn common_part(part: Torque, whole: Torque) -> Torque {
+    part.max(whole.min(Torque::ZERO)).min(whole.max(Torque::ZERO))
 }

@@ -8,6 +8,7 @@ pub mod injection;
 use heapless::Vec;
 
 use crate::actuator::Actuator;
+use crate::advice::Advice;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
     Column as ColumnMessage, Demand, FaultRecord, Guidance, LanePreview, Message, ResetCause, TIMEOUT,
@@ -23,6 +24,7 @@ use crate::monitor::{Evidence, Monitor, MonitorState};
 use crate::params::{Config, Setup};
 use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use crate::reliance::Sample;
 use crate::vital::{Guarded, Vital, vital};
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -153,6 +155,7 @@ impl Vitals {
                 Request {
                     engage: 0,
                     authority: Gain::ZERO,
+                    probe: 0,
                 },
                 now,
             ),
@@ -179,7 +182,9 @@ pub struct Ecu {
     /// Bytes of frames accepted since the last step, for the monitor's own decoding.
     lane_bytes: Option<[u8; 8]>,
     column_bytes: Option<[u8; 8]>,
+    demand_bytes: Option<[u8; 8]>,
     warned_at: Option<u32>,
+    advice: Advice,
     #[cfg(feature = "fault-injection")]
     injected: injection::Injected,
 }
@@ -242,7 +247,9 @@ impl Ecu {
             boot,
             lane_bytes: None,
             column_bytes: None,
+            demand_bytes: None,
             warned_at: None,
+            advice: Advice::new(setup.reliance),
             #[cfg(feature = "fault-injection")]
             injected: injection::Injected::default(),
         }
@@ -316,10 +323,12 @@ impl Ecu {
             }
             Demand::ID => {
                 let demand = Demand::decode(&mut v.request.e2e, frame)?;
+                self.demand_bytes = frame.full_data();
                 v.request.put(
                     Request {
                         engage: u32::from(demand.engage),
                         authority: demand.authority,
+                        probe: u32::from(demand.probe),
                     },
                     now,
                 );
@@ -350,13 +359,15 @@ impl Ecu {
             request: v.request.take(now),
             faults,
         };
-        let mut command = self.controller.step(&mut self.state, now, v.applied, &inputs);
+        let applied = v.applied;
+        let mut command = self.controller.step(&mut self.state, now, applied, &inputs);
         command.torque = Guidance::rounded(command.torque, command.limit);
         let mut guidance = self.guidance(&command, steps);
 
         let evidence = Evidence {
             lane: self.lane_bytes.as_ref(),
             column: self.column_bytes.as_ref(),
+            demand: self.demand_bytes.as_ref(),
             guidance: guidance.bytes(),
             elapsed_us: now.since(v.last_step).us(),
         };
@@ -365,6 +376,7 @@ impl Ecu {
             faults.insert(Fault::Monitor);
             command = Command {
                 torque: Torque::ZERO,
+                probe: None,
                 limit: LimitReason::Monitor,
                 mode: Mode::Fault,
                 faults: command.faults.union(faults),
@@ -372,12 +384,22 @@ impl Ecu {
             };
             guidance = self.guidance(&command, steps);
         }
-        (self.lane_bytes, self.column_bytes) = (None, None);
+        (self.lane_bytes, self.column_bytes, self.demand_bytes) = (None, None, None);
         v.faults = u32::from(faults.bits());
         v.applied = command.torque;
         v.last_step = now;
         v.steps = steps.wrapping_add(1);
         self.vitals.set(v);
+        let sample = match inputs.column {
+            Input::New(column) => Some(Sample {
+                at: now,
+                applied,
+                driver_torque: column.driver_torque,
+                wheel_angle: column.wheel_angle,
+            }),
+            _ => None,
+        };
+        self.advice.take(sample, command.probe);
         self.history.step(now, command.faults);
         let others = self.others(&command, steps);
         Step {
@@ -386,6 +408,12 @@ impl Ecu {
             others,
             permitted,
         }
+    }
+
+    /// The advisory part of a step, to be called once after its frames have left: the telemetry frame, when it
+    /// is its turn. In f32, and without effect on any torque.
+    pub fn advise(&mut self) -> Option<Frame> {
+        self.advice.step()
     }
 
     /// The vital state is damaged: nothing of it can be used. What comes in its place knows nothing but the
@@ -452,6 +480,7 @@ impl Ecu {
         let evidence = Evidence {
             lane: None,
             column: None,
+            demand: None,
             guidance: &nonsense,
             elapsed_us: 1000,
         };

@@ -12,13 +12,17 @@
 //! see them all.
 //!
 //! No allocation, no `unsafe`; and from `Ecu::receive` and `Ecu::step` no float and no panic is reachable,
-//! which is proved on the linked image (`cargo xtask gate`). SI values as `f64` exist for parameters, for
+//! which is proved on the linked image (`cargo xtask gate`). `Ecu::advise`, called when the torque is
+//! already on its way, may use f32: what it estimates moves nothing.
+//!
+//! SI values as `f64` exist for parameters, for
 //! the host and for tests, and cross into fixed point in [`quantity`] alone.
 
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod actuator;
+mod advice;
 pub mod bus;
 pub mod controller;
 pub mod ecu;
@@ -30,7 +34,10 @@ pub mod modes;
 pub mod monitor;
 pub mod params;
 pub mod plausibility;
+pub mod probe;
 pub mod quantity;
 pub mod ramp;
+pub mod reliance;
+mod sine;
 pub mod stored;
 pub mod vital;

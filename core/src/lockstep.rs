@@ -11,8 +11,9 @@
 use crate::bus::Frame;
 use crate::bus::messages::ResetCause;
 use crate::ecu::{Boot, Ecu};
-use crate::params::{ParamError, Params, Setup, VehicleParams};
+use crate::params::{ParamError, Params, Setup};
 use crate::quantity::Instant;
+use crate::stored::{VALUES, from_values, values};
 
 /// Bytes of a record: identifier (little-endian), length, eight data bytes.
 pub const RECORD_LEN: usize = 11;
@@ -37,58 +38,15 @@ pub fn from_record(record: &[u8; RECORD_LEN]) -> Option<Frame> {
 }
 
 /// How many parameters a set has.
-pub const PARAMETERS: usize = 15;
+pub const PARAMETERS: usize = VALUES;
 /// Identifier of the first parameter's frame; the others follow.
-const PARAMETER_ID: u16 = 0x7E0;
-
-/// The places of the parameters, in the order of their frames.
-fn places(params: &mut Params) -> [&mut f64; PARAMETERS] {
-    // Named one by one, so that a new parameter does not compile until it is sent too.
-    let Params {
-        k_1,
-        a_1,
-        a_2,
-        a_3,
-        a_4,
-        rate_corner_hz,
-        torque_limit_nm,
-        wind_up_nm_per_s,
-        reduction_nm_per_s,
-        least_speed_mps,
-        vehicle:
-            VehicleParams {
-                curvature_gain_1pm,
-                stability_factor_s2pm2,
-                aligning_gain_nms2pm,
-                column_damping_nms,
-                far_time_s,
-            },
-    } = params;
-    [
-        k_1,
-        a_1,
-        a_2,
-        a_3,
-        a_4,
-        rate_corner_hz,
-        torque_limit_nm,
-        wind_up_nm_per_s,
-        reduction_nm_per_s,
-        least_speed_mps,
-        curvature_gain_1pm,
-        stability_factor_s2pm2,
-        aligning_gain_nms2pm,
-        column_damping_nms,
-        far_time_s,
-    ]
-}
+const PARAMETER_ID: u16 = 0x7C0;
 
 /// The frames that give the image its parameters. Eight bytes: an `f64`, little-endian.
 #[must_use]
 pub fn parameter_frames(params: &Params) -> [Frame; PARAMETERS] {
-    let mut params = *params;
     let mut id = PARAMETER_ID;
-    places(&mut params).map(|value| {
+    values(params).map(|value| {
         let frame = Frame::full(id, value.to_le_bytes());
         id = id.wrapping_add(1);
         frame
@@ -98,9 +56,11 @@ pub fn parameter_frames(params: &Params) -> [Frame; PARAMETERS] {
 /// Takes one parameter from its frame. False: not a parameter's frame.
 pub fn set_parameter(params: &mut Params, frame: &Frame) -> bool {
     let index = usize::from(frame.id().wrapping_sub(PARAMETER_ID));
-    match (places(params).into_iter().nth(index), frame.full_data()) {
-        (Some(place), Some(data)) => {
-            *place = f64::from_le_bytes(data);
+    let mut values = values(params);
+    match (values.get_mut(index), frame.full_data()) {
+        (Some(value), Some(data)) => {
+            *value = f64::from_le_bytes(data);
+            *params = from_values(&values);
             true
         }
         _ => false,
@@ -180,30 +140,33 @@ impl Start {
     }
 }
 
-/// What one step cost the target, in cycles of its counter: every `Ecu::receive` of the tick and `Ecu::step`.
-/// Ends the answer to a tick.
+/// What one step cost the target, in cycles of its counter. Ends the answer to a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepCost {
-    /// Counter cycles.
+    /// Every `Ecu::receive` of the tick and `Ecu::step`.
     pub cycles: u32,
+    /// `Ecu::advise`.
+    pub advice_cycles: u32,
 }
 
 impl StepCost {
     /// Identifier.
     const ID: u16 = 0x7F1;
 
-    /// Bytes 0..3: cycles, little-endian.
+    /// Bytes 0..3: cycles, 4..7: cycles of the advice, little-endian.
     #[must_use]
     pub fn encode(self) -> Frame {
-        Frame::full(Self::ID, u64::from(self.cycles).to_le_bytes())
+        let word = u64::from(self.cycles) | u64::from(self.advice_cycles) << 32;
+        Frame::full(Self::ID, word.to_le_bytes())
     }
 
     /// The cost, if this is such a frame.
     #[must_use]
     pub fn decode(frame: &Frame) -> Option<Self> {
-        let [a, b, c, d, ..] = frame.full_data()?;
+        let [a, b, c, d, e, f, g, h] = frame.full_data()?;
         (frame.id() == Self::ID).then(|| Self {
             cycles: u32::from_le_bytes([a, b, c, d]),
+            advice_cycles: u32::from_le_bytes([e, f, g, h]),
         })
     }
 }

@@ -8,7 +8,8 @@
 //! What it refuses: a torque beyond the limit, growing too fast, in a mode without torque, against a driver
 //! who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for.
 //! The last is coarse (proportional part and rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for
-//! 20 ms, or while the torque falls: the envelope may still be bringing an honest change about.
+//! 20 ms, or while the torque falls: the envelope may still be bringing an honest change about. While the
+//! host asks for the probe, and for a second after, the band is wider by the probe's amplitude.
 
 use crate::vital::vital;
 
@@ -19,6 +20,8 @@ vital! {
         pub(crate) limit_mnm: i32,
         /// Largest growth in one millisecond.
         pub(crate) growth_mnm_per_ms: i32,
+        /// Amplitude of the probe.
+        pub(crate) probe_mnm: i32,
         /// Law, mN.m per m, per rad, per m/s, per rad/s.
         pub(crate) gains_mnm: [i32; 4],
     }
@@ -32,6 +35,8 @@ vital! {
         lane: Lane,
         /// An older lane sample, for rates.
         before: Lane,
+        /// For how long there may still be a probe.
+        probe_left_us: i32,
         astray_ms: i32,
         /// 1 after the first disagreement.
         withdrawn: i32,
@@ -55,6 +60,8 @@ pub struct Evidence<'a> {
     pub lane: Option<&'a [u8; 8]>,
     /// Bytes of the latest column frame in use, if a new one arrived.
     pub column: Option<&'a [u8; 8]>,
+    /// Bytes of the latest command frame in use, if a new one arrived.
+    pub demand: Option<&'a [u8; 8]>,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
@@ -68,6 +75,8 @@ const LAST_WITH_TORQUE: i32 = 4;
 const TOLERANCE_MNM: i32 = 3;
 /// Around the torque that the lane errors ask for.
 const BAND_MNM: i32 = 300;
+/// The probe ends within a period, and none is slower than 1 Hz; a command is stale after 30 ms.
+const PROBE_END_US: i32 = 1_030_000;
 /// For how long the torque may be outside that band.
 const ASTRAY_MS: i32 = 20;
 /// Lane data older than this must not move the wheel in Active: the time-out and a camera period.
@@ -94,6 +103,7 @@ impl MonitorState {
             e_theta_urad: 0,
             age_us: 0,
         },
+        probe_left_us: 0,
         astray_ms: 0,
         withdrawn: 0,
     };
@@ -161,9 +171,15 @@ impl Monitor {
             .saturating_div(1000)
             .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
         let both = position.saturating_add(rate);
+        let probe = if state.probe_left_us > 0 {
+            self.probe_mnm
+        } else {
+            0
+        };
+        let band = BAND_MNM.saturating_add(probe);
         // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
-        let high = position.max(both).max(0).saturating_add(BAND_MNM);
-        let low = position.min(both).min(0).saturating_sub(BAND_MNM);
+        let high = position.max(both).max(0).saturating_add(band);
+        let low = position.min(both).min(0).saturating_sub(band);
         let falling = torque.saturating_abs() < state.torque_mnm.saturating_abs();
         let astray = !(low..=high).contains(&torque) && !falling;
         state.astray_ms = if astray {
@@ -193,6 +209,10 @@ impl MonitorState {
         }
         if let Some(bytes) = evidence.column {
             self.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
+        }
+        self.probe_left_us = self.probe_left_us.saturating_sub(elapsed_us).max(0);
+        if evidence.demand.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
+            self.probe_left_us = PROBE_END_US;
         }
     }
 }

@@ -9,7 +9,9 @@ use crate::envelope::Envelope;
 use crate::law::Law;
 use crate::monitor::Monitor;
 use crate::plausibility::Plausibility;
+use crate::probe::Probe;
 use crate::quantity::{Gain, Speed, Torque};
+use crate::reliance::{BLOCK_S, Reliance};
 use crate::vital::vital;
 
 /// Parameters of the guidance controller, SI units.
@@ -36,6 +38,15 @@ pub struct Params {
     pub reduction_nm_per_s: f64,
     /// Slowest speed that is guided, m/s, 0.5 to 30.
     pub least_speed_mps: f64,
+    /// Amplitude of the probe, N.m, 0 to 0.3.
+    pub probe_amplitude_nm: f64,
+    /// Frequency of the probe, Hz, 1 to 5. Its steepest slope, 2*pi*amplitude*frequency, is at most 3.5 N.m/s,
+    /// so that the wind-up limit leaves room for it and nominal guidance together.
+    pub probe_frequency_hz: f64,
+    /// t_nms of the driver's arm, s, 0.01 to 1: what the estimator of reliance assumes.
+    pub t_nms_s: f64,
+    /// K_nms of the driver's arm, N.m/rad, 0 to 10, likewise.
+    pub k_nms: f64,
     /// The vehicle as the plausibility checks know it.
     pub vehicle: VehicleParams,
 }
@@ -68,6 +79,10 @@ impl Params {
         wind_up_nm_per_s: 4.0,
         reduction_nm_per_s: 8.0,
         least_speed_mps: 5.0,
+        probe_amplitude_nm: 0.2,
+        probe_frequency_hz: 2.5,
+        t_nms_s: 0.1,
+        k_nms: 1.0,
         vehicle: VehicleParams {
             // (1/17) / 2.635
             curvature_gain_1pm: 0.022_324,
@@ -121,11 +136,15 @@ vital! {
         pub plausibility: Plausibility,
         /// Slowest speed that is guided.
         pub least_speed: Speed,
+        /// The probe.
+        pub probe: Probe,
     }
 }
 
 /// Largest product K_1*a', in N.m per unit: keeps the law's wide sum inside an `i64`.
 const MAX_GAIN: f64 = 32.0;
+/// Steepest slope of the probe, N.m/s.
+const MAX_PROBE_SLOPE: f64 = 3.5;
 
 impl Config {
     /// The paper's parameters, checked at compile time.
@@ -151,6 +170,16 @@ impl Config {
             ("wind_up_nm_per_s", p.wind_up_nm_per_s, 0.5, 4.0),
             ("reduction_nm_per_s", p.reduction_nm_per_s, 4.0, 8.0),
             ("least_speed_mps", p.least_speed_mps, 0.5, 30.0),
+            ("probe_amplitude_nm", p.probe_amplitude_nm, 0.0, 0.3),
+            ("probe_frequency_hz", p.probe_frequency_hz, 1.0, 5.0),
+            ("t_nms_s", p.t_nms_s, 0.01, 1.0),
+            ("k_nms", p.k_nms, 0.0, 10.0),
+            (
+                "2 * pi * probe_amplitude_nm * probe_frequency_hz",
+                2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz,
+                0.0,
+                MAX_PROBE_SLOPE,
+            ),
             ("vehicle.curvature_gain_1pm", v.curvature_gain_1pm, 0.001, 0.1),
             (
                 "vehicle.stability_factor_s2pm2",
@@ -206,17 +235,28 @@ impl Config {
                 column_margin: Gain::from_si(0.6),
             },
             least_speed: Speed::from_mps(p.least_speed_mps),
+            probe: Probe {
+                amplitude: Torque::from_nm(p.probe_amplitude_nm),
+                phase_per_us: phase_per_us(p.probe_frequency_hz),
+            },
         })
     }
 }
 
-/// Everything that parameters decide: the controller's configuration and the monitor's.
+/// 2^32 turns for each second's 10^6 microseconds.
+const fn phase_per_us(frequency_hz: f64) -> u32 {
+    (frequency_hz * 4_294.967_296 + 0.5) as u32
+}
+
+/// Everything that parameters decide: the controller's configuration, the monitor's and the estimator's.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup {
     /// Law, envelope, plausibility.
     pub config: Config,
     /// The monitor's own limits.
     pub monitor: Monitor,
+    /// The estimator of reliance.
+    pub reliance: Reliance,
 }
 
 impl Setup {
@@ -224,6 +264,7 @@ impl Setup {
     pub const PAPER: Self = Self {
         config: Config::PAPER,
         monitor: Monitor::new(&Params::PAPER),
+        reliance: Reliance::new(&Params::PAPER),
     };
 
     /// Checks every parameter.
@@ -235,8 +276,24 @@ impl Setup {
             Ok(config) => Ok(Self {
                 config,
                 monitor: Monitor::new(p),
+                reliance: Reliance::new(p),
             }),
             Err(error) => Err(error),
+        }
+    }
+}
+
+impl Reliance {
+    /// The estimator's settings.
+    #[must_use]
+    const fn new(p: &Params) -> Self {
+        let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
+        Self {
+            phase_per_us: phase_per_us(p.probe_frequency_hz),
+            periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
+            amplitude_nm: p.probe_amplitude_nm as f32,
+            lag: (turns * p.t_nms_s) as f32,
+            k_nms: p.k_nms as f32,
         }
     }
 }
@@ -248,6 +305,7 @@ impl Monitor {
         Self {
             limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
             growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
+            probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
             gains_mnm: [
                 (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
                 (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,

@@ -39,6 +39,12 @@ macro_rules! quantity {
                 self.0.to_bits() as f64 / ONE as f64
             }
 
+            /// As f32, rounded to nearest: for what is advisory only.
+            #[must_use]
+            pub const fn to_f32(self) -> f32 {
+                self.0.to_bits() as f32 * (1.0 / ONE as f32)
+            }
+
             pub(crate) const fn from_bits(bits: i32) -> Self {
                 Self(I8F24::from_bits(bits))
             }
@@ -104,6 +110,11 @@ quantity!(
 impl Gain {
     /// One.
     pub const ONE: Self = Self::from_bits(1 << FRAC_BITS);
+
+    /// From f32: truncates, saturates, NaN becomes 0.
+    pub(crate) const fn from_f32(si: f32) -> Self {
+        Self::from_bits((si * ONE as f32) as i32)
+    }
 }
 
 /// A time span in microseconds, up to 71.6 minutes.

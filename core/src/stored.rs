@@ -4,8 +4,8 @@
 //! |---|---|
 //! | 0..4 | version of this layout, u32 |
 //! | 4..8 | sequence number, u32; the newer of two good copies counts, across a wrap |
-//! | 8..128 | the fields of [`Params`] in their order, SI, f64 |
-//! | 128..132 | CRC-32 (ISO-HDLC, as in zlib) of all before |
+//! | 8..160 | the fields of [`Params`] in their order, SI, f64 |
+//! | 160..164 | CRC-32 (ISO-HDLC, as in zlib) of all before |
 //!
 //! All little-endian. Who writes puts the next sequence number into the copy that was *not* loaded, so that a
 //! write that power cuts short leaves the previous set in use. Not here: the memory itself, and what to do
@@ -19,7 +19,7 @@ use crate::params::{Config, Params, VehicleParams};
 /// Length of a copy.
 pub const BYTES: usize = 8 + 8 * VALUES + 4;
 /// Fields of [`Params`].
-const VALUES: usize = 15;
+pub(crate) const VALUES: usize = 19;
 const VERSION: u32 = 1;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
@@ -82,7 +82,8 @@ fn read(bytes: &[u8]) -> Option<(u32, Params)> {
         .then(|| (u32::from_le_bytes([*s0, *s1, *s2, *s3]), params))
 }
 
-fn values(params: &Params) -> [f64; VALUES] {
+/// The fields of a set, in their order.
+pub(crate) fn values(params: &Params) -> [f64; VALUES] {
     let Params {
         k_1,
         a_1,
@@ -94,6 +95,10 @@ fn values(params: &Params) -> [f64; VALUES] {
         wind_up_nm_per_s,
         reduction_nm_per_s,
         least_speed_mps,
+        probe_amplitude_nm,
+        probe_frequency_hz,
+        t_nms_s,
+        k_nms,
         vehicle,
     } = *params;
     [
@@ -107,6 +112,10 @@ fn values(params: &Params) -> [f64; VALUES] {
         wind_up_nm_per_s,
         reduction_nm_per_s,
         least_speed_mps,
+        probe_amplitude_nm,
+        probe_frequency_hz,
+        t_nms_s,
+        k_nms,
         vehicle.curvature_gain_1pm,
         vehicle.stability_factor_s2pm2,
         vehicle.aligning_gain_nms2pm,
@@ -115,7 +124,8 @@ fn values(params: &Params) -> [f64; VALUES] {
     ]
 }
 
-const fn from_values(si: &[f64; VALUES]) -> Params {
+/// The set with these fields.
+pub(crate) const fn from_values(si: &[f64; VALUES]) -> Params {
     let [
         k_1,
         a_1,
@@ -127,6 +137,10 @@ const fn from_values(si: &[f64; VALUES]) -> Params {
         wind_up_nm_per_s,
         reduction_nm_per_s,
         least_speed_mps,
+        probe_amplitude_nm,
+        probe_frequency_hz,
+        t_nms_s,
+        k_nms,
         curvature_gain_1pm,
         stability_factor_s2pm2,
         aligning_gain_nms2pm,
@@ -144,6 +158,10 @@ const fn from_values(si: &[f64; VALUES]) -> Params {
         wind_up_nm_per_s,
         reduction_nm_per_s,
         least_speed_mps,
+        probe_amplitude_nm,
+        probe_frequency_hz,
+        t_nms_s,
+        k_nms,
         vehicle: VehicleParams {
             curvature_gain_1pm,
             stability_factor_s2pm2,

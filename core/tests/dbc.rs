@@ -5,12 +5,14 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ResetCause, SimTime, Vehicle, Warning,
+    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ResetCause, SimTime, Telemetry, Vehicle,
+    Warning,
 };
 use haptic_core::envelope::LimitReason;
 use haptic_core::faults::{Fault, FaultSet, Record};
 use haptic_core::modes::Mode;
 use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::reliance::Reading;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -138,10 +140,12 @@ fn vehicle_and_demand() {
         let sent = Demand {
             engage: raw % 2 == 0,
             authority: Gain::from_si(f64::from(raw) / 128.0),
+            probe: raw % 3 == 0,
         };
         let frame = sent.encode(3);
         assert_eq!(signal(&dbc, &frame, "Authority"), f64::from(raw) / 128.0);
         assert_eq!(signal(&dbc, &frame, "Engage"), f64::from(u8::from(raw % 2 == 0)));
+        assert_eq!(signal(&dbc, &frame, "Probe"), f64::from(u8::from(raw % 3 == 0)));
         assert_eq!(decode(sent), sent);
     }
 }
@@ -201,6 +205,36 @@ fn warning_and_fault_record() {
         let frame = sent.encode(0);
         let signals = ["Index", "Total", "Fault", "Count", "Age"].map(|name| signal(&dbc, &frame, name));
         assert_eq!(signals, [i as f64, 15.0, i as f64, 200.0, 54_321.0]);
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
+fn telemetry() {
+    let dbc = dbc();
+    for raw in -4096..=4096_i32 {
+        let probe = f64::from(raw.clamp(-2047, 2047)) / 4096.0;
+        let (k_hg, deviation) = (f64::from(raw) / 1024.0, f64::from(raw & 2047) / 1024.0);
+        let (probing, identified) = (raw % 2 == 0, raw % 3 == 0);
+        let sent = Telemetry {
+            probe: probing.then(|| Torque::from_nm(probe)),
+            reliance: identified.then(|| Reading {
+                k_hg: Gain::from_si(k_hg),
+                deviation: Gain::from_si(deviation),
+            }),
+        };
+        let frame = sent.encode(0);
+        let shown = |there: bool, value: f64| if there { value } else { 0.0 };
+        let expected = [
+            ("Probe", shown(probing, probe)),
+            ("ProbeOn", shown(probing, 1.0)),
+            ("Identified", shown(identified, 1.0)),
+            ("Reliance", shown(identified, k_hg)),
+            ("Deviation", shown(identified, deviation)),
+        ];
+        for (name, value) in expected {
+            assert_eq!(signal(&dbc, &frame, name), value, "{name} {raw}");
+        }
         assert_eq!(decode(sent), sent);
     }
 }

@@ -6,7 +6,7 @@ type Set = fn(&mut Params, f64);
 
 #[test]
 fn each_parameter_is_checked_at_its_edges() {
-    let fields: [(&str, f64, f64, Set); 7] = [
+    let fields: [(&str, f64, f64, Set); 11] = [
         ("k_1", 0.0, 4.0, |p, x| (p.k_1, p.a_3) = (x, 1.0)),
         ("a_1", 0.0, 100.0, |p, x| p.a_1 = x),
         ("a_2", 0.0, 100.0, |p, x| p.a_2 = x),
@@ -14,6 +14,14 @@ fn each_parameter_is_checked_at_its_edges() {
         ("a_4", 0.0, 100.0, |p, x| p.a_4 = x),
         ("rate_corner_hz", 0.5, 60.0, |p, x| p.rate_corner_hz = x),
         ("torque_limit_nm", 0.1, 5.0, |p, x| p.torque_limit_nm = x),
+        ("probe_amplitude_nm", 0.0, 0.3, |p, x| {
+            (p.probe_amplitude_nm, p.probe_frequency_hz) = (x, 1.5);
+        }),
+        ("probe_frequency_hz", 1.0, 5.0, |p, x| {
+            (p.probe_amplitude_nm, p.probe_frequency_hz) = (0.1, x);
+        }),
+        ("t_nms_s", 0.01, 1.0, |p, x| p.t_nms_s = x),
+        ("k_nms", 0.0, 10.0, |p, x| p.k_nms = x),
     ];
     for (name, min, max, set) in fields {
         let with = |x: f64| {
@@ -46,4 +54,20 @@ fn a_product_out_of_range_is_named() {
     })
     .unwrap_err();
     assert_eq!(error.to_string(), "k_1 * a_3 = 40 is outside [0, 32]");
+}
+
+#[test]
+fn a_probe_too_steep_for_the_wind_up_limit_is_refused() {
+    let with = |amplitude, frequency| {
+        Config::new(&Params {
+            probe_amplitude_nm: amplitude,
+            probe_frequency_hz: frequency,
+            ..Params::PAPER
+        })
+    };
+    // 2*pi*0.2*2.75 = 3.456 N.m/s, 2*pi*0.2*2.8 = 3.519 N.m/s.
+    assert!(with(0.2, 2.75).is_ok());
+    let error = with(0.2, 2.8).unwrap_err();
+    assert_eq!(error.name, "2 * pi * probe_amplitude_nm * probe_frequency_hz");
+    assert!((error.value - 3.5186).abs() < 1e-4 && error.max == 3.5, "{error}");
 }

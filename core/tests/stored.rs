@@ -24,8 +24,8 @@ fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
 }
 
 /// A different value in each field.
-const VALUES: [f64; 15] = [
-    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.02, 0.001, 1.25, 0.5, 0.75,
+const VALUES: [f64; 19] = [
+    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.02, 0.001, 1.25, 0.5, 0.75,
 ];
 
 fn params() -> Params {
@@ -40,6 +40,10 @@ fn params() -> Params {
         wind_up_nm_per_s: 3.5,
         reduction_nm_per_s: 7.0,
         least_speed_mps: 6.0,
+        probe_amplitude_nm: 0.1,
+        probe_frequency_hz: 2.0,
+        t_nms_s: 0.2,
+        k_nms: 1.5,
         vehicle: VehicleParams {
             curvature_gain_1pm: 0.02,
             stability_factor_s2pm2: 0.001,
@@ -63,7 +67,7 @@ fn the_layout_is_the_documented_one() {
     assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     let bytes = save(&params(), 0x0102_0304);
     assert_eq!(bytes.to_vec(), block(1, 0x0102_0304, &VALUES));
-    assert_eq!(bytes.len(), 132);
+    assert_eq!(bytes.len(), 164);
     assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
 }
 
@@ -123,7 +127,7 @@ fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
 #[test]
 fn other_versions_and_values_out_of_range_are_no_good() {
     assert_eq!(load([&block(2, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(1, 1, &VALUES[..14]), &[]]), None);
+    assert_eq!(load([&block(1, 1, &VALUES[..18]), &[]]), None);
     let ranges_end = [
         (0, 4.1),
         (5, 0.4),
@@ -131,11 +135,15 @@ fn other_versions_and_values_out_of_range_are_no_good() {
         (7, 4.01),
         (8, 3.99),
         (9, 0.49),
-        (10, 0.2),
-        (11, -0.1),
-        (12, 21.0),
-        (13, 10.1),
-        (14, f64::NAN),
+        (10, 0.31),
+        (11, 0.9),
+        (12, 1.1),
+        (13, -0.1),
+        (14, 0.2),
+        (15, -0.1),
+        (16, 21.0),
+        (17, 10.1),
+        (18, f64::NAN),
     ];
     for (index, value) in ranges_end {
         let mut values = VALUES;

@@ -106,10 +106,17 @@ pub fn observe<O: Observer>(
 ) -> Result<Run, String> {
     scenario.check()?;
     let setup = scenario.setup()?;
+    let probe = scenario.guidance.probe;
     Ok(match (scenario.condition, scenario.sensors) {
         (Condition::Manual, _) => drive(scenario, centreline, &mut NoGuidance, observer),
-        (_, Sensors::Exact) => drive(scenario, centreline, &mut Direct::new(&setup), observer),
-        (_, Sensors::Paper) => drive(scenario, centreline, &mut OverBus::new(&setup), observer),
+        (_, Sensors::Exact) => {
+            let mut guidance = Direct::new(&setup).with_probe(probe);
+            drive(scenario, centreline, &mut guidance, observer)
+        }
+        (_, Sensors::Paper) => {
+            let mut guidance = OverBus::new(&setup).with_probe(probe);
+            drive(scenario, centreline, &mut guidance, observer)
+        }
     })
 }
 
@@ -124,6 +131,9 @@ pub fn drive<G: Guidance, O: Observer>(
     let (vehicle, driver) = (&scenario.vehicle, &scenario.driver);
     let relying = Transition::new(v, vehicle, driver, scenario.gains);
     let manual = Transition::new(v, vehicle, driver, ArmGains::MANUAL);
+    let change = scenario.driver_change;
+    let changed = change.map(|change| Transition::new(v, vehicle, driver, change.gains()));
+    let change_step = change.map_or(u32::MAX, |change| step_of(change.time_s));
     let failure_step = scenario.failure.at_s().map_or(u32::MAX, step_of);
     let noticed_step = failure_step.saturating_add(step_of(FAILURE_REACTION_S));
 
@@ -198,7 +208,11 @@ pub fn drive<G: Guidance, O: Observer>(
         }
 
         let target_next_rad = vision.step(seen.e_y_m, seen.e_theta_rad);
-        let transition = if step < noticed_step { &relying } else { &manual };
+        let transition = match &changed {
+            _ if step >= noticed_step => &manual,
+            Some(changed) if step >= change_step => changed,
+            _ => &relying,
+        };
         let input = PlantInput {
             target_now_rad,
             target_next_rad,

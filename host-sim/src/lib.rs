@@ -10,5 +10,4 @@ pub mod pil;
 pub mod plot;
 pub mod report;
 pub mod scenario;
-pub mod studies;
 pub mod trace;

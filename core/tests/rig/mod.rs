@@ -6,7 +6,7 @@
 
 #![allow(dead_code, reason = "each test uses its part of the bench")]
 
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Telemetry, Vehicle};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::modes::Mode;
@@ -29,6 +29,7 @@ pub(crate) struct Rig {
     pub(crate) speeds: [f64; 2],
     pub(crate) engage: bool,
     pub(crate) authority: f64,
+    pub(crate) probe: bool,
     /// The aligning torque that driver and guidance share, N.m.
     pub(crate) aligning: f64,
     pub(crate) wheel: f64,
@@ -39,6 +40,8 @@ pub(crate) struct Rig {
     /// Which senders are silent: lane, column, vehicle, demand.
     pub(crate) silent: [bool; 4],
     pub(crate) applied: f64,
+    /// The last telemetry.
+    pub(crate) telemetry: Option<Telemetry>,
     /// Rejections by the ECU since they were last taken.
     pub(crate) rejects: Vec<Reject>,
 }
@@ -60,12 +63,14 @@ impl Rig {
             speeds: [SPEED; 2],
             engage: false,
             authority: 1.0,
+            probe: false,
             aligning: 0.0,
             wheel: 0.0,
             driver: None,
             motor: |torque| torque,
             silent: [false; 4],
             applied: 0.0,
+            telemetry: None,
             rejects: Vec::new(),
         }
     }
@@ -125,6 +130,7 @@ impl Rig {
             _ => Demand {
                 engage: self.engage,
                 authority: Gain::from_si(self.authority),
+                probe: self.probe,
             }
             .encode(counter),
         }
@@ -150,6 +156,11 @@ impl Rig {
         self.ticks += 1;
         let step = self.ecu.step(self.now());
         self.applied = step.command.torque.nm();
+        if let Some(frame) = self.ecu.advise() {
+            let data: [u8; 8] = frame.data().try_into().unwrap();
+            assert!(frame.id() == Telemetry::ID && Telemetry::PROTECTION.is_intact(&data));
+            self.telemetry = Telemetry::unpack(u64::from_le_bytes(data));
+        }
         step
     }
 

@@ -62,6 +62,12 @@ mod target {
                 counts.unsent = counts.unsent.wrapping_add(1);
             }
         }
+        // The torque is on its way; what follows may take its time.
+        if let Some(frame) = ecu.advise()
+            && board.can().transmit(&frame).is_err()
+        {
+            counts.unsent = counts.unsent.wrapping_add(1);
+        }
         let guiding = matches!(step.command.mode, Mode::Active | Mode::Fade | Mode::Handover);
         let Ok(()) = board.status().set_state(guiding.into());
         counts.steps = counts.steps.wrapping_add(1);

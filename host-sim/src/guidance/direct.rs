@@ -6,7 +6,7 @@ use haptic_core::envelope::LimitReason;
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
 use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
+use haptic_core::quantity::{Gain, Metres, Radians, Speed, Torque};
 
 use super::{Applied, Guidance, View};
 
@@ -15,6 +15,7 @@ use super::{Applied, Guidance, View};
 pub struct Direct {
     controller: Controller,
     state: ControllerState,
+    probe: bool,
 }
 
 impl Direct {
@@ -22,8 +23,14 @@ impl Direct {
     pub fn new(setup: &Setup) -> Self {
         Self {
             controller: Controller::new(setup.config),
-            state: ControllerState::engaged(Instant::from_us(0)),
+            state: ControllerState::engaged(super::instant(0)),
+            probe: false,
         }
+    }
+
+    /// As it is, with the probe asked for or not.
+    pub fn with_probe(self, probe: bool) -> Self {
+        Self { probe, ..self }
     }
 }
 
@@ -34,7 +41,7 @@ impl Guidance for Direct {
 
     #[inline]
     fn step(&mut self, view: &View) -> Applied {
-        let now = view.now();
+        let now = super::instant(view.step);
         let inputs = Inputs {
             lane: view.lane.map_or(Input::Lost, |errors| {
                 Input::New(LaneSample {
@@ -51,6 +58,7 @@ impl Guidance for Direct {
             request: Input::New(Request {
                 engage: 1,
                 authority: Gain::ONE,
+                probe: self.probe.into(),
             }),
             faults: FaultSet::NONE,
         };

@@ -12,7 +12,7 @@ use haptic_core::bus::messages::{
 use haptic_core::ecu::Ecu;
 use haptic_core::envelope::LimitReason;
 use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
 use heapless::Vec;
 
 use super::{Applied, Guidance, View};
@@ -24,14 +24,15 @@ const COLUMN_PERIOD_STEPS: u32 = 2;
 const HOST_PERIOD_STEPS: u32 = 10;
 /// One frame of each sender in a step.
 const MAX_FRAMES: usize = 4;
-/// The guidance frame, a warning and a line of the fault history.
-const MAX_ANSWERS: usize = 3;
+/// The guidance frame, a warning, a line of the fault history and telemetry.
+const MAX_ANSWERS: usize = 4;
 
 /// The ECU, its sensors and its actuator on one bus. Every sender is trusted and the guidance active from the
 /// start, as the paper's studies have it.
 #[derive(Debug, Clone)]
 pub struct OverBus {
     ecu: Ecu,
+    probe: bool,
     lane_counter: u8,
     sent: Vec<Frame, MAX_FRAMES>,
     answers: Vec<Frame, MAX_ANSWERS>,
@@ -43,13 +44,19 @@ impl OverBus {
     /// A bus on which nothing was sent yet.
     pub fn new(setup: &Setup) -> Self {
         Self {
-            ecu: Ecu::engaged(setup, Instant::from_us(0)),
+            ecu: Ecu::engaged(setup, super::instant(0)),
+            probe: false,
             lane_counter: 0,
             sent: Vec::new(),
             answers: Vec::new(),
             actuator: ReceiverState::TRUSTED,
             applied: Applied::default(),
         }
+    }
+
+    /// As it is, with the probe asked for or not.
+    pub fn with_probe(self, probe: bool) -> Self {
+        Self { probe, ..self }
     }
 
     /// The frames that the senders put on the bus in this step.
@@ -85,6 +92,7 @@ impl OverBus {
             let demand = Demand {
                 engage: true,
                 authority: Gain::ONE,
+                probe: self.probe,
             };
             let _ = self.sent.push(demand.encode(counter));
         }
@@ -98,7 +106,7 @@ impl Guidance for OverBus {
 
     #[inline]
     fn step(&mut self, view: &View) -> Applied {
-        let now = view.now();
+        let now = super::instant(view.step);
         self.send(view);
         for frame in &self.sent {
             // The ECU judges by itself, keeps the last good frame and reports what it misses.
@@ -109,6 +117,7 @@ impl Guidance for OverBus {
         // MAX_ANSWERS has a place for each.
         let _ = self.answers.push(step.guidance);
         let _ = self.answers.extend_from_slice(&step.others);
+        self.answers.extend(self.ecu.advise());
         if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &step.guidance) {
             self.applied = Applied {
                 torque_nm: guidance.torque.nm(),

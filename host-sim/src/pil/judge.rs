@@ -21,8 +21,8 @@ const SILENCE: Duration = Duration::from_secs(20);
 /// Longest wait for a target to quit after its run.
 const EXIT: Duration = Duration::from_secs(5);
 
-/// Most frames of one answer: guidance, a warning, a line of the fault history.
-const ANSWER_MAX: usize = 3;
+/// Most frames of one answer: guidance, a warning, a line of the fault history, telemetry.
+const ANSWER_MAX: usize = 4;
 
 /// What the host's controller answered at a tick. No allocation: there is one each step.
 pub(super) struct Expected {
@@ -106,6 +106,10 @@ pub struct Instructions {
     pub worst_step: u64,
     /// The mean.
     pub mean: f64,
+    /// The most of any advice: what the controller does after its frames have left.
+    pub worst_advice: u32,
+    /// Its mean.
+    pub mean_advice: f64,
 }
 
 pub(super) struct Judge {
@@ -140,15 +144,18 @@ impl Judge {
     /// Compares until nothing more is expected. Ends the machine.
     pub(super) fn run(mut self, expected: &Receiver<Expected>) -> Result<Report, PilError> {
         let mut start = None;
-        let mut total = 0_u64;
+        let mut total = [0_u64; 2];
         for expected in expected {
             let start = *start.get_or_insert_with(std::time::Instant::now);
-            total += u64::from(self.step(&expected)?);
+            for (total, spent) in total.iter_mut().zip(self.step(&expected)?) {
+                *total += u64::from(spent);
+            }
             self.report.steps += 1;
             self.report.steps_per_second = self.report.steps as f64 / start.elapsed().as_secs_f64();
         }
         if let Some(instructions) = &mut self.report.instructions {
-            instructions.mean = total as f64 / self.report.steps as f64;
+            [instructions.mean, instructions.mean_advice] =
+                total.map(|total| total as f64 / self.report.steps as f64);
         }
         match self.qemu.wait(EXIT) {
             Some(status) if status.success() => {}
@@ -161,20 +168,20 @@ impl Judge {
         Ok(self.report)
     }
 
-    /// Compares one answer. Returns the instructions of the step.
-    fn step(&mut self, expected: &Expected) -> Result<u32, PilError> {
+    /// Compares one answer. Returns the instructions of the step and of the advice.
+    fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
-        let cycles = loop {
+        let cost = loop {
             let frame = self.frame()?;
-            if let Some(StepCost { cycles }) = StepCost::decode(&frame) {
-                break cycles;
+            if let Some(cost) = StepCost::decode(&frame) {
+                break cost;
             }
             self.compare(expected.now, host.next(), Some(frame));
         };
         for missing in host {
             self.compare(expected.now, Some(missing), None);
         }
-        Ok(self.account(cycles))
+        Ok(self.account(cost))
     }
 
     fn compare(&mut self, now: Instant, host: Option<Frame>, target: Option<Frame>) {
@@ -191,18 +198,19 @@ impl Judge {
         }
     }
 
-    /// Instructions of a step; without counting, cycles mean nothing.
-    fn account(&mut self, cycles: u32) -> u32 {
+    /// Instructions of a step and of the advice; without counting, cycles mean nothing.
+    fn account(&mut self, cost: StepCost) -> [u32; 2] {
         if !self.count {
-            return 0;
+            return [0; 2];
         }
-        let spent = instructions(cycles);
+        let (spent, advice) = (instructions(cost.cycles), instructions(cost.advice_cycles));
         let counted = self.report.instructions.get_or_insert_default();
         if spent > counted.worst {
             counted.worst = spent;
             counted.worst_step = self.report.steps;
         }
-        spent
+        counted.worst_advice = counted.worst_advice.max(advice);
+        [spent, advice]
     }
 
     /// The next frame from the target.

@@ -1,4 +1,5 @@
-//! The form of a scenario in a TOML file: tables `driver`, `vehicle`, `guidance` and `failure`, every field
+//! The form of a scenario in a TOML file: tables `driver`, `vehicle`, `guidance`, `failure`
+//! and `driver_change`, every field
 //! with a default, an unknown one an error. Ranges are checked by the scenario itself.
 
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 use haptic_core::params::Params;
 use serde::Deserialize;
 
-use super::{Condition, DEFAULT_SPEED_KMH, Failure, GuidanceParameters, Scenario, Sensors};
+use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, Sensors};
 use crate::input::InputError;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::road::{Course, PAPER_COURSE};
@@ -76,14 +77,21 @@ pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Scenario, I
                 wind_up_nm_per_s: g.wind_up_nm_per_s,
                 reduction_nm_per_s: g.reduction_nm_per_s,
                 least_speed_mps: g.least_speed_mps,
+                probe_amplitude_nm: g.probe_amplitude_nm,
+                probe_frequency_hz: g.probe_frequency_hz,
+                // What the controller takes for granted, whatever the driver is.
+                t_nms_s: Params::PAPER.t_nms_s,
+                k_nms: Params::PAPER.k_nms,
                 // Follows from the vehicle, see `Scenario::setup`.
                 vehicle: Params::PAPER.vehicle,
             },
             t_n: g.t_n,
             t_f: g.t_f,
+            probe: g.probe,
         },
         sensors: file.sensors,
         failure: file.failure,
+        driver_change: file.driver_change,
         seed: file.seed,
     })
 }
@@ -100,6 +108,7 @@ struct ScenarioFile {
     vehicle: VehicleParameters,
     guidance: GuidanceFile,
     failure: Failure,
+    driver_change: Option<DriverChange>,
 }
 
 impl Default for ScenarioFile {
@@ -114,6 +123,7 @@ impl Default for ScenarioFile {
             vehicle: VehicleParameters::default(),
             guidance: GuidanceFile::default(),
             failure: Failure::default(),
+            driver_change: None,
         }
     }
 }
@@ -189,6 +199,9 @@ struct GuidanceFile {
     wind_up_nm_per_s: f64,
     reduction_nm_per_s: f64,
     least_speed_mps: f64,
+    probe: bool,
+    probe_amplitude_nm: f64,
+    probe_frequency_hz: f64,
 }
 
 impl Default for GuidanceFile {
@@ -197,6 +210,7 @@ impl Default for GuidanceFile {
             controller: c,
             t_n,
             t_f,
+            probe,
         } = GuidanceParameters::default();
         Self {
             k_1: c.k_1,
@@ -211,6 +225,9 @@ impl Default for GuidanceFile {
             wind_up_nm_per_s: c.wind_up_nm_per_s,
             reduction_nm_per_s: c.reduction_nm_per_s,
             least_speed_mps: c.least_speed_mps,
+            probe,
+            probe_amplitude_nm: c.probe_amplitude_nm,
+            probe_frequency_hz: c.probe_frequency_hz,
         }
     }
 }

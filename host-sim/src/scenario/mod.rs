@@ -130,6 +130,31 @@ impl Default for Failure {
     }
 }
 
+/// A driver who changes in mid-drive, before a failure is noticed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriverChange {
+    /// When, s after the start.
+    #[serde(rename = "time")]
+    pub time_s: f64,
+    /// K_d from then on, N.m/rad.
+    #[serde(rename = "K_d", alias = "k_d")]
+    pub k_d: f64,
+    /// K_hg from then on.
+    #[serde(rename = "K_hg", alias = "k_hg")]
+    pub k_hg: f64,
+}
+
+impl DriverChange {
+    /// The arm's gains from then on.
+    pub fn gains(&self) -> ArmGains {
+        ArmGains {
+            k_d: self.k_d,
+            k_hg: self.k_hg,
+        }
+    }
+}
+
 /// The controller and the camera that feeds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuidanceParameters {
@@ -139,6 +164,8 @@ pub struct GuidanceParameters {
     pub t_n: f64,
     /// t'_f, look-ahead time of its far point, s.
     pub t_f: f64,
+    /// Whether the host asks for the probe. Seen only by the shipping controller.
+    pub probe: bool,
 }
 
 impl Default for GuidanceParameters {
@@ -147,6 +174,7 @@ impl Default for GuidanceParameters {
             controller: Params::PAPER,
             t_n: 0.3,
             t_f: 0.7,
+            probe: false,
         }
     }
 }
@@ -172,6 +200,8 @@ pub struct Scenario {
     pub sensors: Sensors,
     /// What fails.
     pub failure: Failure,
+    /// When the driver changes how he weighs vision against guidance, if he does.
+    pub driver_change: Option<DriverChange>,
     /// Seed of the remnant's noise.
     pub seed: u64,
 }
@@ -189,6 +219,7 @@ impl Default for Scenario {
             guidance: GuidanceParameters::default(),
             sensors: Sensors::default(),
             failure: Failure::default(),
+            driver_change: None,
             seed: 1,
         }
     }
@@ -224,13 +255,16 @@ impl Scenario {
         let within = |table: &'static str| move |e: String| format!("{table}.{e}");
         in_range("speed", self.speed_kmh, SPEED_KMH, "km/h")?;
         self.driver.check().map_err(within("driver"))?;
-        in_range("K_d", self.gains.k_d, 0.0..=50.0, "N.m/rad").map_err(within("driver"))?;
-        in_range("K_hg", self.gains.k_hg, 0.0..=10.0, "").map_err(within("driver"))?;
+        check_gains(self.gains).map_err(within("driver"))?;
         self.vehicle.check().map_err(within("vehicle"))?;
         in_range("t_n", self.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
         in_range("t_f", self.guidance.t_f, 0.0..=5.0, "s").map_err(within("guidance"))?;
         self.setup()?;
         in_range("time", self.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
+        if let Some(change) = &self.driver_change {
+            in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
+            check_gains(change.gains()).map_err(within("driver_change"))?;
+        }
         let (length, look_ahead) = (self.course.length_m(), self.look_ahead_m());
         if length <= look_ahead {
             return Err(format!(
@@ -249,15 +283,11 @@ impl Scenario {
     /// # Errors
     /// The first parameter out of range, with its value and range.
     pub fn setup(&self) -> Result<Setup, String> {
-        Setup::new(&self.controller_params()).map_err(|e| format!("guidance.{e}"))
-    }
-
-    /// The controller's parameters with what it knows of the vehicle.
-    pub fn controller_params(&self) -> Params {
-        Params {
+        let params = Params {
             vehicle: self.vehicle_for_plausibility(),
             ..self.guidance.controller
-        }
+        };
+        Setup::new(&params).map_err(|e| format!("guidance.{e}"))
     }
 
     /// The vehicle as the controller's plausibility checks know it: the true one, from tables 8 and 9.
@@ -305,4 +335,9 @@ impl Scenario {
         let DriverParameters { t_n, t_f, .. } = self.driver;
         t_n.max(t_f).max(self.guidance.t_n).max(self.guidance.t_f)
     }
+}
+
+fn check_gains(gains: ArmGains) -> Result<(), String> {
+    in_range("K_d", gains.k_d, 0.0..=50.0, "N.m/rad")?;
+    in_range("K_hg", gains.k_hg, 0.0..=10.0, "")
 }

@@ -93,6 +93,15 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ("[guidance]\nK_1 = 50", "guidance.k_1 = 50"),
         ("[guidance]\nt_n = -0.1", "guidance.t_n = -0.1"),
         ("[failure]\ntime = -3", "failure.time = -3"),
+        ("[driver_change]\ntime = 3\nK_d = 2", "K_hg"),
+        (
+            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = -1",
+            "driver_change.K_hg = -1",
+        ),
+        (
+            "[guidance]\nprobe_amplitude_nm = 0.31",
+            "guidance.probe_amplitude_nm = 0.31",
+        ),
         (
             "[driver]\nt_f = 5\n[guidance]\nt_f = 5.5",
             "guidance.t_f = 5.5 s is outside 0 to 5 s",

@@ -157,6 +157,8 @@ pub struct Demand {
     pub engage: bool,
     /// Share of the law's torque, 0 to 1, LSB 2^-7.
     pub authority: Gain,
+    /// The probe is wanted on top of it; refused outside Active.
+    pub probe: bool,
 }
 
 impl Demand {
@@ -171,7 +173,7 @@ impl Message for Demand {
 
     fn pack(&self) -> u64 {
         let authority = to_lsb(self.authority.bits(), Self::LSB, Self::MAX).max(0);
-        put(i64::from(self.engage), 12, 1) | put(authority, 13, 8)
+        put(i64::from(self.engage), 12, 1) | put(authority, 13, 8) | put(i64::from(self.probe), 21, 1)
     }
 
     fn unpack(word: u64) -> Option<Self> {
@@ -179,6 +181,7 @@ impl Message for Demand {
         (authority <= Self::MAX).then(|| Self {
             engage: unsigned(word, 12, 1) != 0,
             authority: Gain::from_wide(from_lsb(authority, Self::LSB)),
+            probe: unsigned(word, 21, 1) != 0,
         })
     }
 }

@@ -9,7 +9,7 @@ mod inputs;
 mod outputs;
 
 pub use inputs::{Column, Demand, LanePreview, Vehicle};
-pub use outputs::{FaultRecord, Guidance, ResetCause, Warning};
+pub use outputs::{FaultRecord, Guidance, ResetCause, Telemetry, Warning};
 
 use super::e2e::{Protection, ReceiverState, Reject};
 use super::frame::Frame;

@@ -5,7 +5,8 @@ use crate::bus::e2e::Protection;
 use crate::envelope::LimitReason;
 use crate::faults::{Fault, FaultSet, Record};
 use crate::modes::Mode;
-use crate::quantity::Torque;
+use crate::quantity::{Gain, Torque};
+use crate::reliance::Reading;
 
 /// Why the ECU last started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -174,6 +175,60 @@ impl Message for FaultRecord {
                 count: unsigned(word, 24, 8) as u8,
                 age_s: unsigned(word, 32, 16) as u16,
             },
+        })
+    }
+}
+
+/// The probe and what it tells, every 20 ms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Telemetry {
+    /// The part of the guidance torque that is the probe, +-0.4995 N.m, LSB 2^-12 N.m, while there is one.
+    pub probe: Option<Torque>,
+    /// K_hg, +-4, LSB 2^-10, and its standard deviation, 0 to 1.999, LSB 2^-10, once identified.
+    pub reliance: Option<Reading>,
+}
+
+impl Telemetry {
+    const TORQUE_LSB: u32 = 12;
+    const TORQUE_MAX: i64 = (1 << 11) - 1;
+    const RELIANCE_LSB: u32 = 10;
+    const RELIANCE_MAX: i64 = 4 << Self::RELIANCE_LSB;
+    const DEVIATION_MAX: i64 = (1 << 11) - 1;
+}
+
+impl Message for Telemetry {
+    const ID: u16 = 0x310;
+    const PROTECTION: Protection = Protection::new(0x88);
+    const MAX_DELTA: u8 = 2;
+
+    fn pack(&self) -> u64 {
+        let probe = self.probe.unwrap_or(Torque::ZERO);
+        let reading = self.reliance.unwrap_or(Reading {
+            k_hg: Gain::ZERO,
+            deviation: Gain::ZERO,
+        });
+        let deviation = to_lsb(reading.deviation.bits(), Self::RELIANCE_LSB, Self::DEVIATION_MAX);
+        put(to_lsb(probe.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX), 12, 12)
+            | put(i64::from(self.probe.is_some()), 24, 1)
+            | put(i64::from(self.reliance.is_some()), 25, 1)
+            | put(
+                to_lsb(reading.k_hg.bits(), Self::RELIANCE_LSB, Self::RELIANCE_MAX),
+                26,
+                14,
+            )
+            | put(deviation, 40, 11)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let probe = Torque::from_wide(from_lsb(signed(word, 12, 12), Self::TORQUE_LSB));
+        let k_hg = signed(word, 26, 14);
+        let reading = Reading {
+            k_hg: Gain::from_wide(from_lsb(k_hg, Self::RELIANCE_LSB)),
+            deviation: Gain::from_wide(from_lsb(unsigned(word, 40, 11), Self::RELIANCE_LSB)),
+        };
+        (k_hg.abs() <= Self::RELIANCE_MAX).then(|| Self {
+            probe: (unsigned(word, 24, 1) != 0).then_some(probe),
+            reliance: (unsigned(word, 25, 1) != 0).then_some(reading),
         })
     }
 }

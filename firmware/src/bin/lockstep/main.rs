@@ -128,14 +128,21 @@ mod target {
                 }
             }
             let step = ecu.step(now);
-            let cycles = ThisBoard::cycles().wrapping_sub(start);
+            let stepped = ThisBoard::cycles();
+            let advice = ecu.advise();
+            let advice_cycles = ThisBoard::cycles().wrapping_sub(stepped);
+            let cycles = stepped.wrapping_sub(start);
             self.frames.clear();
             self.steps = self.steps.wrapping_add(1);
             send(can, &step.guidance);
-            for frame in &step.others {
+            for frame in step.others.iter().chain(&advice) {
                 send(can, frame);
             }
-            send(can, &StepCost { cycles }.encode());
+            let cost = StepCost {
+                cycles,
+                advice_cycles,
+            };
+            send(can, &cost.encode());
         }
     }
 

@@ -1,0 +1,142 @@
+//! The probe: a small known sine that is added to the guidance torque so that the driver's answer to a torque
+//! can be told from what the driver does anyway. From passive driving the reliance cannot be read.
+//!
+//! It starts and ends without a jump: its amplitude grows linearly from zero over the first period, and falls
+//! likewise over the period after its end. Its slope stays within `2*pi*frequency*amplitude`, and 1.3 % more
+//! while it ends, so that with 3.5 N.m/s at most ([`crate::params`] checks it) it stays under the envelope's
+//! 4 N.m/s.
+//!
+//! Error: at most 0.3 uN.m from a float64 sine of the same phase. A late step advances the phase by 2 ms at
+//! most: the torque must not jump because time did.
+//!
+//! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
+//! word on the sum), and what the answer tells ([`crate::reliance`]).
+
+use crate::quantity::{Micros, Torque, shift_round};
+use crate::sine::sine;
+use crate::vital::vital;
+
+vital! {
+    /// Amplitude and frequency; immutable once validated by [`crate::params`].
+    pub struct Probe {
+        /// Amplitude; zero means that there is no probe.
+        pub(crate) amplitude: Torque,
+        /// Phase per microsecond, in 2^-32 turns: at 1 Hz or more within 1.2e-4 of the frequency.
+        pub(crate) phase_per_us: u32,
+    }
+}
+
+vital! {
+    /// Phase and gain.
+    pub struct ProbeState {
+        phase: u32,
+        /// Share of the amplitude in use, in 2^-32 of it: as a phase, so that it grows over one period.
+        gain: u32,
+    }
+}
+
+impl ProbeState {
+    /// Silent.
+    pub const SILENT: Self = Self { phase: 0, gain: 0 };
+}
+
+/// As the envelope's rate limits count it: two ticks.
+const MAX_ELAPSED_US: u32 = 2_000;
+
+impl Probe {
+    /// The torque to add now; `None` once it is silent.
+    #[must_use]
+    pub fn step(&self, state: &mut ProbeState, elapsed: Micros, wanted: bool) -> Option<Torque> {
+        let advance = self.phase_per_us.wrapping_mul(elapsed.us().min(MAX_ELAPSED_US));
+        state.gain = if wanted {
+            state.gain.saturating_add(advance)
+        } else {
+            state.gain.saturating_sub(advance)
+        };
+        if state.gain == 0 || self.amplitude == Torque::ZERO {
+            *state = ProbeState::SILENT;
+            return None;
+        }
+        state.phase = state.phase.wrapping_add(advance);
+        // 31 bits of gain times 30 of the sine, then times 24 of the torque: each fits an i64.
+        let share = shift_round(
+            i64::from(state.gain >> 1).saturating_mul(i64::from(sine(state.phase))),
+            31,
+        );
+        let torque = share.saturating_mul(i64::from(self.amplitude.bits()));
+        Some(Torque::from_wide(shift_round(torque, 30)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROBE: Probe = Probe {
+        amplitude: Torque::from_nm(0.2),
+        phase_per_us: 10_737,
+    };
+
+    /// Torque after each millisecond, N.m; 0 where there is none.
+    fn run(state: &mut ProbeState, steps: usize, wanted: bool) -> impl Iterator<Item = f64> {
+        (0..steps).map(move |_| {
+            PROBE
+                .step(state, Micros::from_ms(1), wanted)
+                .map_or(0.0, Torque::nm)
+        })
+    }
+
+    #[test]
+    fn is_a_sine_that_grows_over_its_first_period() {
+        let mut state = ProbeState::SILENT;
+        for (i, torque) in run(&mut state, 5_000, true).enumerate() {
+            let turns = (i + 1) as f64 * 1000.0 * 10_737.0 / 4_294_967_296.0;
+            let expected = 0.2 * turns.min(1.0) * (turns * core::f64::consts::TAU).sin();
+            assert!((torque - expected).abs() < 3e-7, "{i}: {torque} {expected}");
+        }
+    }
+
+    #[test]
+    fn never_jumps_whenever_it_starts_and_ends() {
+        // 2*pi*2.5 Hz*0.2 N.m is pi N.m/s, and 1.3 % more while it ends.
+        use core::f64::consts::PI;
+        let (mut state, mut last, mut steepest) = (ProbeState::SILENT, 0.0_f64, 0.0_f64);
+        for steps in 1..900 {
+            for wanted in [true, false] {
+                for torque in run(&mut state, steps, wanted) {
+                    steepest = steepest.max((torque - last).abs() / 1e-3);
+                    last = torque;
+                }
+            }
+        }
+        assert!(steepest > 0.99 * PI && steepest < 1.013 * PI, "{steepest}");
+    }
+
+    #[test]
+    fn is_silent_a_period_after_its_end_and_starts_from_zero_again() {
+        let mut state = ProbeState::SILENT;
+        run(&mut state, 1_234, true).for_each(drop);
+        run(&mut state, 401, false).for_each(drop);
+        assert_eq!(state, ProbeState::SILENT);
+        assert_eq!(PROBE.step(&mut state, Micros::from_ms(1), false), None);
+    }
+
+    #[test]
+    fn a_late_step_moves_it_no_further_than_two_ticks() {
+        let (mut late, mut on_time) = (ProbeState::SILENT, ProbeState::SILENT);
+        let jump = PROBE.step(&mut late, Micros::from_ms(90), true);
+        assert_eq!(jump, PROBE.step(&mut on_time, Micros::from_ms(2), true));
+    }
+
+    #[test]
+    fn no_amplitude_is_no_probe() {
+        let none = Probe {
+            amplitude: Torque::ZERO,
+            ..PROBE
+        };
+        assert_eq!(
+            none.step(&mut ProbeState::SILENT.clone(), Micros::from_ms(1), true),
+            None
+        );
+    }
+}

@@ -1,0 +1,77 @@
+//! Sine of a 32-bit phase: the one waveform of the probe and of the window and phasor of its estimator, the
+//! same bits on every machine.
+//!
+//! A phase is a `u32` whose full range is one turn, so that it wraps by itself. The sine is an odd minimax
+//! polynomial of degree 7 on the quarter wave. Error: at most 7e-7 of full scale, a twentieth of an LSB of
+//! the bus for the largest probe (the test below asserts it against f64). Cost: about 30 instructions.
+
+/// One, in the sine's format.
+pub(crate) const ONE: i32 = 1 << 30;
+
+/// Coefficients of x, x^3, x^5, x^7 in 2^-30, for x = 1 at a quarter turn.
+const C: [i64; 4] = [1_686_623_910, -693_521_754, 85_290_965, -4_651_906];
+
+/// The phase a quarter turn ahead of another: `sine(phase + QUARTER)` is the cosine.
+pub(crate) const QUARTER: u32 = 1 << 30;
+
+/// `sin(2*pi*phase/2^32)` in 2^-30.
+#[must_use]
+pub(crate) const fn sine(phase: u32) -> i32 {
+    // Half turns as an i32, folded to the quarter wave on each side of zero.
+    let turn = phase as i32;
+    let x = if turn.unsigned_abs() > QUARTER {
+        i32::MIN.wrapping_sub(turn)
+    } else {
+        turn
+    };
+    let x = x as i64;
+    let square = times(x, x);
+    let tail = C[2].saturating_add(times(square, C[3]));
+    let tail = C[1].saturating_add(times(square, tail));
+    let sine = times(x, C[0].saturating_add(times(square, tail)));
+    // The polynomial may pass one by its error.
+    if sine > ONE as i64 {
+        ONE
+    } else if sine < -(ONE as i64) {
+        -ONE
+    } else {
+        sine as i32
+    }
+}
+
+/// A product in 2^-30: both below 2^32 in magnitude.
+const fn times(a: i64, b: i64) -> i64 {
+    a.saturating_mul(b) >> 30
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agrees_with_f64_to_7e_7() {
+        let mut worst = 0.0_f64;
+        for phase in (0..=u32::MAX)
+            .step_by(9973)
+            .chain([0, 1 << 30, 1 << 31, 3 << 30, u32::MAX])
+        {
+            let exact = (f64::from(phase) * core::f64::consts::TAU / 4_294_967_296.0).sin();
+            worst = worst.max((f64::from(sine(phase)) / f64::from(ONE) - exact).abs());
+        }
+        assert!(worst < 7e-7, "{worst:e}");
+    }
+
+    #[test]
+    fn quarter_turns() {
+        assert_eq!(sine(0), 0);
+        assert_eq!(sine(1 << 31), 0);
+        for phase in [123_u32, 1 << 29, 0x3FFF_FFFF, 0x5555_5555] {
+            // A shift rounds down on both sides of zero.
+            assert!(
+                (sine(phase.wrapping_neg()) + sine(phase)).abs() <= 4,
+                "{phase:#x}"
+            );
+            assert_eq!(sine(phase), sine((1_u32 << 31).wrapping_sub(phase)), "{phase:#x}");
+        }
+    }
+}
