@@ -10,4 +10,5 @@ pub mod pil;
 pub mod plot;
 pub mod report;
 pub mod scenario;
+pub mod studies;
 pub mod trace;

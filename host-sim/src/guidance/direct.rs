@@ -6,7 +6,7 @@ use haptic_core::envelope::LimitReason;
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
 use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Metres, Radians, Speed, Torque};
+use haptic_core::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
 
 use super::{Applied, Guidance, View};
 
@@ -23,7 +23,7 @@ impl Direct {
     pub fn new(setup: &Setup) -> Self {
         Self {
             controller: Controller::new(setup.config),
-            state: ControllerState::engaged(super::instant(0)),
+            state: ControllerState::engaged(Instant::from_us(0)),
             probe: false,
         }
     }
@@ -41,7 +41,7 @@ impl Guidance for Direct {
 
     #[inline]
     fn step(&mut self, view: &View) -> Applied {
-        let now = super::instant(view.step);
+        let now = view.now();
         let inputs = Inputs {
             lane: view.lane.map_or(Input::Lost, |errors| {
                 Input::New(LaneSample {

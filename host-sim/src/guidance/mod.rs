@@ -44,6 +44,13 @@ pub struct View {
     pub speed_mps: f64,
 }
 
+impl View {
+    /// The ECU's clock at this step, from zero at the start; it wraps every 71.6 minutes, as the real one does.
+    pub fn now(&self) -> Instant {
+        Instant::from_us(self.step.wrapping_mul(1000))
+    }
+}
+
 /// The torque that a guidance applies until the next step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Applied {
@@ -84,9 +91,4 @@ impl Guidance for NoGuidance {
     fn step(&mut self, _view: &View) -> Applied {
         Applied::default()
     }
-}
-
-/// The ECU's clock at a step; it wraps every 71.6 minutes, as the real one does.
-fn instant(step: u32) -> Instant {
-    Instant::from_us(step.wrapping_mul(1000))
 }

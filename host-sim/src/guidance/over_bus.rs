@@ -12,7 +12,7 @@ use haptic_core::bus::messages::{
 use haptic_core::ecu::Ecu;
 use haptic_core::envelope::LimitReason;
 use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
 use heapless::Vec;
 
 use super::{Applied, Guidance, View};
@@ -44,7 +44,7 @@ impl OverBus {
     /// A bus on which nothing was sent yet.
     pub fn new(setup: &Setup) -> Self {
         Self {
-            ecu: Ecu::engaged(setup, super::instant(0)),
+            ecu: Ecu::engaged(setup, Instant::from_us(0)),
             probe: false,
             lane_counter: 0,
             sent: Vec::new(),
@@ -106,7 +106,7 @@ impl Guidance for OverBus {
 
     #[inline]
     fn step(&mut self, view: &View) -> Applied {
-        let now = super::instant(view.step);
+        let now = view.now();
         self.send(view);
         for frame in &self.sent {
             // The ECU judges by itself, keeps the last good frame and reports what it misses.

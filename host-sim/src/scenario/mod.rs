@@ -283,11 +283,15 @@ impl Scenario {
     /// # Errors
     /// The first parameter out of range, with its value and range.
     pub fn setup(&self) -> Result<Setup, String> {
-        let params = Params {
+        Setup::new(&self.controller_params()).map_err(|e| format!("guidance.{e}"))
+    }
+
+    /// The controller's parameters with what it knows of the vehicle.
+    pub fn controller_params(&self) -> Params {
+        Params {
             vehicle: self.vehicle_for_plausibility(),
             ..self.guidance.controller
-        };
-        Setup::new(&params).map_err(|e| format!("guidance.{e}"))
+        }
     }
 
     /// The vehicle as the controller's plausibility checks know it: the true one, from tables 8 and 9.

@@ -1,0 +1,93 @@
+//! The command line: options in, tables, files and exit codes out.
+//!
+//! Exit codes: 0 all is well; 1 a check or a comparison failed; 2 bad input or usage. Results go to stdout, all
+//! else (progress, where the files are, what is wrong) to stderr; with `--json` stdout holds one JSON object.
+//!
+//! One file per subcommand. Not here: anything that a study or a model decides.
+
+mod evaluate;
+mod pil;
+mod progress;
+mod run;
+mod table;
+
+use std::fmt::Display;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use serde::Serialize;
+
+/// Closed-loop workbench for the haptic-guidance steering controller.
+///
+/// Without a subcommand: the evaluation, as `evaluate` with the same options.
+///
+/// Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage.
+#[derive(Debug, Parser)]
+#[command(version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    evaluate: evaluate::Arguments,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// The paper's evaluation: 3 drivers, 4 conditions, with and without failure of the guidance
+    Evaluate(evaluate::Arguments),
+    /// One scenario from a TOML file
+    Run(run::Arguments),
+    /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
+    Pil(pil::Arguments),
+}
+
+/// How a command ended that could do its work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    Good,
+    /// A check or a comparison failed.
+    Failed,
+}
+
+/// Why a command could not do its work: a message for people.
+#[derive(Debug)]
+struct BadInput(String);
+
+impl<E: Display> From<E> for BadInput {
+    fn from(error: E) -> Self {
+        Self(error.to_string())
+    }
+}
+
+pub(crate) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        None => evaluate::run(&cli.evaluate),
+        Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
+        Some(Command::Run(arguments)) => run::run(&arguments),
+        Some(Command::Pil(arguments)) => pil::run(&arguments),
+    };
+    match result {
+        Ok(Outcome::Good) => ExitCode::SUCCESS,
+        Ok(Outcome::Failed) => ExitCode::from(1),
+        Err(BadInput(message)) => {
+            eprintln!("error: {message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// One JSON object on stdout.
+fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
+    print(&serde_json::to_string_pretty(value)?)
+}
+
+/// Text on stdout. A reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<(), BadInput> {
+    use std::io::{ErrorKind, Write};
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,64 @@
+//! `host-sim run SCENARIO.toml`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::metrics::DEFINITIONS;
+use host_sim::scenario::Scenario;
+use host_sim::studies::run::{SingleRun, run as simulate};
+
+use super::table::{self, number};
+use super::{BadInput, Outcome, print, print_json};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Scenario file (TOML); every field has a default
+    #[arg(value_name = "SCENARIO.toml")]
+    scenario: PathBuf,
+    /// Directory for a figure, the time series, the results and a report; default: no files
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the results as one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let single = simulate(Scenario::load(&arguments.scenario)?)?;
+    if let Some(directory) = &arguments.out {
+        single.write(directory)?;
+        eprintln!("Report: {}", directory.join("report.html").display());
+    }
+    if arguments.json {
+        print_json(&single.results)?;
+    } else {
+        print(&readable(&single))?;
+    }
+    Ok(Outcome::Good)
+}
+
+fn readable(single: &SingleRun) -> String {
+    let results = &single.results;
+    let record = &results.record;
+    let [from, to] = results.window_m;
+    let mut lines = vec![["metric", "value", "unit"].map(String::from).to_vec()];
+    for definition in DEFINITIONS {
+        let value = number((definition.value)(&record.metrics), 4);
+        lines.push(vec![definition.label.into(), value, definition.unit.into()]);
+    }
+    let ended = if record.diverged {
+        format!("DIVERGED at {:.0} m", record.end_m)
+    } else {
+        "ran to its end".into()
+    };
+    format!(
+        "{}, {} km/h, t_p {} s, {}, failure {}: {ended}\n{from} to {to} m of {:.0} m\n\n{}",
+        results.course,
+        results.speed_kmh,
+        record.t_p,
+        record.condition,
+        record.failure,
+        results.course_length_m,
+        table::text(&lines),
+    )
+}

@@ -1,0 +1,54 @@
+//! Studies: what to simulate, what to make of it, and which files to leave.
+//!
+//! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
+//! - [`claims`]: what that evaluation must show.
+//! - [`run`]: one scenario.
+//! - [`processor`]: one scenario with the ECU's image in QEMU beside the host's.
+//!
+//! Not here: options and exit codes (the command line), how a metric is computed, how a figure is drawn.
+
+pub mod claims;
+mod curves;
+pub mod evaluate;
+mod evaluation_files;
+pub mod processor;
+mod record;
+pub mod run;
+mod run_files;
+
+pub use record::{RunRecord, check_window};
+
+use crate::plot::PlotError;
+use crate::report::WriteError;
+
+/// Why the files of a study could not be made.
+#[derive(Debug)]
+pub enum OutputError {
+    /// A file or directory cannot be written.
+    Write(WriteError),
+    /// A figure cannot be drawn.
+    Plot(PlotError),
+}
+
+impl From<WriteError> for OutputError {
+    fn from(error: WriteError) -> Self {
+        Self::Write(error)
+    }
+}
+
+impl From<PlotError> for OutputError {
+    fn from(error: PlotError) -> Self {
+        Self::Plot(error)
+    }
+}
+
+impl std::fmt::Display for OutputError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Write(error) => error.fmt(f),
+            Self::Plot(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for OutputError {}

@@ -1,0 +1,66 @@
+//! Processor in the loop: a scenario on this host, every frame of it also to the ECU's image in QEMU, and every
+//! answer compared. The image has the controller's parameters of the scenario.
+
+use haptic_core::lockstep::{Start, StartState};
+use haptic_core::quantity::Instant;
+
+use crate::closed_loop::{Cycle, drive};
+use crate::guidance::OverBus;
+use crate::models::road::Centreline;
+use crate::pil::{Channel, Pil, PilError, Report};
+use crate::scenario::{Condition, Scenario};
+
+/// Why there is no comparison.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ProcessorError {
+    /// The scenario cannot be run with a processor.
+    Scenario(String),
+    /// The image cannot be built, started or heard.
+    Target(PilError),
+}
+
+/// Runs a scenario over the bus, whatever its sensors say: the image knows no other way in. With `count`, the
+/// target counts its instructions. `progress` is told each step's number.
+///
+/// # Errors
+/// A manual scenario, which has no controller to compare; as [`Scenario::check`]; what is missing or fails on
+/// the way to a running image.
+pub fn run(
+    scenario: &Scenario,
+    channel: Channel,
+    count: bool,
+    mut progress: impl FnMut(u32),
+) -> Result<Report, ProcessorError> {
+    scenario.check().map_err(ProcessorError::Scenario)?;
+    if scenario.condition == Condition::Manual {
+        return Err(ProcessorError::Scenario(
+            "condition = manual has no controller whose frames could be compared".into(),
+        ));
+    }
+    let params = scenario.controller_params();
+    let setup = scenario.setup().map_err(ProcessorError::Scenario)?;
+    let start = Start {
+        state: StartState::Engaged,
+        at: Instant::from_us(0),
+    };
+    let mut pil = Pil::start(channel, &params, start, count).map_err(ProcessorError::Target)?;
+    let mut broken = None;
+    drive(
+        scenario,
+        &Centreline::new(&scenario.course),
+        &mut OverBus::new(&setup),
+        &mut |cycle: &Cycle| {
+            // The host's loop needs no answer, so it simply runs out when the target is gone.
+            if broken.is_none() {
+                broken = pil
+                    .tick(cycle.view.now(), cycle.frames_in, cycle.frames_out)
+                    .err();
+                progress(cycle.view.step);
+            }
+        },
+    );
+    match broken {
+        Some(error) => Err(ProcessorError::Target(error)),
+        None => pil.finish().map_err(ProcessorError::Target),
+    }
+}

@@ -1,0 +1,95 @@
+//! One scenario, simulated and measured.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::record::default_window;
+use super::{OutputError, RunRecord, run_files};
+use crate::closed_loop::{Run, simulate};
+use crate::models::road::Centreline;
+use crate::scenario::{Failure, FailureKind, Scenario, Sensors};
+
+/// A scenario with its run.
+#[derive(Debug, Clone)]
+pub struct SingleRun {
+    /// What was simulated.
+    pub scenario: Scenario,
+    /// What came of it.
+    pub run: Run,
+    /// What is handed on.
+    pub results: SingleResults,
+}
+
+/// The results of one run, as JSON holds them.
+#[derive(Debug, Clone, Serialize)]
+pub struct SingleResults {
+    /// Name of the course.
+    pub course: String,
+    /// Its length, m.
+    pub course_length_m: f64,
+    /// Speed, km/h.
+    pub speed_kmh: f64,
+    /// What the controller saw.
+    pub sensors: Sensors,
+    /// When the guidance failed, if it did, s.
+    pub failure_time_s: Option<f64>,
+    /// Seed of the remnant.
+    pub seed: u64,
+    /// Stretch that was measured, m: the paper's curve on its course, else all of it.
+    pub window_m: [f64; 2],
+    /// The run's record.
+    #[serde(flatten)]
+    pub record: RunRecord,
+}
+
+/// Simulates a scenario; one with a failure also without it, to tell when the driver has recovered.
+///
+/// # Errors
+/// As [`Scenario::check`].
+pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
+    let centreline = Centreline::new(&scenario.course);
+    let window = default_window(&scenario.course);
+    let run = simulate(&scenario, &centreline)?;
+    let nominal_peak_m = if scenario.failure.at_s().is_some() {
+        let failure = Failure {
+            kind: FailureKind::None,
+            ..scenario.failure
+        };
+        let nominal = Scenario {
+            failure,
+            ..scenario.clone()
+        };
+        let run = simulate(&nominal, &centreline)?;
+        RunRecord::new(&nominal, &run, window, None)
+            .metrics
+            .peak_lateral_error_m
+    } else {
+        None
+    };
+    let results = SingleResults {
+        course: scenario.course.name().into(),
+        course_length_m: scenario.course.length_m(),
+        speed_kmh: scenario.speed_kmh,
+        sensors: scenario.sensors,
+        failure_time_s: scenario.failure.at_s(),
+        seed: scenario.seed,
+        window_m: [window.from_m, window.to_m],
+        record: RunRecord::new(&scenario, &run, window, nominal_peak_m),
+    };
+    Ok(SingleRun {
+        scenario,
+        run,
+        results,
+    })
+}
+
+impl SingleRun {
+    /// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON) and a report (HTML).
+    ///
+    /// # Errors
+    /// What could not be written or drawn.
+    pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
+        run_files::write(self, directory)
+    }
+}

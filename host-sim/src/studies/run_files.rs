@@ -1,0 +1,143 @@
+//! The files that one run leaves: a figure, its time series, its results, and the report that shows them.
+
+use std::path::Path;
+
+use super::run::SingleRun;
+use super::{OutputError, curves};
+use crate::closed_loop::Ending;
+use crate::metrics::DEFINITIONS;
+use crate::plot::{Axis, Figure, Line, Marker, Panel};
+use crate::report::{
+    Block, Event, Report, Section, Table, definitions_table, write_file, write_json, write_trace_csv,
+};
+use crate::scenario::FAILURE_REACTION_S;
+use crate::trace::Sample;
+
+pub(super) fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
+    let figure = figure(single);
+    let (svg, png) = (figure.to_svg()?, figure.to_png()?);
+    write_file(&directory.join("run.svg"), |f| f.write_all(svg.as_bytes()))?;
+    write_file(&directory.join("run.png"), |f| f.write_all(&png))?;
+    write_trace_csv(&directory.join("run.csv"), &single.run.trace)?;
+    write_json(&directory.join("results.json"), &single.results)?;
+    let html = report(single, figure).to_html()?;
+    write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
+    Ok(())
+}
+
+fn figure(single: &SingleRun) -> Figure {
+    let samples = &single.run.trace.samples;
+    let line = |label: &str, style, value: fn(&Sample) -> f64| Line {
+        label: label.into(),
+        style,
+        points: samples.iter().map(|s| (s.s_m, value(s))).collect(),
+    };
+    let panel = |label: &str, lines| Panel {
+        title: String::new(),
+        y: Axis {
+            label: label.into(),
+            limits: None,
+        },
+        lines,
+    };
+    let failed = single
+        .scenario
+        .failure
+        .at_s()
+        .and_then(|t| samples.iter().find(|s| s.time_s >= t));
+    Figure {
+        title: String::new(),
+        x: Axis {
+            label: "Distance along the road (m)".into(),
+            limits: None,
+        },
+        same_y: false,
+        panels: vec![
+            panel("Lateral error (m)", vec![line("", 0, |s| s.lateral_error_m)]),
+            panel(
+                "Wheel angle (deg)",
+                vec![line("", 0, |s| s.wheel_angle_rad.to_degrees())],
+            ),
+            panel(
+                "Torque (N.m)",
+                vec![
+                    line("driver", 0, |s| s.driver_torque_nm),
+                    line("guidance", 1, |s| s.guidance_torque_nm),
+                ],
+            ),
+        ],
+        markers: failed
+            .map(|s| Marker {
+                label: "failure".into(),
+                x: s.s_m,
+            })
+            .into_iter()
+            .collect(),
+        bands: curves::bands(&single.scenario.course),
+    }
+}
+
+fn report(single: &SingleRun, figure: Figure) -> Report {
+    let (scenario, record) = (&single.scenario, &single.results.record);
+    let metrics = DEFINITIONS.iter().map(|d| {
+        let value = (d.value)(&record.metrics).map_or("-".into(), |value| format!("{value:.4}"));
+        let unit = if d.unit == "1" { "" } else { d.unit };
+        (d.label, format!("{value} {unit}"))
+    });
+    let [from, to] = single.results.window_m;
+    Report {
+        title: "A run under shared steering control".into(),
+        summary: format!(
+            "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m.",
+            scenario.course.name(),
+            scenario.speed_kmh,
+            scenario.driver.t_p,
+            scenario.gains.k_d,
+            scenario.gains.k_hg,
+            scenario.condition,
+        ),
+        sections: vec![
+            Section {
+                heading: "Along the road".into(),
+                blocks: vec![
+                    Block::Figure {
+                        figure,
+                        caption: "Lateral error, wheel angle and torques.".into(),
+                    },
+                    Block::Events(events(single)),
+                ],
+            },
+            Section {
+                heading: "Metrics".into(),
+                blocks: vec![
+                    Block::Table(Table::of_pairs(["Metric", "Value"], metrics)),
+                    Block::Table(definitions_table()),
+                ],
+            },
+        ],
+    }
+}
+
+fn events(single: &SingleRun) -> Vec<Event> {
+    let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
+    let mut events = Vec::new();
+    if let Some(time_s) = single.scenario.failure.at_s().filter(|t| *t <= end_s) {
+        events.push(Event {
+            time_s,
+            what: "The guidance torque drops to zero".into(),
+        });
+        let noticed_s = time_s + FAILURE_REACTION_S;
+        if noticed_s <= end_s {
+            events.push(Event {
+                time_s: noticed_s,
+                what: "The driver steers as manually".into(),
+            });
+        }
+    }
+    let what = match single.run.ending {
+        Ending::CourseEnd => "The far point reaches the end of the course".into(),
+        Ending::Diverged { s_m } => format!("The run diverged at {s_m:.0} m and was stopped"),
+    };
+    events.push(Event { time_s: end_s, what });
+    events
+}
