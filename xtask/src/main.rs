@@ -1,2 +1,77 @@
-//! The one door for builds, tests, QEMU, sizes and benchmarks.
-fn main() {}
+//! The one door for builds, tests, QEMU, sizes and benchmarks: `cargo xtask --help`.
+//!
+//! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
+
+mod bench;
+mod callgrind;
+mod ci;
+mod gate;
+mod golden;
+mod image;
+mod qemu;
+mod size;
+mod speed;
+mod tool;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// The one door for builds, tests, QEMU, sizes and benchmarks.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Everything that CI checks, the tests last. Installs the tools it needs where it may.
+    Ci,
+    /// Proves on the linked image that the controller has no panic path and no float.
+    Gate,
+    /// Flash and RAM of the images.
+    Size,
+    /// Instructions per control step in QEMU, flash and RAM, and callgrind counts, against xtask/golden.json.
+    Bench {
+        /// Write the golden file anew.
+        #[arg(long)]
+        bless: bool,
+    },
+    /// Simulated seconds per wall second on one core: our closed loop, the same in C and in NumPy.
+    Speed,
+    /// Runs an image in QEMU and prints its log.
+    Qemu(qemu::Options),
+    /// Decodes a log that `host-sim pil` left behind.
+    Log {
+        /// The log, as the image wrote it.
+        file: PathBuf,
+        /// The image that wrote it; the lock-step image if not given.
+        #[arg(long)]
+        elf: Option<PathBuf>,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Ci => ci::run(),
+        Command::Gate => gate::run(),
+        Command::Size => size::run(),
+        Command::Bench { bless } => bench::run(bless),
+        Command::Speed => speed::run(),
+        Command::Qemu(options) => match qemu::run(&options) {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
+        Command::Log { file, elf } => qemu::print_log(&file, elf),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -34,8 +34,10 @@ mod target {
 
     #[entry]
     fn main() -> ! {
+        // A static and not on the stack, so that its size shows in the image's RAM.
+        static mut ECU: Option<Ecu> = None;
         let mut board = ThisBoard::start();
-        let mut ecu = Ecu::new(Some(&Setup::PAPER), Boot::default(), ThisBoard::now());
+        let ecu = ECU.insert(Ecu::new(Some(&Setup::PAPER), Boot::default(), ThisBoard::now()));
         let mut counts = Counts::default();
         defmt::info!("steering-ecu on {=str}", ThisBoard::NAME);
         board.start_tick();
@@ -48,7 +50,7 @@ mod target {
                 }
             }
             if board.tick() {
-                step(&mut board, &mut ecu, &mut counts);
+                step(&mut board, ecu, &mut counts);
             }
         }
     }

@@ -1,0 +1,46 @@
+//! Builds the bare-metal images and finds their ELF files.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+use crate::tool::cargo;
+
+/// The reference board's core, with floating-point hardware.
+pub(crate) const M4F: &str = "thumbv7em-none-eabihf";
+/// A core without: every float operation is a call that can be seen.
+pub(crate) const M3: &str = "thumbv7m-none-eabi";
+/// The reference board.
+pub(crate) const BOARD: &str = "mps2-an386";
+
+/// The command that builds `bin` of the firmware in release mode.
+pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command {
+    let mut command = cargo();
+    command
+        .args(["build", "--release", "-p", "haptic-firmware", "--bin", bin])
+        .args(["--target", target, "--features", features])
+        .arg("--message-format=json-render-diagnostics");
+    command
+}
+
+/// Builds an image for the reference board and returns its ELF.
+pub(crate) fn build(bin: &str) -> Result<PathBuf> {
+    elf_of(&mut build_command(bin, M4F, BOARD))
+}
+
+/// Runs a build command, whose messages the user sees, and returns its ELF.
+pub(crate) fn elf_of(command: &mut Command) -> Result<PathBuf> {
+    let output = command
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cargo does not start")?;
+    if !output.status.success() {
+        bail!("the image does not build");
+    }
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from))
+        .context("cargo names no executable")
+}

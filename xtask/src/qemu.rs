@@ -1,0 +1,201 @@
+//! Runs an image in QEMU: its log, decoded, on standard error; its bus on any of QEMU's character devices.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, ExitCode, Stdio};
+use std::sync::mpsc::{Sender, channel};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use defmt_decoder::{DecodeError, StreamDecoder, Table};
+
+use crate::{image, tool};
+
+/// Exit code of a run that was stopped by its time-out, as that of timeout(1).
+const TIMED_OUT: u8 = 124;
+/// How often the machine is looked at while its log is silent.
+const GLANCE: Duration = Duration::from_millis(20);
+
+/// Options of `cargo xtask qemu`.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// The image to build and run: steering-ecu or lockstep.
+    #[arg(default_value = "steering-ecu")]
+    image: String,
+    /// Run this ELF instead of building one (cargo's runner does).
+    #[arg(long)]
+    elf: Option<PathBuf>,
+    /// Where the bus (SLCAN) goes: `null`, `stdio`, or any QEMU character device such as `pty` or
+    /// `tcp:127.0.0.1:3333,server,nowait`. With `stdio` the run ends with the input.
+    #[arg(long, default_value = "null")]
+    can: String,
+    /// Let the clock count instructions, 32 ns each, about the board's speed: work of the host is then no time of
+    /// the target.
+    #[arg(long)]
+    icount: bool,
+    /// Stop after this many seconds, with exit code 124.
+    #[arg(long, default_value_t = 60)]
+    timeout: u64,
+}
+
+/// What the threads around QEMU see.
+enum Event {
+    Log(Vec<u8>),
+    InputEnded,
+}
+
+/// A QEMU that ends with its owner.
+struct Machine(Child);
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        // Both fail only for a process that is gone already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+pub(crate) fn run(options: &Options) -> Result<ExitCode> {
+    tool::ensure(&[("qemu-system-arm", "qemu-system-arm")])?;
+    let elf = match &options.elf {
+        Some(elf) => elf.clone(),
+        None => image::build(&options.image)?,
+    };
+    let table = table(&elf)?;
+    let mut log = Log {
+        decoder: table.new_stream_decoder(),
+        can_recover: table.encoding().can_recover(),
+    };
+    let (events, seen) = channel();
+    let mut machine = start(&elf, options, &events)?;
+    let deadline = Instant::now() + Duration::from_secs(options.timeout);
+    let code = loop {
+        match seen.recv_timeout(GLANCE) {
+            Ok(Event::Log(bytes)) => log.print(&bytes)?,
+            Ok(Event::InputEnded) => break ExitCode::SUCCESS,
+            // The other end keeps a sender, so this is a time-out: a moment to look around.
+            Err(_) => {
+                if let Some(status) = machine.0.try_wait()? {
+                    break status
+                        .code()
+                        .map_or(ExitCode::FAILURE, |code| ExitCode::from(code as u8));
+                }
+            }
+        }
+        if Instant::now() > deadline {
+            eprintln!("stopped after {} s", options.timeout);
+            break ExitCode::from(TIMED_OUT);
+        }
+    };
+    drop(machine);
+    while let Ok(event) = seen.recv_timeout(GLANCE) {
+        if let Event::Log(bytes) = event {
+            log.print(&bytes)?;
+        }
+    }
+    Ok(code)
+}
+
+fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machine> {
+    let log = TcpListener::bind("127.0.0.1:0").context("a port for the log")?;
+    let mut command = Command::new("qemu-system-arm");
+    command
+        .args(["-machine", image::BOARD, "-display", "none", "-monitor", "none"])
+        .args(["-serial", &options.can])
+        .args(["-serial", &format!("tcp:{}", log.local_addr()?)])
+        // For the lock-step image, which takes its channel from here.
+        .args([
+            "-semihosting-config",
+            "enable=on,target=native,arg=image,arg=slcan",
+        ])
+        .arg("-kernel")
+        .arg(elf)
+        .stdin(if options.can == "stdio" {
+            Stdio::piped()
+        } else {
+            Stdio::null()
+        });
+    if options.icount {
+        command.args(["-icount", "shift=5"]);
+    }
+    let mut child = command.spawn().context("qemu-system-arm does not start")?;
+    if let Some(to) = child.stdin.take() {
+        forward_input(to, events.clone());
+    }
+    forward_log(log, events.clone());
+    Ok(Machine(child))
+}
+
+/// Passes our standard input on and tells when it ends: with it whoever started this run is gone.
+fn forward_input(mut to: ChildStdin, events: Sender<Event>) {
+    std::thread::spawn(move || {
+        let mut buffer = [0; 4096];
+        while let Ok(n @ 1..) = std::io::stdin().read(&mut buffer) {
+            if to.write_all(&buffer[..n]).and_then(|()| to.flush()).is_err() {
+                return;
+            }
+        }
+        let _ = events.send(Event::InputEnded);
+    });
+}
+
+fn forward_log(from: TcpListener, events: Sender<Event>) {
+    std::thread::spawn(move || {
+        let Ok((mut log, _)) = from.accept() else { return };
+        let mut buffer = [0; 4096];
+        while let Ok(n @ 1..) = log.read(&mut buffer) {
+            if events.send(Event::Log(buffer[..n].to_vec())).is_err() {
+                return;
+            }
+        }
+    });
+}
+
+/// Decodes and prints a log that was kept in a file.
+pub(crate) fn print_log(file: &Path, elf: Option<PathBuf>) -> Result<()> {
+    let elf = match elf {
+        Some(elf) => elf,
+        None => image::build("lockstep")?,
+    };
+    let table = table(&elf)?;
+    let mut log = Log {
+        decoder: table.new_stream_decoder(),
+        can_recover: table.encoding().can_recover(),
+    };
+    log.print(&fs::read(file).with_context(|| file.display().to_string())?)
+}
+
+fn table(elf: &Path) -> Result<Table> {
+    let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
+    Table::parse(&bytes)?.with_context(|| format!("{} has no log messages", elf.display()))
+}
+
+struct Log<'a> {
+    decoder: Box<dyn StreamDecoder + 'a>,
+    can_recover: bool,
+}
+
+impl Log<'_> {
+    /// Prints the messages that `bytes` complete: time in seconds, level, text.
+    fn print(&mut self, bytes: &[u8]) -> Result<()> {
+        self.decoder.received(bytes);
+        loop {
+            match self.decoder.decode() {
+                Ok(frame) => {
+                    let time = frame
+                        .display_timestamp()
+                        .map(|time| time.to_string())
+                        .unwrap_or_default();
+                    let level = frame.level().map_or("", |level| level.as_str());
+                    eprintln!("{time} {level} {}", frame.display_message());
+                }
+                Err(DecodeError::UnexpectedEof) => return Ok(()),
+                Err(DecodeError::Malformed) if self.can_recover => eprintln!("(a damaged message)"),
+                Err(DecodeError::Malformed) => bail!("the log does not fit the image"),
+            }
+        }
+    }
+}
