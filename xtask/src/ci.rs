@@ -1,4 +1,56 @@
-use anyhow::Result;
-pub(crate) fn run() -> Result<()> {
+//! Everything that CI checks. The tests come last, so that a log ends with their results; what failed before
+//! them is named before they start.
+
+use anyhow::{Result, bail};
+
+use crate::image::{BOARD, M4F};
+use crate::tool::{cargo, ensure, run};
+use crate::{bench, gate};
+
+pub(crate) fn run_all() -> Result<()> {
+    ensure(&[
+        ("qemu-system-arm", "qemu-system-arm"),
+        ("valgrind", "valgrind"),
+        ("gcc", "gcc"),
+    ])?;
+    let target_features = format!("{BOARD},gate");
+    let checks: [(&str, &dyn Fn() -> Result<()>); 5] = [
+        ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
+        ("clippy", &|| {
+            run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+        }),
+        ("clippy of the images", &|| {
+            let package = ["clippy", "--release", "-p", "haptic-firmware", "--bins", "--lib"];
+            let target = [
+                "--target",
+                M4F,
+                "--features",
+                &target_features,
+                "--",
+                "-D",
+                "warnings",
+            ];
+            run(cargo().args(package).args(target))
+        }),
+        ("gate", &gate::run),
+        // Compares every frame of a whole run in QEMU on the way.
+        ("sizes and instructions", &|| bench::run(false)),
+    ];
+    let mut failed = Vec::new();
+    for (name, check) in checks {
+        println!("== {name}");
+        if let Err(error) = check() {
+            eprintln!("error: {name}: {error:#}");
+            failed.push(name);
+        }
+    }
+    if !failed.is_empty() {
+        eprintln!("== failed: {}; the tests follow", failed.join(", "));
+    }
+    println!("== tests");
+    run(cargo().args(["test", "--workspace", "--no-fail-fast"]))?;
+    if !failed.is_empty() {
+        bail!("failed: {}", failed.join(", "));
+    }
     Ok(())
 }

@@ -34,14 +34,15 @@ enum Command {
     Gate,
     /// Flash and RAM of the images.
     Size,
-    /// Instructions per control step in QEMU, flash and RAM, and callgrind counts, against xtask/golden.json.
+    /// Instructions per control step in QEMU and on the host, flash and RAM, against xtask/golden.json.
+    #[command(args_conflicts_with_subcommands = true)]
     Bench {
         /// Write the golden file anew.
         #[arg(long)]
         bless: bool,
+        #[command(subcommand)]
+        what: Option<Bench>,
     },
-    /// Simulated seconds per wall second on one core: our closed loop, the same in C and in NumPy.
-    Speed,
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -54,13 +55,22 @@ enum Command {
     },
 }
 
+#[derive(Subcommand)]
+enum Bench {
+    /// Simulated seconds per wall second on one core: our closed loop, the same in C and in NumPy.
+    Speed,
+}
+
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Ci => ci::run(),
+        Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Size => size::run(),
-        Command::Bench { bless } => bench::run(bless),
-        Command::Speed => speed::run(),
+        Command::Bench {
+            what: Some(Bench::Speed),
+            ..
+        } => speed::run(),
+        Command::Bench { bless, what: None } => bench::run(bless),
         Command::Qemu(options) => match qemu::run(&options) {
             Ok(code) => return code,
             Err(error) => Err(error),
