@@ -1,0 +1,299 @@
+//! Each rule of the independent monitor at its edge, with frames packed here by hand.
+
+use haptic_core::monitor::{Evidence, Monitor, MonitorState};
+use haptic_core::params::{Params, Setup};
+
+const STANDBY: u64 = 1;
+const ACTIVE: u64 = 2;
+const FADE: u64 = 3;
+const HANDOVER: u64 = 4;
+
+/// Torque in 2^-12 N.m, from bit 12; mode from bit 32.
+fn guidance(torque: i64, mode: u64) -> [u8; 8] {
+    (((torque as u64) & 0xFFFF) << 12 | mode << 32).to_le_bytes()
+}
+
+/// e_y in 2^-13 m from bit 12, e_theta in 2^-16 rad from bit 29, age in 0.1 ms from bit 46, valid bit 55.
+fn lane(e_y: i64, e_theta: i64, age: u64) -> [u8; 8] {
+    let word = ((e_y as u64) & 0x1_FFFF) << 12 | ((e_theta as u64) & 0x1_FFFF) << 29 | age << 46 | 1 << 55;
+    word.to_le_bytes()
+}
+
+/// Driver torque in 2^-12 N.m from bit 12, and other signals above that must not be mixed in.
+fn column(driver: i64) -> [u8; 8] {
+    (((driver as u64) & 0x3_FFFF) << 12 | 0xFFFF_FFFF << 30).to_le_bytes()
+}
+
+fn monitor(limit_nm: f64) -> Monitor {
+    let params = Params {
+        torque_limit_nm: limit_nm,
+        ..Params::PAPER
+    };
+    Setup::new(&params).unwrap().monitor
+}
+
+/// A monitor with what it remembers.
+#[derive(Clone, Copy)]
+struct Bench {
+    monitor: Monitor,
+    state: MonitorState,
+}
+
+impl Bench {
+    fn new(limit_nm: f64) -> Self {
+        Self {
+            monitor: monitor(limit_nm),
+            state: MonitorState::NEW,
+        }
+    }
+
+    fn show(&mut self, lane: Option<[u8; 8]>, column: Option<[u8; 8]>, frame: [u8; 8], us: u32) -> bool {
+        let evidence = Evidence {
+            lane: lane.as_ref(),
+            column: column.as_ref(),
+            guidance: &frame,
+            elapsed_us: us,
+        };
+        self.monitor.step(&mut self.state, &evidence)
+    }
+
+    fn torque(&mut self, torque: i64, mode: u64) -> bool {
+        self.show(None, None, guidance(torque, mode), 1000)
+    }
+
+    /// Brought to a torque in a fade, where the lane has no say.
+    fn at(limit_nm: f64, torque: i64) -> Self {
+        let mut bench = Self::new(limit_nm);
+        let mut now = 0;
+        while now != torque {
+            // 20 counts of 2^-12 N.m are 4.9 mN.m.
+            now += (torque - now).clamp(-20, 20);
+            assert!(bench.torque(now, FADE));
+        }
+        bench
+    }
+}
+
+/// Counts of 2^-12 N.m that make so many mN.m when cut to whole ones: the smallest, and the largest.
+fn counts(mnm: i64) -> (i64, i64) {
+    let at_least = |mnm: i64| (mnm * 4096 + 999) / 1000;
+    let (small, large) = (at_least(mnm.abs()), at_least(mnm.abs() + 1) - 1);
+    (mnm.signum() * small, if mnm < 0 { -large } else { large })
+}
+
+#[test]
+fn beyond_the_limit() {
+    for (limit_nm, limit_mnm) in [(5.0, 5000), (3.0, 3000)] {
+        for sign in [1, -1] {
+            // 3 mN.m of tolerance.
+            let last_good = counts(limit_mnm + 3).1;
+            let first_bad = last_good + 1;
+            let bench = Bench::at(limit_nm, sign * (last_good - 20));
+            assert!({ bench }.torque(sign * last_good, FADE));
+            assert!(!{ bench }.torque(sign * first_bad, FADE));
+        }
+    }
+}
+
+#[test]
+fn growing_too_fast() {
+    // 4 mN.m per ms and 3 of tolerance; at least for 1 ms, at most for 2.
+    for (us, growth) in [
+        (0, 7),
+        (1000, 7),
+        (1500, 9),
+        (2000, 11),
+        (5000, 11),
+        (u32::MAX, 11),
+    ] {
+        for sign in [1, -1] {
+            for start_mnm in [0, 1000] {
+                let start = counts(start_mnm).0;
+                let bench = Bench::at(5.0, sign * start);
+                let (_, last_good) = counts(start_mnm + growth);
+                let show = |count: i64| { bench }.show(None, None, guidance(sign * count, FADE), us);
+                assert!(show(last_good), "{us} {start_mnm}");
+                assert!(!show(last_good + 1), "{us} {start_mnm}");
+            }
+        }
+    }
+    // Falling is the envelope's business: a fault must be able to end a torque at once.
+    assert!(Bench::at(5.0, 8000).torque(0, STANDBY));
+    // Across zero the magnitude counts.
+    assert!(Bench::at(5.0, 4096).torque(-4096, HANDOVER));
+    assert!(!Bench::at(5.0, 4096).torque(-4129, HANDOVER));
+}
+
+#[test]
+fn a_torque_in_a_mode_without() {
+    for mode in 0..7 {
+        let mut bench = Bench::at(5.0, 100);
+        // A fresh lane that asks for it, so that Active has nothing else to refuse.
+        let permitted = bench.show(Some(lane(0, 0, 0)), None, guidance(100, mode), 1000);
+        assert_eq!(permitted, [ACTIVE, FADE, HANDOVER].contains(&mode), "{mode}");
+        // Less than a milli-newton-metre is none.
+        assert!(Bench::new(5.0).torque(4, mode) && Bench::new(5.0).torque(0, mode));
+    }
+}
+
+#[test]
+fn against_the_driver() {
+    // (driver's opposing torque, bound) in mN.m: 5000 - 3*(opposing - 800), and 50 of slack.
+    for (opposing, bound) in [
+        (800, 5000),
+        (1000, 4400),
+        (2000, 1400),
+        (2400, 200),
+        (3000, 0),
+        (20_000, 0),
+    ] {
+        for sign in [1, -1] {
+            let first_bad = counts(bound + 50).1 + 1;
+            let at = first_bad.min(counts(5000).0);
+            let bench = Bench::at(5.0, sign * at);
+            let driver = column(-sign * counts(opposing).0);
+            let show = |torque: i64, column: [u8; 8]| {
+                { bench }.show(None, Some(column), guidance(sign * torque, FADE), 1000)
+            };
+            assert!(show(first_bad.min(at) - 1, driver), "{opposing}");
+            assert_eq!(show(at, driver), bound == 5000, "{opposing}");
+            // The same torque with the guidance is no opposition.
+            assert!(show(at, column(sign * counts(opposing).0)), "{opposing}");
+        }
+    }
+    // The last column frame counts until the next one.
+    let mut bench = Bench::at(5.0, 8000);
+    assert!(bench.show(None, Some(column(-4096)), guidance(8000, FADE), 1000));
+    assert!(bench.torque(8000, FADE));
+    assert!(bench.show(None, Some(column(-12_000)), guidance(0, FADE), 1000));
+    assert!(!{ bench }.torque(300, FADE));
+    assert!({ bench }.torque(20, FADE));
+}
+
+#[test]
+fn old_lane_data_in_active() {
+    for (age, last_good_ms) in [(0, 40), (100, 30), (400, 0)] {
+        let mut bench = Bench::at(5.0, 100);
+        assert!(bench.show(Some(lane(0, 0, age)), None, guidance(100, ACTIVE), 1000));
+        for _ in 0..last_good_ms {
+            assert!(bench.torque(100, ACTIVE));
+        }
+        assert!({ bench }.torque(0, ACTIVE), "no torque, nothing to refuse");
+        assert!({ bench }.torque(100, FADE), "a fade needs no lane");
+        assert!(!bench.torque(100, ACTIVE), "{age}");
+    }
+}
+
+/// Steps in Active with a torque before permission is withdrawn, at most 100; the lane repeats its errors.
+fn permitted_steps(torque: i64, e_y: i64, e_theta: i64) -> u32 {
+    let mut bench = Bench::at(5.0, torque);
+    // Long enough at these errors that nothing changes any more.
+    for _ in 0..200 {
+        assert!(bench.show(Some(lane(e_y, e_theta, 0)), None, guidance(torque, FADE), 1000));
+    }
+    (0..100)
+        .take_while(|_| bench.show(Some(lane(e_y, e_theta, 0)), None, guidance(torque, ACTIVE), 1000))
+        .count() as u32
+}
+
+#[test]
+fn away_from_the_lane_for_more_than_20_ms() {
+    // Paper: 500 mN.m per m and 10 mN.m per mrad. A step of the torque away counts from the first.
+    for sign in [1, -1] {
+        for (e_y, e_theta, asked_mnm) in [
+            (0, 0, 0),
+            // 1 m.
+            (8192, 0, 500),
+            // 0.05 rad is 3276.8 counts.
+            (0, 3277, 500),
+            (8192, 3277, 1000),
+        ] {
+            let steps = |mnm: i64| permitted_steps(sign * counts(mnm).0, sign * e_y, sign * e_theta);
+            // 1 mN.m for the roundings of the monitor's integers.
+            assert_eq!(steps(asked_mnm + 299), 100, "{asked_mnm}");
+            assert_eq!(steps(asked_mnm + 301), 20, "{asked_mnm}");
+            // On the other side zero is always allowed, and 0.3 N.m around it.
+            assert_eq!(steps(-299), 100);
+            assert_eq!(steps(-301), 20);
+            assert_eq!(steps(0), 100);
+        }
+    }
+}
+
+#[test]
+fn rates_widen_the_band_on_their_side() {
+    // Errors that pass zero at a constant rate, a sample every 8 ms, the last one at zero. K_1*a4' is 250 mN.m
+    // per rad/s, K_1*a2' 12.5 mN.m per m/s.
+    for sign in [1, -1] {
+        for (per_sample_y, per_sample_theta, asked_mnm) in [
+            // 8 m/s and 1 rad/s in counts per 8 ms, rounded.
+            (524, 0, 100),
+            (0, 524, 250),
+            (524, 524, 350),
+        ] {
+            let steps = |mnm: i64| {
+                let torque = sign * counts(mnm).0;
+                let mut bench = Bench::at(5.0, torque);
+                for k in -30..=0 {
+                    let sample = lane(sign * k * per_sample_y, sign * k * per_sample_theta, 0);
+                    assert!(bench.show(Some(sample), None, guidance(torque, FADE), 8000));
+                }
+                (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
+            };
+            // 1 % for the rounded counts and the gain in whole mN.m, 4 % where the gain is 13 for 12.5.
+            let error = if per_sample_y == 0 { 4 } else { 8 };
+            assert_eq!(steps(asked_mnm + 299 - error), 30, "{asked_mnm}");
+            assert_eq!(steps(asked_mnm + 301 + error), 20, "{asked_mnm}");
+            assert_eq!(steps(-299), 30, "{asked_mnm}");
+            assert_eq!(steps(-301), 20, "{asked_mnm}");
+        }
+    }
+}
+
+#[test]
+fn rates_are_forgotten_with_an_old_sample() {
+    // One sample, then 300 ms of nothing, then two at a distance: no rate of the first two is left.
+    let torque = counts(350).0;
+    let steps = |gap_ms: u32| {
+        let mut bench = Bench::at(5.0, torque);
+        assert!(bench.show(Some(lane(-8192, 0, 0)), None, guidance(torque, FADE), 1000));
+        for _ in 0..gap_ms {
+            assert!(bench.torque(torque, FADE));
+        }
+        for _ in 0..2 {
+            assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 8000));
+        }
+        (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
+    };
+    assert_eq!(steps(300), 20);
+}
+
+#[test]
+fn a_torque_on_its_way_back_is_not_astray() {
+    // 2 N.m on a lane that asks for nothing, falling by one milli-newton-metre per step.
+    let mut bench = Bench::at(5.0, counts(2000).0);
+    for mnm in (500..2000).rev() {
+        assert!(
+            bench.show(Some(lane(0, 0, 0)), None, guidance(counts(mnm).0, ACTIVE), 1000),
+            "{mnm}"
+        );
+    }
+    // Then held: 20 ms.
+    for _ in 0..20 {
+        assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(counts(500).0, ACTIVE), 1000));
+    }
+    let mut back = bench;
+    assert!(!bench.show(Some(lane(0, 0, 0)), None, guidance(counts(500).0, ACTIVE), 1000));
+    // One step inside begins the count anew.
+    assert!(back.show(Some(lane(0, 0, 0)), None, guidance(counts(100).0, ACTIVE), 1000));
+}
+
+#[test]
+fn once_withdrawn_it_stays_withdrawn() {
+    let mut bench = Bench::new(5.0);
+    assert!(bench.torque(0, STANDBY));
+    assert!(!bench.torque(100, STANDBY));
+    for _ in 0..1000 {
+        assert!(!bench.torque(0, STANDBY));
+    }
+}
