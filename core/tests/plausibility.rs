@@ -321,7 +321,7 @@ fn steps_at_their_edges() {
     const LSB: f64 = 1.0 / 16_777_216.0;
     let (y, theta) = (Metres::from_m(0.3).m(), Radians::from_rad(0.1).rad());
     for sign in [1.0, -1.0] {
-        let from = lane(sign * -1.0, sign * -0.05);
+        let from = lane(-sign, -0.05 * sign);
         let possible =
             |dy: f64, dt: f64| lane_step_is_possible(&from, &lane(sign * (dy - 1.0), sign * (dt - 0.05)));
         assert!(possible(y, theta) && possible(0.0, 0.0));
