@@ -6,6 +6,8 @@
 
 #![allow(dead_code, reason = "each test uses its part of the bench")]
 
+pub(crate) mod watch;
+
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Telemetry, Vehicle};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::ecu::{Boot, Ecu, Step};
@@ -42,6 +44,9 @@ pub(crate) struct Rig {
     pub(crate) applied: f64,
     /// The last telemetry.
     pub(crate) telemetry: Option<Telemetry>,
+    /// What the ECU last accepted of the driver's torque and of the request, and when.
+    pub(crate) heard_driver: Option<(f64, u64)>,
+    pub(crate) heard_engage: Option<(bool, u64)>,
     /// Rejections by the ECU since they were last taken.
     pub(crate) rejects: Vec<Reject>,
 }
@@ -71,6 +76,8 @@ impl Rig {
             silent: [false; 4],
             applied: 0.0,
             telemetry: None,
+            heard_driver: None,
+            heard_engage: None,
             rejects: Vec::new(),
         }
     }
@@ -138,7 +145,18 @@ impl Rig {
 
     /// Hands a frame to the ECU.
     pub(crate) fn send(&mut self, frame: &Frame) -> Result<(), Reject> {
-        self.ecu.receive(frame, self.now())
+        let result = self.ecu.receive(frame, self.now());
+        if let (Ok(()), Ok(bytes)) = (result, <[u8; 8]>::try_from(frame.data())) {
+            let word = u64::from_le_bytes(bytes);
+            // Bits 12..29 signed, 2^-12 N.m; bit 12: layouts written a second time.
+            let driver = (word << 34).cast_signed() >> 46;
+            match frame.id() {
+                0x110 => self.heard_driver = Some((driver as f64 / 4096.0, self.t_us)),
+                0x130 => self.heard_engage = Some((word >> 12 & 1 == 1, self.t_us)),
+                _ => {}
+            }
+        }
+        result
     }
 
     /// Time passes, senders whose turn it is speak, the ECU steps.
@@ -154,6 +172,11 @@ impl Rig {
             }
         }
         self.ticks += 1;
+        self.step()
+    }
+
+    /// The ECU steps, without time or frames.
+    pub(crate) fn step(&mut self) -> Step {
         let step = self.ecu.step(self.now());
         self.applied = step.command.torque.nm();
         if let Some(frame) = self.ecu.advise() {
