@@ -42,6 +42,18 @@ impl Watch {
         }
     }
 
+    /// Of a bench that is guiding already.
+    pub(crate) fn engaged(rig: &Rig) -> Self {
+        Self {
+            torque: rig.applied,
+            anchor: rig.applied,
+            t_us: rig.t_us,
+            anchor_t_us: rig.t_us,
+            mode: Mode::Active,
+            ..Self::new(5.0)
+        }
+    }
+
     /// The ECU was started anew.
     pub(crate) fn restart(&mut self, rig: &Rig) {
         let (steps, by_mode, by_limit) = (self.steps, self.by_mode, self.by_limit);

@@ -109,10 +109,14 @@ impl Message for Column {
     fn unpack(word: u64) -> Option<Self> {
         let driver = signed(word, 12, 18);
         let angle = signed(word, 30, 18);
-        (driver.abs() <= Self::DRIVER_MAX && angle.abs() <= Self::ANGLE_MAX).then(|| Self {
+        let motor = signed(word, 48, 16);
+        let in_range = driver.abs() <= Self::DRIVER_MAX
+            && angle.abs() <= Self::ANGLE_MAX
+            && motor.abs() <= Self::MOTOR_MAX;
+        in_range.then(|| Self {
             driver_torque: Torque::from_wide(from_lsb(driver, Self::TORQUE_LSB)),
             wheel_angle: Radians::from_wide(shift_round(angle.saturating_mul(Self::ANGLE_UNIT), 16)),
-            motor_torque: Torque::from_wide(from_lsb(signed(word, 48, 16), Self::TORQUE_LSB)),
+            motor_torque: Torque::from_wide(from_lsb(motor, Self::TORQUE_LSB)),
         })
     }
 }
