@@ -51,6 +51,7 @@ impl Bench {
         let evidence = Evidence {
             lane: lane.as_ref(),
             column: column.as_ref(),
+            demand: None,
             guidance: &frame,
             elapsed_us: us,
         };
