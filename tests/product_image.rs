@@ -172,6 +172,7 @@ fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
             Demand {
                 engage,
                 authority: Gain::from_si(1.0),
+                probe: false,
             }
             .encode((k / 10) as u8),
         );
