@@ -5,6 +5,7 @@
 //!
 //! One file per subcommand. Not here: anything that a study or a model decides.
 
+mod bus;
 mod evaluate;
 mod pil;
 mod progress;
@@ -39,6 +40,8 @@ enum Command {
     Run(run::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
+    /// The worst-case load of the CAN bus, message by message
+    Bus(bus::Arguments),
 }
 
 /// How a command ended that could do its work.
@@ -66,6 +69,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
+        Some(Command::Bus(arguments)) => bus::run(&arguments),
     };
     match result {
         Ok(Outcome::Good) => ExitCode::SUCCESS,

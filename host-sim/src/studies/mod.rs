@@ -3,10 +3,12 @@
 //! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
 //! - [`claims`]: what that evaluation must show.
 //! - [`run`]: one scenario.
+//! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`processor`]: one scenario with the ECU's image in QEMU beside the host's.
 //!
 //! Not here: options and exit codes (the command line), how a metric is computed, how a figure is drawn.
 
+pub mod bus_load;
 pub mod claims;
 mod curves;
 pub mod evaluate;
