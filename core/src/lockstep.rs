@@ -170,3 +170,30 @@ impl StepCost {
         })
     }
 }
+
+/// How much of its stack the target has ever used. Comes now and then, before a [`StepCost`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StackUse {
+    /// Bytes.
+    pub bytes: u32,
+}
+
+impl StackUse {
+    /// Identifier.
+    const ID: u16 = 0x7F2;
+
+    /// Bytes 0..3: bytes of stack, little-endian.
+    #[must_use]
+    pub fn encode(self) -> Frame {
+        Frame::full(Self::ID, u64::from(self.bytes).to_le_bytes())
+    }
+
+    /// The figure, if this is such a frame.
+    #[must_use]
+    pub fn decode(frame: &Frame) -> Option<Self> {
+        let [a, b, c, d, ..] = frame.full_data()?;
+        (frame.id() == Self::ID).then(|| Self {
+            bytes: u32::from_le_bytes([a, b, c, d]),
+        })
+    }
+}

@@ -4,9 +4,11 @@
 //! - [`slcan_can`]: a serial port as a CAN controller (`embedded-can`), by SLCAN.
 //! - `boards`: the [`boards::Board`] trait and one file per board; a feature of the same name chooses it.
 //! - `log`: defmt over the board's log port.
+//! - `product`: the product's loop. [`reset`]: why the processor started. `stack`: its guard and its budget.
+//! - `host`: words from the machine that runs QEMU.
 //!
 //! Images (`src/bin`): `steering-ecu`, the product; `lockstep`, the same controller driven tick by tick by a
-//! simulator; `gate`, which links only if the controller cannot panic.
+//! simulator; `broken`, the product with a flaw; `gate`, which links only if the controller cannot panic.
 //!
 //! The program is one loop with interrupts masked: a tick or a byte makes its interrupt pending, which wakes
 //! the core from `wfi` and runs no handler. So nothing is shared, nothing is preempted, and the longest turn
@@ -14,9 +16,16 @@
 
 #![cfg_attr(target_os = "none", no_std)]
 
+pub mod reset;
 pub mod slcan_can;
 
 #[cfg(target_os = "none")]
 pub mod boards;
+#[cfg(all(target_os = "none", feature = "semihosting"))]
+pub mod host;
 #[cfg(target_os = "none")]
 pub mod log;
+#[cfg(target_os = "none")]
+pub mod product;
+#[cfg(target_os = "none")]
+pub mod stack;

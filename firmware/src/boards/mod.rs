@@ -5,15 +5,22 @@
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use haptic_core::bus::Frame;
-use haptic_core::quantity::Instant;
+use haptic_core::bus::messages::Column;
+use haptic_core::quantity::{Instant, Micros, Torque};
 
-#[cfg(feature = "mps2-an386")]
-mod mps2_an386;
-#[cfg(feature = "mps2-an386")]
-pub use mps2_an386::Mps2An386 as ThisBoard;
+use crate::reset;
 
-#[cfg(not(feature = "mps2-an386"))]
-compile_error!("no board is chosen: build haptic-firmware with --features mps2-an386");
+#[cfg(any(feature = "mps2-an386", feature = "mps2-an500"))]
+mod mps2;
+#[cfg(any(feature = "mps2-an386", feature = "mps2-an500"))]
+pub use mps2::Mps2 as ThisBoard;
+
+#[cfg(not(any(feature = "mps2-an386", feature = "mps2-an500")))]
+compile_error!("no board is chosen: build haptic-firmware with --features mps2-an386 or mps2-an500");
+
+/// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; an
+/// actuator on the bus gives up after 30 ms.
+pub const WATCHDOG: Micros = Micros::from_ms(16);
 
 /// What the images need of a board.
 pub trait Board: Sized {
@@ -25,7 +32,8 @@ pub trait Board: Sized {
     /// The feature that chooses the board.
     const NAME: &'static str;
 
-    /// Takes the hardware, masks interrupts and starts the clocks. To be called once, first.
+    /// Takes the hardware, masks interrupts, starts the clocks and guards the stack ([`crate::stack`]). The torque
+    /// is zero. To be called once, first.
     fn start() -> Self;
 
     /// The bus.
@@ -40,6 +48,9 @@ pub trait Board: Sized {
     /// A free-running counter of core clock cycles, for measurements.
     fn cycles() -> u32;
 
+    /// Why the hardware started, and forgets it.
+    fn reset_source(&mut self) -> reset::Hardware;
+
     /// Starts the 1 kHz tick.
     fn start_tick(&mut self);
 
@@ -48,6 +59,25 @@ pub trait Board: Sized {
 
     /// Sleeps until a tick, or until the bus has something to do. May return early.
     fn sleep(&mut self);
+
+    /// Starts the watchdog, which nothing but a reset stops ([`WATCHDOG`]).
+    fn start_watchdog(&mut self);
+
+    /// Feeds the watchdog. Only a step that the monitor permits may.
+    fn feed_watchdog(&mut self);
+
+    /// Sets the motor stage that is wired to the board. Without one, the actuator on the bus obeys the frames.
+    fn set_torque(&mut self, _torque: Torque) {}
+
+    /// The column's sensors that are wired to the board; `None` where they are on the bus, or disagree.
+    fn column(&mut self) -> Option<Column> {
+        None
+    }
+
+    /// Whether the client at the other end of the bus has hung up. On a real bus nobody can.
+    fn is_hung_up(&self) -> bool {
+        false
+    }
 
     /// Brings the torque to zero from any state, without the [`Board`]: what a panic or a fault calls.
     fn zero_torque();

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, Message};
-use haptic_core::lockstep::StepCost;
+use haptic_core::lockstep::{StackUse, StepCost};
 use haptic_core::quantity::Instant;
 use serde::Serialize;
 
@@ -135,6 +135,7 @@ impl Judge {
                 frames_compared: 0,
                 mismatches: 0,
                 steps_per_second: 0.0,
+                stack_bytes: 0,
                 instructions: None,
                 first_mismatch: None,
             },
@@ -173,6 +174,10 @@ impl Judge {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
             let frame = self.frame()?;
+            if let Some(StackUse { bytes }) = StackUse::decode(&frame) {
+                self.report.stack_bytes = bytes;
+                continue;
+            }
             if let Some(cost) = StepCost::decode(&frame) {
                 break cost;
             }

@@ -100,6 +100,8 @@ pub struct Report {
     pub mismatches: u64,
     /// Steps in a second of wall time, from the first tick on.
     pub steps_per_second: f64,
+    /// Bytes of its stack that the target has used by the last whole thousand of steps; 0 in a shorter run.
+    pub stack_bytes: u32,
     /// What a step cost the target, if it was counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instructions: Option<Instructions>,

@@ -3,12 +3,13 @@
 //! A read returns what the pipe holds and waits only when it is empty, and answers are written before such a
 //! wait; so a client may send one tick and wait for its answer, or send thousands ahead.
 
-use cortex_m_semihosting::{nr, syscall};
+use cortex_m_semihosting::syscall;
 use embedded_can::nb::Can;
 use embedded_can::{Error, ErrorKind};
 use embedded_hal_nb::nb;
 use haptic_core::bus::Frame;
 use haptic_core::lockstep::{RECORD_LEN, from_record, to_record};
+use haptic_firmware::host;
 
 /// Bytes of a buffer: few calls of the host, which cost a microsecond each and more.
 const BUFFER: usize = 8192;
@@ -44,19 +45,6 @@ impl File {
     }
 }
 
-/// What follows QEMU's `-semihosting-config` arguments, joined by blanks; empty if there are none.
-pub(crate) fn command_line(buffer: &mut [u8]) -> &str {
-    let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
-    // SAFETY: SYS_GET_CMDLINE writes at most `buffer.len()` bytes and then their number into the block.
-    let failed = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, block.as_mut_ptr() as usize) };
-    // SAFETY: the host wrote to the block, which the compiler cannot know.
-    let [_, len] = unsafe { core::ptr::read_volatile(&block) };
-    match buffer.get(..len) {
-        Some(text) if failed == 0 => core::str::from_utf8(text).unwrap_or(""),
-        _ => "",
-    }
-}
-
 /// The end of the input: the client has closed its pipe.
 #[derive(Debug)]
 pub(crate) struct EndOfInput;
@@ -77,9 +65,22 @@ pub(crate) struct Fifo {
     sent: heapless::Vec<u8, BUFFER>,
 }
 
+/// Serves the pipes if QEMU's semihosting arguments ask for them.
+pub(crate) fn serve_if_asked(serve: impl FnOnce(&mut Fifo)) {
+    // A static and not on the stack, whose budget is the controller's.
+    static mut FIFO: Option<Fifo> = None;
+    let mut buffer = [0; 128];
+    let mut arguments = host::command_line(&mut buffer).split(' ');
+    if arguments.any(|argument| argument == "fifo") {
+        let fifo = &raw mut FIFO;
+        // SAFETY: called once, from `main`; no interrupt has a handler.
+        serve(unsafe { (*fifo).insert(Fifo::open()) });
+    }
+}
+
 impl Fifo {
     /// Opens the pipes.
-    pub(crate) fn open() -> Self {
+    fn open() -> Self {
         // Modes of SYS_OPEN, as fopen's: 1 is "rb", 5 is "wb".
         Self {
             input: File::open(b"/dev/stdin\0", 1),

@@ -5,11 +5,13 @@
 //! - `slcan`: the board's CAN bus, as an outside client such as python-can would drive it;
 //! - `fifo`: binary records on QEMU's standard input and output, for long runs.
 //!
+//! A board without QEMU has only its bus, and waits there for the next run; a panic or a fault restarts it.
+//!
 //! How a run starts and how an answer ends: `haptic_core::lockstep`.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", feature = "semihosting"))]
 mod fifo;
 
 #[cfg(not(target_os = "none"))]
@@ -20,19 +22,17 @@ fn main() {
 #[cfg(target_os = "none")]
 mod target {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use embedded_can::nb::Can;
     use embedded_hal_nb::nb;
     use haptic_core::bus::Frame;
     use haptic_core::bus::messages::SimTime;
     use haptic_core::ecu::{Boot, Ecu};
-    use haptic_core::lockstep::{Start, StartState, StepCost, set_parameter};
+    use haptic_core::lockstep::{StackUse, Start, StartState, StepCost, set_parameter};
     use haptic_core::params::Params;
     use haptic_core::quantity::{Instant, Micros};
     use haptic_firmware::boards::{Board, ThisBoard};
+    use haptic_firmware::stack;
     use heapless::Vec;
-
-    use crate::fifo::{self, Fifo};
 
     /// Most frames of one tick; a full bus at 500 kbit/s carries 4 a millisecond.
     const FRAMES_PER_TICK: usize = 64;
@@ -40,46 +40,40 @@ mod target {
     /// A client that is silent for so long is gone: the machine must not outlive it.
     const IDLE: Micros = Micros::from_ms(60_000);
 
+    /// The stack is looked at every so many steps: looking takes longer than a step.
+    const STACK_TURN: u32 = 1000;
+
     #[entry]
     fn main() -> ! {
+        static mut RUN: Run = Run::NEW;
+        stack::paint();
         let mut board = ThisBoard::start();
-        let mut buffer = [0; 128];
-        let arguments = fifo::command_line(&mut buffer);
-        let has = |word| arguments.split(' ').any(|argument| argument == word);
-        let mut run = Run::NEW;
-        defmt::info!(
-            "lockstep on {=str}, arguments: {=str}",
-            ThisBoard::NAME,
-            arguments
-        );
-        if has("fifo") {
-            let mut fifo = Fifo::open();
+        defmt::info!("lockstep on {=str}", ThisBoard::NAME);
+        #[cfg(feature = "semihosting")]
+        crate::fifo::serve_if_asked(|fifo| {
             while let Ok(frame) = nb::block!(fifo.receive()) {
-                run.take(frame, &mut fifo);
+                RUN.take(frame, fifo);
             }
-        } else {
-            serve(&mut board, &mut run);
+            RUN.end()
+        });
+        board.start_tick();
+        loop {
+            serve(&mut board, RUN);
+            RUN.end();
         }
-        defmt::info!(
-            "end of the run: {=u32} steps, {=u32} frames rejected",
-            run.steps,
-            run.rejected
-        );
-        exit(EXIT_SUCCESS)
     }
 
     /// A run on the bus port, from the client's opening of the channel to its closing.
     fn serve(board: &mut ThisBoard, run: &mut Run) {
         let mut last = None;
-        board.start_tick();
         loop {
             match (board.can().receive(), last) {
                 (Ok(frame), _) => {
                     last = Some(ThisBoard::now());
                     run.take(frame, board.can());
                 }
-                (Err(_), Some(_)) if !board.can().is_open() => return,
-                (Err(_), Some(at)) if ThisBoard::now().since(at) > IDLE => {
+                (Err(_), Some(_)) if board.is_hung_up() => return,
+                (Err(_), Some(at)) if cfg!(feature = "semihosting") && ThisBoard::now().since(at) > IDLE => {
                     panic!("the client left the channel open and is silent")
                 }
                 (Err(_), _) => board.sleep(),
@@ -110,6 +104,7 @@ mod target {
                 self.tick(now, can);
             } else if let Some(start) = Start::decode(&frame) {
                 self.ecu = Some(start_ecu(start, &self.params));
+                self.frames.clear();
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
             }
@@ -138,11 +133,28 @@ mod target {
             for frame in step.others.iter().chain(&advice) {
                 send(can, frame);
             }
+            if self.steps.is_multiple_of(STACK_TURN) {
+                let bytes = stack::used();
+                send(can, &StackUse { bytes }.encode());
+            }
             let cost = StepCost {
                 cycles,
                 advice_cycles,
             };
             send(can, &cost.encode());
+        }
+
+        /// The client has ended the run: so does QEMU.
+        fn end(&self) {
+            defmt::info!(
+                "end of the run: {=u32} steps, {=u32} frames rejected, {=u32} of {=u32} bytes of stack used",
+                self.steps,
+                self.rejected,
+                stack::used(),
+                stack::budget()
+            );
+            #[cfg(feature = "semihosting")]
+            haptic_firmware::host::exit(true);
         }
     }
 
@@ -159,23 +171,25 @@ mod target {
         }
     }
 
-    fn exit(status: debug::ExitStatus) -> ! {
-        loop {
-            debug::exit(status);
-        }
+    fn give_up() -> ! {
+        ThisBoard::zero_torque();
+        #[cfg(feature = "semihosting")]
+        haptic_firmware::host::exit(false);
+        #[cfg(not(feature = "semihosting"))]
+        cortex_m::peripheral::SCB::sys_reset()
     }
 
     #[panic_handler]
     fn panic(info: &core::panic::PanicInfo) -> ! {
         ThisBoard::zero_torque();
         defmt::error!("panic: {}", defmt::Display2Format(info));
-        exit(EXIT_FAILURE)
+        give_up()
     }
 
     #[exception]
     unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
         ThisBoard::zero_torque();
         defmt::error!("fault at {=u32:#010x}", frame.pc());
-        exit(EXIT_FAILURE)
+        give_up()
     }
 }

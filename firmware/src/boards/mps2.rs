@@ -1,9 +1,11 @@
-//! The reference board: ARM MPS2+ with the AN386 image (Cortex-M4F, 25 MHz), as QEMU's `mps2-an386`.
+//! The reference board: ARM MPS2+ with the AN386 image (Cortex-M4F, 25 MHz), as QEMU's `mps2-an386`; and the same
+//! board with the AN500 image (Cortex-M7), as `mps2-an500`.
 //!
 //! - UART0: the CAN bus, as SLCAN. UART1: the log. Both transmit at 25 MHz / 16 = 1.5625 Mbaud.
 //! - SysTick: the 1 kHz tick. FPGAIO counter: microseconds. CMSDK timer 0: cycles. LED 0: status.
+//! - CMSDK watchdog: a non-maskable interrupt after half its time, the reset after all of it.
 //!
-//! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART and timer. The actuator
+//! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART, timer and watchdog. The actuator
 //! sits on the bus and takes 30 ms without a frame as zero torque (`bus::messages::TIMEOUT`), so zero torque
 //! here is a silent bus.
 
@@ -11,35 +13,43 @@ use core::convert::Infallible;
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::syst::SystClkSource;
+
 use cortex_m::peripheral::{NVIC, Peripherals, SCB, SYST};
+use cortex_m_rt::exception;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal_nb::nb;
 use embedded_hal_nb::serial::{self, Read, Write};
 use haptic_core::quantity::Instant;
 use volatile_register::{RO, RW};
 
-use super::Board;
+use super::{Board, WATCHDOG};
 use crate::slcan_can::SlcanCan;
+use crate::{reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 25_000_000;
 const TICK_HZ: u32 = 1000;
 
 /// The board's peripherals, taken.
-pub struct Mps2An386 {
+pub struct Mps2 {
     can: SlcanCan<Uart>,
     led: Led,
     systick: SYST,
 }
 
-impl Board for Mps2An386 {
+impl Board for Mps2 {
     type Can = SlcanCan<Uart>;
     type Status = Led;
 
-    const NAME: &'static str = "mps2-an386";
+    const NAME: &'static str = if cfg!(feature = "mps2-an500") {
+        "mps2-an500"
+    } else {
+        "mps2-an386"
+    };
 
     fn start() -> Self {
         cortex_m::interrupt::disable();
-        let cortex = Peripherals::take().expect("the board is started once");
+        let mut cortex = Peripherals::take().expect("the board is started once");
+        stack::protect(&mut cortex.MPU);
         FPGAIO.get().write_prescale(CORE_CLOCK_HZ / 1_000_000 - 1);
         TIMER0.get().run();
         UART1.get().start(TRANSMIT);
@@ -70,6 +80,26 @@ impl Board for Mps2An386 {
     fn cycles() -> u32 {
         // The timer counts down.
         !TIMER0.get().value.read()
+    }
+
+    fn reset_source(&mut self) -> reset::Hardware {
+        // The machine has no register that says.
+        reset::Hardware::Watchdog
+    }
+
+    fn start_watchdog(&mut self) {
+        // It counts its load twice: to the interrupt, and from there to the reset.
+        WATCHDOG_BLOCK
+            .get()
+            .start(WATCHDOG.us() / 2 * (CORE_CLOCK_HZ / 1_000_000));
+    }
+
+    fn feed_watchdog(&mut self) {
+        WATCHDOG_BLOCK.get().feed();
+    }
+
+    fn is_hung_up(&self) -> bool {
+        !self.can.is_open()
     }
 
     fn start_tick(&mut self) {
@@ -134,6 +164,7 @@ impl<T> At<T> {
 const TIMER0: At<TimerBlock> = At(0x4000_0000 as *const _);
 const UART0: At<UartBlock> = At(0x4000_4000 as *const _);
 const UART1: At<UartBlock> = At(0x4000_5000 as *const _);
+const WATCHDOG_BLOCK: At<WatchdogBlock> = At(0x4000_8000 as *const _);
 const FPGAIO: At<FpgaIoBlock> = At(0x4002_8000 as *const _);
 
 /// CMSDK timer: counts down at the core clock.
@@ -151,6 +182,40 @@ impl TimerBlock {
             self.reload.write(u32::MAX);
             self.ctrl.write(1);
         }
+    }
+}
+
+/// CMSDK watchdog: counts down at the core clock, interrupts at zero, loads anew, and resets at the next zero.
+#[repr(C)]
+struct WatchdogBlock {
+    load: RW<u32>,
+    value: RO<u32>,
+    control: RW<u32>,
+    /// Any write loads the counter and clears the interrupt.
+    clear: RW<u32>,
+}
+
+impl WatchdogBlock {
+    fn start(&self, load: u32) {
+        // SAFETY: bit 0 counts and interrupts, bit 1 resets. Both only stop a program that does not feed.
+        unsafe {
+            self.load.write(load);
+            self.control.write(0b11);
+        }
+    }
+
+    fn feed(&self) {
+        // SAFETY: as above.
+        unsafe { self.clear.write(1) }
+    }
+}
+
+/// The watchdog is half through: no torque while it lasts.
+#[exception]
+unsafe fn NonMaskableInt() {
+    Mps2::zero_torque();
+    loop {
+        cortex_m::asm::nop();
     }
 }
 

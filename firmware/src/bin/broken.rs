@@ -1,0 +1,77 @@
+//! The product with a flaw, to show what becomes of it: half a second after power-up, and in one case after every
+//! start, the loop hangs, panics, faults, or outgrows its stack. QEMU's semihosting argument says which.
+
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("broken runs in QEMU: `cargo test --test resets`");
+}
+
+#[cfg(target_os = "none")]
+mod target {
+    use cortex_m_rt::{ExceptionFrame, entry, exception};
+    use haptic_core::bus::messages::ResetCause;
+    use haptic_core::ecu::Ecu;
+    use haptic_firmware::{host, product};
+
+    /// The step that breaks.
+    const AT: u32 = 500;
+
+    #[entry]
+    fn main() -> ! {
+        static mut ECU: Option<Ecu> = None;
+        let mut buffer = [0; 128];
+        let arguments = host::command_line(&mut buffer);
+        let flaw = match arguments.split(' ').next_back() {
+            Some("hang") => Flaw::Hang,
+            Some("panic") => Flaw::Panic,
+            Some("fault") => Flaw::Fault,
+            Some("overflow") => Flaw::Overflow,
+            _ => Flaw::HangAlways,
+        };
+        product::run(ECU, move |boot, step| {
+            if step == AT && (boot.reset == ResetCause::PowerOn || flaw == Flaw::HangAlways) {
+                break_down(flaw);
+            }
+        })
+    }
+
+    #[derive(Clone, Copy, PartialEq)]
+    enum Flaw {
+        Hang,
+        HangAlways,
+        Panic,
+        Fault,
+        Overflow,
+    }
+
+    fn break_down(flaw: Flaw) {
+        match flaw {
+            Flaw::Hang | Flaw::HangAlways => loop {
+                cortex_m::asm::nop();
+            },
+            Flaw::Panic => panic!("on purpose"),
+            Flaw::Fault => cortex_m::asm::udf(),
+            Flaw::Overflow => drop(deeper(0)),
+        }
+    }
+
+    /// Never ends, and no two levels share a frame.
+    #[expect(unconditional_recursion)]
+    #[inline(never)]
+    fn deeper(level: u32) -> u32 {
+        let frame = core::hint::black_box([level; 16]);
+        deeper(frame[3].wrapping_add(1)).wrapping_add(frame[7])
+    }
+
+    #[panic_handler]
+    fn panic(info: &core::panic::PanicInfo) -> ! {
+        product::on_panic(info)
+    }
+
+    #[exception]
+    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+        product::on_fault()
+    }
+}

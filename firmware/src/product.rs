@@ -1,0 +1,123 @@
+//! The product's loop: every millisecond one step of the controller, its inputs and its torque on the bus.
+//!
+//! What is broken does not steer: a panic or a fault brings the torque to zero and resets the processor with
+//! the cause on record; a loop that hangs, or that the monitor does not permit, loses the watchdog. The
+//! controller comes up in Standby, says why on the bus, and locks after three resets within 10 s.
+
+use embedded_can::nb::Can;
+use embedded_hal::digital::OutputPin;
+use haptic_core::bus::messages::{Message, ResetCause};
+use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::modes::Mode;
+use haptic_core::params::Setup;
+
+use crate::boards::{Board, ThisBoard};
+use crate::{reset, stack};
+
+/// Steps between two lines of the log: one second.
+const STEPS_PER_REPORT: u32 = 1000;
+/// Steps after which earlier resets no longer count: 10 s.
+const STEPS_TO_SETTLE: u32 = 10_000;
+
+/// What the log says once a second.
+#[derive(Default)]
+struct Counts {
+    steps: u32,
+    received: u32,
+    rejected: u32,
+    unsent: u32,
+}
+
+/// Runs the product. `disturb` is called before each step with its number: the product has nothing to say there,
+/// the image that breaks itself has.
+pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) -> ! {
+    stack::paint();
+    let mut board = ThisBoard::start();
+    let boot = reset::boot(board.reset_source());
+    let ecu = ecu.insert(Ecu::new(Some(&Setup::PAPER), boot, ThisBoard::now()));
+    let mut counts = Counts::default();
+    defmt::info!(
+        "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}",
+        ThisBoard::NAME,
+        boot.reset as u8,
+        boot.recent_resets
+    );
+    board.start_tick();
+    board.start_watchdog();
+    loop {
+        board.sleep();
+        while let Ok(frame) = board.can().receive() {
+            counts.received = counts.received.wrapping_add(1);
+            if ecu.receive(&frame, ThisBoard::now()).is_err() {
+                counts.rejected = counts.rejected.wrapping_add(1);
+            }
+        }
+        if board.tick() {
+            disturb(boot, counts.steps);
+            step(&mut board, ecu, &mut counts);
+        }
+    }
+}
+
+fn step(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) {
+    if let Some(column) = board.column() {
+        // By the codec, as from the bus: what judges a sample there judges it here.
+        let frame = column.encode(counts.steps as u8);
+        if ecu.receive(&frame, ThisBoard::now()).is_err() {
+            counts.rejected = counts.rejected.wrapping_add(1);
+        }
+    }
+    let step = ecu.step(ThisBoard::now());
+    board.set_torque(step.command.torque);
+    if step.permitted {
+        board.feed_watchdog();
+    }
+    // A frame that finds no room is lost; the next follows in a millisecond, and the receiver's time-out
+    // judges a bus that stays closed.
+    for frame in core::iter::once(&step.guidance).chain(&step.others) {
+        if board.can().transmit(frame).is_err() {
+            counts.unsent = counts.unsent.wrapping_add(1);
+        }
+    }
+    // The torque is on its way; what follows may take its time.
+    if let Some(frame) = ecu.advise()
+        && board.can().transmit(&frame).is_err()
+    {
+        counts.unsent = counts.unsent.wrapping_add(1);
+    }
+    let guiding = matches!(step.command.mode, Mode::Active | Mode::Fade | Mode::Handover);
+    // A light that fails is no reason to stop.
+    let _ = board.status().set_state(guiding.into());
+    counts.steps = counts.steps.wrapping_add(1);
+    if counts.steps == STEPS_TO_SETTLE {
+        reset::settled();
+    }
+    if counts.steps.is_multiple_of(STEPS_PER_REPORT) {
+        defmt::info!(
+            "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, stack {=u32} of {=u32}",
+            counts.steps,
+            counts.received,
+            counts.rejected,
+            counts.unsent,
+            stack::used(),
+            stack::budget()
+        );
+    }
+}
+
+/// What a panic leads to.
+pub fn on_panic(info: &core::panic::PanicInfo) -> ! {
+    ThisBoard::zero_torque();
+    defmt::error!("panic: {}", defmt::Display2Format(info));
+    reset::restart(ResetCause::Panic)
+}
+
+/// What a fault of the processor leads to.
+pub fn on_fault() -> ! {
+    ThisBoard::zero_torque();
+    reset::restart(if stack::overflowed() {
+        ResetCause::StackOverflow
+    } else {
+        ResetCause::HardFault
+    })
+}
