@@ -15,8 +15,15 @@ mod mps2;
 #[cfg(any(feature = "mps2-an386", feature = "mps2-an500"))]
 pub use mps2::Mps2 as ThisBoard;
 
-#[cfg(not(any(feature = "mps2-an386", feature = "mps2-an500")))]
-compile_error!("no board is chosen: build haptic-firmware with --features mps2-an386 or mps2-an500");
+#[cfg(feature = "nucleo-g474re")]
+mod nucleo_g474re;
+#[cfg(feature = "nucleo-g474re")]
+pub use nucleo_g474re::NucleoG474re as ThisBoard;
+
+#[cfg(not(any(feature = "mps2-an386", feature = "mps2-an500", feature = "nucleo-g474re")))]
+compile_error!(
+    "no board is chosen: build haptic-firmware with --features mps2-an386, mps2-an500 or nucleo-g474re"
+);
 
 /// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; an
 /// actuator on the bus gives up after 30 ms.
