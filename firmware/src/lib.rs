@@ -16,6 +16,7 @@
 
 #![cfg_attr(target_os = "none", no_std)]
 
+#[cfg(any(target_os = "none", test))]
 pub mod reset;
 pub mod slcan_can;
 
