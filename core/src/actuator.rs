@@ -16,8 +16,8 @@ const SPEAKS_FOR: u32 = 4;
 /// Commands that a measurement may be an echo of.
 const COMMANDS: usize = 8;
 
-/// The last commands, and what came of them.
-#[derive(Debug, Clone)]
+/// The last commands, and what came of them; at first nothing commanded, nothing delivered.
+#[derive(Debug, Clone, Default)]
 pub struct Actuator {
     /// Newest first.
     commanded: [Torque; COMMANDS],
@@ -28,17 +28,6 @@ pub struct Actuator {
 }
 
 impl Actuator {
-    /// Nothing commanded, nothing delivered.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            commanded: [Torque::ZERO; COMMANDS],
-            delivered: Torque::ZERO,
-            fresh: 0,
-            astray: 0,
-        }
-    }
-
     /// Takes a measurement.
     pub fn deliver(&mut self, torque: Torque) {
         (self.delivered, self.fresh) = (torque, SPEAKS_FOR);
@@ -64,11 +53,5 @@ impl Actuator {
             self.astray = if near { 0 } else { self.astray.saturating_add(1) };
         }
         self.astray <= PATIENCE
-    }
-}
-
-impl Default for Actuator {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -242,7 +242,7 @@ impl Ecu {
             state,
             monitor: Guarded::new(setup.monitor),
             vitals: Guarded::new(Vitals::new(e2e, faults, now)),
-            actuator: Actuator::new(),
+            actuator: Actuator::default(),
             history: History::new(now),
             boot,
             lane_bytes: None,
@@ -458,17 +458,17 @@ impl Ecu {
             self.warned_at = None;
         }
         let total = self.history.records().count();
-        if due(0) && total > 0 {
-            let turn = steps / TURN;
-            let index = (turn as usize).checked_rem(total).unwrap_or(0);
-            if let Some(record) = self.history.records().nth(index) {
-                let line = FaultRecord {
-                    index: index as u8,
-                    total: total as u8,
-                    record,
-                };
-                let _ = frames.push(line.encode(turn as u8));
-            }
+        let turn = steps / TURN;
+        let index = (turn as usize).checked_rem(total).unwrap_or(0);
+        if due(0)
+            && let Some(record) = self.history.records().nth(index)
+        {
+            let line = FaultRecord {
+                index: index as u8,
+                total: total as u8,
+                record,
+            };
+            let _ = frames.push(line.encode(turn as u8));
         }
         frames
     }

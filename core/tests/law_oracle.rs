@@ -192,3 +192,30 @@ fn extremes_saturate() {
         }
     }
 }
+
+#[test]
+fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
+    // 0.1 rad/s for long enough that the filter has settled; then one sample is read later and later.
+    let law = Config::PAPER.law;
+    let mut state = LawState::NEW;
+    let mut sample = LaneSample::default();
+    for k in 0..100_u32 {
+        let at = Instant::from_us(k * 10_000);
+        let e_theta = Radians::from_rad(1e-3 * f64::from(k));
+        sample = LaneSample {
+            e_theta,
+            at,
+            ..LaneSample::default()
+        };
+        let _ = law.step(&mut state, at, sample);
+    }
+    let mut read = |ms: u32| {
+        let now = sample.at.after(Micros::from_ms(ms));
+        law.step(&mut state, now, sample).nm()
+    };
+    // K_1*a3' = 10 N.m/rad times 0.1 rad/s times the age.
+    for (ms, grown) in [(30, 0.03), (500, 0.5), (501, 0.5), (5_000, 0.5)] {
+        let difference = read(ms) - read(0);
+        assert!((difference - grown).abs() < 1e-3, "{ms} ms: {difference}");
+    }
+}

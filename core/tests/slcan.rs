@@ -47,6 +47,15 @@ fn nonsense_is_invalid_and_the_next_line_is_good() {
         "S9",
         "x",
         "t123812345678901234567890123456789012345",
+        "t",
+        "t12",
+        "tg230",
+        "t1g30",
+        "t123g",
+        "t1231g0",
+        "t12310g",
+        // Nine bytes, all there.
+        "t1239001122334455667788",
     ] {
         assert_eq!(
             lines(&format!("{bad}\rO\r")),

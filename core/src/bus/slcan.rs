@@ -100,22 +100,19 @@ fn parse(line: &[u8]) -> Line {
 }
 
 fn parse_frame(text: &[u8]) -> Option<Frame> {
-    let (head, mut rest) = text.split_at_checked(4)?;
-    let [a, b, c, len] = head else { return None };
+    let [a, b, c, length, digits @ ..] = text else {
+        return None;
+    };
     let id = (digit(*a)? << 8) | (digit(*b)? << 4) | digit(*c)?;
-    let mut data: Vec<u8, 8> = Vec::new();
-    for _ in 0..digit(*len)? {
-        let (pair, more) = rest.split_at_checked(2)?;
-        let [high, low] = pair else { return None };
-        data.push(u8::try_from((digit(*high)? << 4) | digit(*low)?).ok()?)
-            .ok()?;
-        rest = more;
+    let (pairs, rest) = digits.as_chunks::<2>();
+    if usize::from(digit(*length)?) != pairs.len() || !rest.is_empty() {
+        return None;
     }
-    if rest.is_empty() {
-        Frame::new(id, &data)
-    } else {
-        None
+    let mut data = [0; 8];
+    for (byte, [high, low]) in data.iter_mut().zip(pairs) {
+        *byte = ((digit(*high)? << 4) | digit(*low)?) as u8;
     }
+    Frame::new(id, data.get(..pairs.len())?)
 }
 
 fn digit(ascii: u8) -> Option<u16> {
