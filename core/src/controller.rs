@@ -524,14 +524,13 @@ impl Step<'_> {
 
     /// The law's torque, scaled by the authority.
     fn guidance(&self, v: &mut Vitals) -> Torque {
-        let (Some(sample), Some(request)) = (self.inputs.lane.value(), self.inputs.request.value()) else {
-            return Torque::ZERO;
-        };
-        let asked = self.config.law.step(&mut v.law, self.now, sample);
+        let law = |sample| self.config.law.step(&mut v.law, self.now, sample);
+        let asked = self.inputs.lane.value().map_or(Torque::ZERO, law);
         #[cfg(feature = "fault-injection")]
         let asked = self.forced_law.unwrap_or(asked);
         // A share: more than all or less than nothing is a host's mistake.
-        let authority = request.authority.max(Gain::ZERO).min(Gain::ONE);
+        let share = |request: Request| request.authority.max(Gain::ZERO).min(Gain::ONE);
+        let authority = self.inputs.request.value().map_or(Gain::ZERO, share);
         Torque::from_wide(product(authority.bits(), asked.bits()))
     }
 }

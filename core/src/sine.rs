@@ -16,7 +16,7 @@ pub(crate) const QUARTER: u32 = 1 << 30;
 
 /// `sin(2*pi*phase/2^32)` in 2^-30.
 #[must_use]
-pub(crate) const fn sine(phase: u32) -> i32 {
+pub(crate) fn sine(phase: u32) -> i32 {
     // Half turns as an i32, folded to the quarter wave on each side of zero.
     let turn = phase as i32;
     let x = if turn.unsigned_abs() > QUARTER {
@@ -30,13 +30,7 @@ pub(crate) const fn sine(phase: u32) -> i32 {
     let tail = C[1].saturating_add(times(square, tail));
     let sine = times(x, C[0].saturating_add(times(square, tail)));
     // The polynomial may pass one by its error.
-    if sine > ONE as i64 {
-        ONE
-    } else if sine < -(ONE as i64) {
-        -ONE
-    } else {
-        sine as i32
-    }
+    sine.min(i64::from(ONE)).max(-i64::from(ONE)) as i32
 }
 
 /// A product in 2^-30: both below 2^32 in magnitude.

@@ -401,6 +401,34 @@ fn the_driver_who_opposes_wins_in_the_same_step() {
 }
 
 #[test]
+fn where_a_limit_acts_no_more_counts_as_probe_than_was_applied() {
+    // 2.45 N.m against the torque leaves 5 - 3*(2.45 - 0.8) = 0.05 N.m, 2.47 nothing. The probe's first half
+    // wave would add up to 0.2 N.m, its second take as much away.
+    for (opposing, left) in [(2.45, 0.05), (2.47, 0.0)] {
+        for periods in [1.0, 1.5] {
+            let mut rig = Rig::active_in_curve(1.5);
+            rig.probe = true;
+            rig.run_until(11, |step| step.command.probe.is_some());
+            rig.run((periods * 400.0) as u32 - 1);
+            rig.driver = Some(-opposing);
+            rig.run_until(3, |step| step.command.limit == LimitReason::DriverOverride);
+            // Before the column's check has seen enough of a driver who pushes without effect.
+            for _ in 0..100 {
+                let step = rig.tick();
+                assert!((rig.applied - left).abs() <= BUS_LSB, "{}", rig.applied);
+                let probe = step.command.probe.unwrap().nm();
+                let upward = periods == 1.0;
+                assert!(
+                    (0.0..=left + 2.0 * BUS_LSB).contains(&probe) && (upward || probe == 0.0),
+                    "{probe}"
+                );
+                assert!(!upward || left == 0.0 || probe > 0.0);
+            }
+        }
+    }
+}
+
+#[test]
 fn no_parameters_or_a_reset_loop_lock() {
     let boots = [
         (true, 3, Fault::ResetLoop),

@@ -17,7 +17,7 @@ fn identifiers_and_lengths_at_their_edges() {
 #[test]
 fn as_embedded_can_sees_it() {
     let id = StandardId::new(0x123).unwrap();
-    let frame = <Frame as embedded_can::Frame>::new(id, &[9, 8]).unwrap();
+    let frame = <Frame as embedded_can::Frame>::new(Id::Standard(id), &[9, 8]).unwrap();
     assert_eq!(Frame::new(0x123, &[9, 8]), Some(frame));
     assert_eq!(embedded_can::Frame::id(&frame), Id::Standard(id));
     assert_eq!(embedded_can::Frame::data(&frame), [9, 8]);
@@ -26,6 +26,9 @@ fn as_embedded_can_sees_it() {
     assert!(frame.is_data_frame() && !frame.is_remote_frame());
     // This bus has neither extended nor remote frames.
     let extended = ExtendedId::new(0x123).unwrap();
-    assert_eq!(<Frame as embedded_can::Frame>::new(extended, &[]), None);
+    assert_eq!(
+        <Frame as embedded_can::Frame>::new(Id::Extended(extended), &[]),
+        None
+    );
     assert_eq!(Frame::new_remote(id, 2), None);
 }

@@ -71,3 +71,11 @@ fn a_probe_too_steep_for_the_wind_up_limit_is_refused() {
     assert_eq!(error.name, "2 * pi * probe_amplitude_nm * probe_frequency_hz");
     assert!((error.value - 3.5186).abs() < 1e-4 && error.max == 3.5, "{error}");
 }
+
+#[test]
+fn the_default_is_the_paper() {
+    // Table 8 and section 3.2.
+    let p = Params::default();
+    assert_eq!([p.k_1, p.a_1, p.a_2, p.a_3, p.a_4], [0.25, 2.0, 0.05, 40.0, 1.0]);
+    assert_eq!(p.torque_limit_nm, 5.0);
+}
