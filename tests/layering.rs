@@ -77,3 +77,32 @@ fn the_blocks_of_the_core_do_not_know_each_other() {
         }
     }
 }
+
+/// In the simulator, models know nothing of the controller or of studies, and studies nothing of the command
+/// line.
+#[test]
+fn the_layers_of_the_simulator_look_downward_only() {
+    let above = [
+        (
+            "models",
+            vec![
+                "haptic_core",
+                "crate::guidance",
+                "crate::closed_loop",
+                "crate::scenario",
+                "crate::studies",
+            ],
+        ),
+        (
+            "guidance",
+            vec!["crate::closed_loop", "crate::scenario", "crate::studies"],
+        ),
+        ("studies", vec!["clap", "indicatif", "println!"]),
+    ];
+    for (layer, forbidden) in above {
+        for needle in forbidden {
+            let hits = mentions(&format!("host-sim/src/{layer}"), needle);
+            assert_eq!(hits, Vec::<String>::new(), "{layer} must not use {needle}");
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! The command line as another program sees it: stdout, files and exit codes.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Runs the program in a directory of its own.
+fn host_sim(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).expect("stdout is one JSON value and nothing else")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn an_evaluation_prints_21_records_and_leaves_its_files() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = host_sim(directory.path(), &["evaluate", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let results = json(&output);
+    let runs = results["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 21);
+    assert_eq!(runs.iter().filter(|r| r["failure"] == "torque").count(), 9);
+    assert_eq!(runs.iter().filter(|r| r["condition"] == "manual").count(), 3);
+    for run in runs {
+        assert!([0.1, 0.3, 0.5].contains(&run["t_p"].as_f64().unwrap()));
+        assert_eq!(run["diverged"], false);
+        for metric in [
+            "peak_lateral_error_m",
+            "mean_abs_lateral_error_m",
+            "peak_guidance_torque_nm",
+            "peak_driver_torque_nm",
+        ] {
+            assert!(run[metric].is_number(), "{metric} in {run}");
+        }
+    }
+    // One number of the independent table, to show that the fields hold what they say.
+    let high = runs
+        .iter()
+        .find(|r| r["t_p"] == 0.5 && r["condition"] == "high" && r["failure"] == "torque");
+    assert!((high.unwrap()["peak_lateral_error_m"].as_f64().unwrap() - 0.6179).abs() < 0.06);
+
+    let out = directory.path().join("out");
+    for (name, start) in [
+        ("figure8.svg", "<svg"),
+        ("figure9.svg", "<svg"),
+        ("figure8.png", "\u{fffd}PNG"),
+        ("figure9.png", "\u{fffd}PNG"),
+        ("report.html", "<!DOCTYPE html>"),
+        ("results.json", "{"),
+        ("runs/t_p_0.5_high_failure_torque.csv", "time_s,"),
+    ] {
+        let bytes = std::fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(String::from_utf8_lossy(&bytes).starts_with(start), "{name}");
+    }
+    assert_eq!(std::fs::read_dir(out.join("runs")).unwrap().count(), 21);
+    let file: Value = serde_json::from_slice(&std::fs::read(out.join("results.json")).unwrap()).unwrap();
+    assert_eq!(file, results);
+}
+
+#[test]
+fn another_course_speed_and_window_are_measured_without_claims() {
+    let directory = tempfile::tempdir().unwrap();
+    let course = "lane_width = 3\n[[segment]]\nlength = 150\n[[segment]]\nlength = 100\ncurvature = -0.002\n";
+    std::fs::write(directory.path().join("c.toml"), course).unwrap();
+    let arguments = [
+        "--course",
+        "c.toml",
+        "--speed",
+        "50",
+        "--sensors",
+        "exact",
+        "--json",
+        "--out",
+        "elsewhere",
+    ];
+    let output = host_sim(directory.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let results = json(&output);
+    assert_eq!(results["window_m"], serde_json::json!([0.0, 250.0]));
+    assert_eq!(results["claims"], serde_json::json!([]));
+    assert!(directory.path().join("elsewhere/report.html").exists());
+
+    let narrow = host_sim(
+        directory.path(),
+        &[&arguments[..], &["--window", "10", "140"]].concat(),
+    );
+    // On the straight, before anything bends.
+    assert_eq!(json(&narrow)["runs"][0]["peak_guidance_torque_nm"], 0.0);
+}
+
+#[test]
+fn a_diverged_evaluation_is_flagged_and_has_no_nan() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = host_sim(directory.path(), &["evaluate", "--speed", "120", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let results = json(&output);
+    assert!(
+        results["runs"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|run| run["diverged"] == true)
+    );
+    for file in [
+        "results.json",
+        "report.html",
+        "runs/t_p_0.5_manual_failure_none.csv",
+    ] {
+        let text = std::fs::read_to_string(directory.path().join("out").join(file)).unwrap();
+        assert!(!text.contains("NaN"), "{file}");
+    }
+}
+
+#[test]
+fn a_run_prints_its_record_and_writes_files_when_asked() {
+    let directory = tempfile::tempdir().unwrap();
+    let scenario = "condition = 'high'\n[driver]\nt_p = 0.5\n[failure]\nkind = 'torque'\n";
+    std::fs::write(directory.path().join("s.toml"), scenario).unwrap();
+    let output = host_sim(directory.path(), &["run", "s.toml", "--json", "--out", "here"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let record = json(&output);
+    assert_eq!(
+        (&record["condition"], &record["failure"]),
+        (&"high".into(), &"torque".into())
+    );
+    assert!((record["peak_lateral_error_m"].as_f64().unwrap() - 0.6179).abs() < 0.06);
+    assert!(record["time_to_recover_s"].as_f64().unwrap() > 1.0);
+    for name in ["run.svg", "run.png", "run.csv", "results.json", "report.html"] {
+        assert!(directory.path().join("here").join(name).exists(), "{name}");
+    }
+    let table = host_sim(directory.path(), &["run", "s.toml"]);
+    let text = String::from_utf8(table.stdout).unwrap();
+    assert!(
+        text.contains("Peak lateral error") && text.contains("failure torque"),
+        "{text}"
+    );
+    assert_eq!(
+        std::fs::read_dir(directory.path()).unwrap().count(),
+        2,
+        "no files unless asked"
+    );
+}
+
+#[test]
+fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("short.toml", "[[segment]]\nlength = 10\n");
+    write("tight.toml", "[[segment]]\nlength = 100\ncurvature = 3\n");
+    write("unknown.toml", "[driver]\nt_q = 1\n");
+    write("manual.toml", "condition = 'manual'\n");
+    let cases: [(&[&str], &str); 12] = [
+        (&["evaluate", "--course", "none.toml"], "none.toml"),
+        (&["evaluate", "--course", "short.toml"], "look-ahead"),
+        (&["evaluate", "--course", "tight.toml"], "curvature = 3"),
+        (
+            &["evaluate", "--speed", "5"],
+            "speed = 5 km/h is outside 20 to 250 km/h",
+        ),
+        (&["evaluate", "--speed", "nan"], "speed = NaN"),
+        (&["evaluate", "--window", "500", "100"], "window"),
+        (
+            &["evaluate", "--window", "100", "9000"],
+            "window to = 9000 m is outside 0 to 3350 m",
+        ),
+        (&["evaluate", "--failure-time=-1"], "failure.time = -1"),
+        (&["evaluate", "--sensors", "perfect"], "perfect"),
+        (&["run", "unknown.toml"], "t_q"),
+        (&["pil", "manual.toml"], "manual"),
+        (&["fly"], "fly"),
+    ];
+    for (arguments, expected) in cases {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(expected),
+            "{arguments:?} gave {}",
+            stderr(&output)
+        );
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}
