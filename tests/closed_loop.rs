@@ -118,7 +118,7 @@ fn whole_curves_are_those_of_an_independent_program() {
 
 #[test]
 fn on_a_second_course_the_shipping_controller_drives_as_a_float_one() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/country-road.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/country-road.toml");
     let course = Course::load(&path).unwrap();
     let line = Centreline::new(&course);
     for t_p in [0.1, 0.3, 0.5] {

@@ -146,3 +146,18 @@ fn a_course_shorter_than_the_look_ahead_is_refused() {
         Ok(())
     );
 }
+
+#[test]
+fn the_examples_are_good_and_the_one_with_every_field_holds_the_defaults() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+    assert_eq!(
+        Scenario::load(&folder.join("every-field.toml")).unwrap(),
+        Scenario::default()
+    );
+    let relying = Scenario::load(&folder.join("relying-driver.toml")).unwrap();
+    assert_eq!(
+        (relying.condition, relying.failure.at_s()),
+        (Condition::High, Some(40.0))
+    );
+    assert!(relying.course.name().ends_with("hill-road.toml"));
+}
