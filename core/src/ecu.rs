@@ -361,7 +361,7 @@ impl Ecu {
         };
         let applied = v.applied;
         let mut command = self.controller.step(&mut self.state, now, applied, &inputs);
-        command.torque = Guidance::rounded(command.torque, command.limit);
+        command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
         let evidence = Evidence {

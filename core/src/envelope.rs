@@ -9,7 +9,7 @@
 //! | absolute | abs(T) <= L |
 //! | window | abs(T) grows by at most 1.2 N.m in 250 ms |
 //! | wind-up | abs(T) grows by at most 4 N.m/s |
-//! | reduction | abs(T) falls by at most 8 N.m/s |
+//! | reduction | abs(T) falls by at most 8 N.m/s, a rounding toward zero included |
 //! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
 use crate::quantity::{Gain, Instant, Micros, Torque, per_second_times, product, saturate};
@@ -100,6 +100,10 @@ pub const WINDOW: Micros = Micros::from_ms(250);
 /// be felt as one.
 const MAX_ELAPSED: Micros = Micros::from_ms(2);
 
+/// What rounding a command toward zero may take away after this file has judged it: an LSB of the guidance
+/// frame. Every other bound is an upper one, on which rounding toward zero is safe.
+const ROUNDING: Torque = Torque::from_nm(1.0 / 4096.0);
+
 impl EnvelopeState {
     /// No torque so far.
     #[must_use]
@@ -149,7 +153,10 @@ impl Envelope {
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
         let step = |rate: Torque| i64::from(saturate(per_second_times(i64::from(rate.bits()), elapsed)));
-        let (growth, fall) = (step(self.wind_up), step(self.reduction));
+        let growth = step(self.wind_up);
+        let fall = step(self.reduction)
+            .saturating_sub(i64::from(ROUNDING.bits()))
+            .max(0);
         // Judged in the frame where the applied torque is positive.
         let mirror = at.applied < Torque::ZERO;
         let turn = |t: Torque| if mirror { t.opposite() } else { t };

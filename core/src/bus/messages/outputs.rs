@@ -65,18 +65,12 @@ impl Guidance {
     /// +-5 N.m, the widest profile of the envelope.
     const TORQUE_MAX: i64 = 5 << Self::TORQUE_LSB;
 
-    /// A torque as this message carries it, at most one LSB away. Rounded toward zero, so that no bound that
-    /// held before is crossed by rounding; away from zero where the bound was one on the reduction.
+    /// A torque as this message carries it, less than one LSB away. Rounded toward zero, so that no upper bound
+    /// that held before is crossed by rounding; the envelope's bound on the reduction leaves room for it.
     #[must_use]
-    pub fn rounded(torque: Torque, limit: LimitReason) -> Torque {
+    pub fn rounded(torque: Torque) -> Torque {
         const LSB: i64 = 1 << (24 - Guidance::TORQUE_LSB);
-        let bits = i64::from(torque.bits());
-        let away = if limit == LimitReason::Reduction {
-            bits.signum().saturating_mul(LSB - 1)
-        } else {
-            0
-        };
-        let raw = (bits.saturating_add(away) / LSB).clamp(-Self::TORQUE_MAX, Self::TORQUE_MAX);
+        let raw = (i64::from(torque.bits()) / LSB).clamp(-Self::TORQUE_MAX, Self::TORQUE_MAX);
         Torque::from_wide(from_lsb(raw, Self::TORQUE_LSB))
     }
 }
