@@ -16,7 +16,7 @@ use crate::models::driver::{ArmGains, Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::road::{Centreline, Foot, Tracker};
 use crate::models::{STEP_S, STEPS_PER_SECOND};
-use crate::scenario::{Condition, FAILURE_REACTION_S, Scenario, Sensors};
+use crate::scenario::{Condition, FAILURE_REACTION_S, FailureKind, Scenario, Sensors};
 use crate::trace::{Sample, Trace};
 
 /// Samples per second of a trace.
@@ -60,7 +60,7 @@ pub struct Cycle<'a> {
     pub view: View,
     /// The torque that it gave.
     pub given: Applied,
-    /// The torque really applied, N.m: zero after a failure.
+    /// The torque really applied, N.m: zero after a failure of the torque.
     pub applied_torque_nm: f64,
     /// The frames that went to the ECU, in order of sending.
     pub frames_in: &'a [Frame],
@@ -172,20 +172,21 @@ pub fn drive<G: Guidance, O: Observer>(
         } else {
             None
         };
-        let remnant_nm = remnant.step();
+        let remnant_nm = remnant.step() + guidance.hand_torque_nm(step, plant.arm_torque_nm());
+        let fails = |kind| step >= failure_step && scenario.failure.kind == kind;
         let view = View {
             step,
-            lane: lane.filter(|_| looks),
+            lane: lane.filter(|_| looks && !fails(FailureKind::Input)),
             driver_torque_nm: plant.arm_torque_nm() + remnant_nm,
             wheel_angle_rad: plant.wheel_angle_rad(),
             motor_torque_nm,
             speed_mps: v,
         };
         let given = guidance.step(&view);
-        let applied = if step < failure_step {
-            given
-        } else {
+        let applied = if fails(FailureKind::Torque) {
             Applied::default()
+        } else {
+            given
         };
         observer.cycle(&Cycle {
             view,

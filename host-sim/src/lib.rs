@@ -1,6 +1,7 @@
 //! The world around the controller, and the workbench that studies it.
 
 pub mod closed_loop;
+pub mod ecu_events;
 pub mod guidance;
 pub mod identify;
 pub mod input;

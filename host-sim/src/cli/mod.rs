@@ -7,6 +7,7 @@
 
 mod bus;
 mod evaluate;
+mod handover;
 mod pil;
 mod progress;
 mod run;
@@ -38,6 +39,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
+    /// What a failed input costs when the ECU hands over, and what a sudden loss costs: 40 to 120 km/h
+    Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
     /// The worst-case load of the CAN bus, message by message
@@ -68,6 +71,7 @@ pub(crate) fn main() -> ExitCode {
         None => evaluate::run(&cli.evaluate),
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
+        Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
     };

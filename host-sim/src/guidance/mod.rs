@@ -5,7 +5,7 @@
 //! - [`FloatLaw`]: a float64 evaluation of equation (9), the reference that the others are held against.
 //! - [`NoGuidance`]: manual driving.
 //!
-//! Not here: the failure of the guidance; the loop takes the torque away, whoever gave it.
+//! Not here: the failure of the guidance; the loop takes the torque or the lane errors away, whoever gives it.
 
 mod direct;
 mod float_law;
@@ -67,6 +67,12 @@ pub trait Guidance {
 
     /// One step of 1 ms.
     fn step(&mut self, view: &View) -> Applied;
+
+    /// Torque on the wheel beyond what the driver's model gives (`arm_torque_nm`), N.m: only a fault campaign
+    /// has a hand that jerks it.
+    fn hand_torque_nm(&mut self, _step: u32, _arm_torque_nm: f64) -> f64 {
+        0.0
+    }
 
     /// The frames that went to the ECU in the last step, in order of sending.
     fn frames_in(&self) -> &[Frame] {

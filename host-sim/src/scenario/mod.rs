@@ -2,7 +2,8 @@
 //!
 //! Fields bear the paper's symbols; defaults are tables 7 to 9. Terms: *condition*, how much the driver relies
 //! on the guidance (section 5.1): a name for a pair of arm gains, or manual driving. *Failure*: the guidance
-//! torque drops to zero, and the driver keeps his gains for one more second before he drives as manually.
+//! torque drops to zero, or its lane preview stops; the driver keeps his gains for one more second before he
+//! drives as manually.
 
 mod file;
 #[cfg(test)]
@@ -92,6 +93,8 @@ pub enum FailureKind {
     None,
     /// The guidance torque drops to zero (section 5.2).
     Torque,
+    /// The lane preview stops; the ECU lives and hands over.
+    Input,
 }
 
 impl fmt::Display for FailureKind {
@@ -99,6 +102,7 @@ impl fmt::Display for FailureKind {
         f.pad(match self {
             Self::None => "none",
             Self::Torque => "torque",
+            Self::Input => "input",
         })
     }
 }

@@ -171,6 +171,22 @@ pub(super) fn check(results: &Results) -> Vec<Claim> {
             .join(" m, ")
             + " m",
     );
+    let handed = |t_p, condition| peak(t_p, condition, FailureKind::Input);
+    let worst = |t_p, condition| handed(t_p, condition) / nominal(t_p, condition).max(nominal(t_p, Manual));
+    claim(
+        "a failed input that the ECU survives costs at most 1.25 times the larger of the no-failure and the \
+         manual peak",
+        DRIVERS_T_P
+            .iter()
+            .all(|&t_p| [High, Mid, Low].iter().all(|&c| worst(t_p, c) <= 1.25)),
+        DRIVERS_T_P
+            .map(|t_p| {
+                [High, Mid, Low]
+                    .map(|c| format!("{:.2}", worst(t_p, c)))
+                    .join(", ")
+            })
+            .join("; "),
+    );
     claims
 }
 

@@ -1,5 +1,6 @@
 //! Section 5 of the paper: three drivers (table 7) under four conditions, and again with a failure of the
-//! guidance. A manual run has no failure run, so there are 21.
+//! guidance. A manual run has no failure run, so there are 21. Beyond the paper, 9 more in which the guidance's
+//! input fails, and the ECU hands over.
 
 use std::path::Path;
 
@@ -17,8 +18,8 @@ use crate::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 
 /// Processing delays of the three drivers, s (table 7).
 pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
-/// Runs of an evaluation: 3 drivers x (4 conditions + 3 that can fail).
-pub const RUNS: usize = 21;
+/// Runs of an evaluation: 3 drivers x (4 conditions + 2 x 3 that can fail).
+pub const RUNS: usize = 30;
 
 /// An evaluation with everything that was simulated.
 #[derive(Debug, Clone)]
@@ -129,7 +130,7 @@ impl Evaluation {
 fn scenarios(base: &Scenario) -> Vec<Scenario> {
     let mut scenarios = Vec::with_capacity(RUNS);
     for t_p in DRIVERS_T_P {
-        for kind in [FailureKind::None, FailureKind::Torque] {
+        for kind in [FailureKind::None, FailureKind::Torque, FailureKind::Input] {
             for condition in Condition::ALL {
                 // There is no guidance to fail.
                 if condition == Condition::Manual && kind != FailureKind::None {

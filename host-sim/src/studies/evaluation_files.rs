@@ -1,4 +1,4 @@
-//! The files that an evaluation leaves: figures 8 and 9, time series, results, and the report that shows them.
+//! The files that an evaluation leaves: figures 8 and 9, figure 9 beside a handover, time series, results, and the report that shows them.
 
 use std::path::Path;
 
@@ -29,6 +29,7 @@ pub(super) fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), Out
     let figures = [
         ("figure8", nominal_figure(evaluation)),
         ("figure9", failure_figure(evaluation)),
+        ("figure9_handover", handover_figure(evaluation)),
     ];
     for (name, figure) in &figures {
         let (svg, png) = (figure.to_svg()?, figure.to_png()?);
@@ -51,9 +52,12 @@ pub(super) fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), Out
 }
 
 fn nominal_figure(evaluation: &Evaluation) -> Figure {
-    panels(evaluation, "Lateral error by reliance on the guidance", |s| {
-        s.failure.kind == FailureKind::None
-    })
+    let shown = |s: &Scenario| s.failure.kind == FailureKind::None;
+    panels(
+        evaluation,
+        "Lateral error by reliance on the guidance",
+        &[("", &shown)],
+    )
 }
 
 /// The manual run has no guidance to fail; it is drawn as what the others fall back to.
@@ -63,7 +67,30 @@ fn failure_figure(evaluation: &Evaluation) -> Figure {
         evaluation.results.failure_time_s
     );
     let shown = |s: &Scenario| s.failure.kind == FailureKind::Torque || s.condition == Condition::Manual;
-    let mut figure = panels(evaluation, &title, shown);
+    let mut figure = panels(evaluation, &title, &[("", &shown)]);
+    figure.markers.extend(failure_marker(evaluation));
+    figure
+}
+
+/// The sudden loss above the handover, driver by driver, on the same axes.
+fn handover_figure(evaluation: &Evaluation) -> Figure {
+    let title = format!(
+        "Lateral error: guidance torque lost, and input lost and handed over, at {} s",
+        evaluation.results.failure_time_s
+    );
+    let fails = |kind| move |s: &Scenario| s.failure.kind == kind || s.condition == Condition::Manual;
+    let (lost, handed_over) = (fails(FailureKind::Torque), fails(FailureKind::Input));
+    let mut figure = panels(
+        evaluation,
+        &title,
+        &[(": torque lost", &lost), (": handed over", &handed_over)],
+    );
+    figure.markers.extend(failure_marker(evaluation));
+    figure
+}
+
+/// Where the guidance fails, if that is in the figure.
+fn failure_marker(evaluation: &Evaluation) -> Option<Marker> {
     let failed = evaluation
         .runs
         .iter()
@@ -73,29 +100,34 @@ fn failure_figure(evaluation: &Evaluation) -> Figure {
         run.trace.samples.iter().find(|sample| sample.time_s >= time_s)
     });
     let [from, to] = evaluation.results.window_m;
-    if let Some(sample) = place.filter(|sample| (from..=to).contains(&sample.s_m)) {
-        figure.markers.push(Marker {
+    place
+        .filter(|sample| (from..=to).contains(&sample.s_m))
+        .map(|sample| Marker {
             label: "failure".into(),
             x: sample.s_m,
-        });
-    }
-    figure
+        })
 }
 
-fn panels(evaluation: &Evaluation, title: &str, shown: impl Fn(&Scenario) -> bool) -> Figure {
+/// What a panel's title ends with, and which runs it shows.
+type Shown<'a> = (&'a str, &'a dyn Fn(&Scenario) -> bool);
+
+/// For each driver one panel for each of `kinds`.
+fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
     let mut drivers = Vec::new();
     for (number, t_p) in DRIVERS_T_P.iter().enumerate() {
-        let runs = evaluation
-            .runs
-            .iter()
-            .filter(|(s, _)| s.driver.t_p == *t_p && shown(s));
-        let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
-        drivers.push(DriverPanel {
-            title: format!("Driver {} (t_p {t_p} s)", number + 1),
-            runs: runs
-                .map(|(s, run)| (label(s.condition).into(), style(s.condition), &run.trace))
-                .collect(),
-        });
+        for (ending, shown) in kinds {
+            let runs = evaluation
+                .runs
+                .iter()
+                .filter(|(s, _)| s.driver.t_p == *t_p && shown(s));
+            let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
+            drivers.push(DriverPanel {
+                title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
+                runs: runs
+                    .map(|(s, run)| (label(s.condition).into(), style(s.condition), &run.trace))
+                    .collect(),
+            });
+        }
     }
     let [from, to] = evaluation.results.window_m;
     let course = evaluation.runs.first().map(|(scenario, _)| &scenario.course);
@@ -114,7 +146,7 @@ fn label(condition: Condition) -> &'static str {
     }
 }
 
-fn report(results: &Results, [nominal, failure]: [Figure; 2]) -> Report {
+fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Report {
     let course = if results.course == PAPER_COURSE {
         "The course is this project's own: the paper prints no numbers for its own. "
     } else {
@@ -137,6 +169,18 @@ fn report(results: &Results, [nominal, failure]: [Figure; 2]) -> Report {
                     "The guidance torque drops to zero at {} s; one second later the driver steers as manually. \
                      The manual run has no failure and is drawn for comparison.",
                     results.failure_time_s
+                ),
+            }],
+        },
+        Section {
+            heading: "Failure of the guidance's input".into(),
+            blocks: vec![Block::Figure {
+                figure: handover,
+                caption: format!(
+                    "Above, the torque drops to zero at {t} s. Below, the lane preview stops at {t} s: the ECU \
+                     holds its last trusted torque and fades it to zero over 2 s. One second after either the \
+                     driver steers as manually.",
+                    t = results.failure_time_s
                 ),
             }],
         },

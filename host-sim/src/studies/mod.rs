@@ -2,6 +2,7 @@
 //!
 //! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
 //! - [`claims`]: what that evaluation must show.
+//! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`run`]: one scenario.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`processor`]: one scenario with the ECU's image in QEMU beside the host's.
@@ -13,6 +14,7 @@ pub mod claims;
 mod curves;
 pub mod evaluate;
 mod evaluation_files;
+pub mod handover;
 pub mod processor;
 mod record;
 pub mod run;

@@ -6,8 +6,10 @@ use serde::Serialize;
 
 use super::record::default_window;
 use super::{OutputError, RunRecord, run_files};
-use crate::closed_loop::{Run, simulate};
+use crate::closed_loop::{Run, observe, simulate};
+use crate::ecu_events::EcuEvents;
 use crate::models::road::Centreline;
+use crate::report::Event;
 use crate::scenario::{Failure, FailureKind, Scenario, Sensors};
 
 /// A scenario with its run.
@@ -17,6 +19,8 @@ pub struct SingleRun {
     pub scenario: Scenario,
     /// What came of it.
     pub run: Run,
+    /// What the ECU said of itself, from its frames.
+    pub reported: Vec<Event>,
     /// What is handed on.
     pub results: SingleResults,
 }
@@ -50,7 +54,8 @@ pub struct SingleResults {
 pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
     let centreline = Centreline::new(&scenario.course);
     let window = default_window(&scenario.course);
-    let run = simulate(&scenario, &centreline)?;
+    let mut ecu = EcuEvents::new();
+    let run = observe(&scenario, &centreline, &mut ecu)?;
     let nominal_peak_m = if scenario.failure.at_s().is_some() {
         let failure = Failure {
             kind: FailureKind::None,
@@ -80,6 +85,7 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
     Ok(SingleRun {
         scenario,
         run,
+        reported: ecu.into_events(),
         results,
     })
 }

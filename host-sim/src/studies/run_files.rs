@@ -10,7 +10,7 @@ use crate::plot::{Axis, Figure, Line, Marker, Panel};
 use crate::report::{
     Block, Event, Report, Section, Table, definitions_table, write_file, write_json, write_trace_csv,
 };
-use crate::scenario::FAILURE_REACTION_S;
+use crate::scenario::{FAILURE_REACTION_S, FailureKind};
 use crate::trace::Sample;
 
 pub(super) fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
@@ -120,11 +120,15 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
 
 fn events(single: &SingleRun) -> Vec<Event> {
     let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
-    let mut events = Vec::new();
+    let mut events = single.reported.clone();
     if let Some(time_s) = single.scenario.failure.at_s().filter(|t| *t <= end_s) {
+        let what = match single.scenario.failure.kind {
+            FailureKind::Input => "The lane preview stops",
+            FailureKind::Torque | FailureKind::None => "The guidance torque drops to zero",
+        };
         events.push(Event {
             time_s,
-            what: "The guidance torque drops to zero".into(),
+            what: what.into(),
         });
         let noticed_s = time_s + FAILURE_REACTION_S;
         if noticed_s <= end_s {
@@ -139,5 +143,6 @@ fn events(single: &SingleRun) -> Vec<Event> {
         Ending::Diverged { s_m } => format!("The run diverged at {s_m:.0} m and was stopped"),
     };
     events.push(Event { time_s: end_s, what });
+    events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     events
 }
