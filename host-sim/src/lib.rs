@@ -2,6 +2,7 @@
 
 pub mod closed_loop;
 pub mod ecu_events;
+pub mod faults;
 pub mod guidance;
 pub mod identify;
 pub mod input;

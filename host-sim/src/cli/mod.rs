@@ -7,6 +7,7 @@
 
 mod bus;
 mod evaluate;
+mod faults;
 mod handover;
 mod pil;
 mod progress;
@@ -39,6 +40,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
+    /// Every fault by name into the closed loop, every rule checked in every cycle
+    Faults(faults::Arguments),
     /// What a failed input costs when the ECU hands over, and what a sudden loss costs: 40 to 120 km/h
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
@@ -71,6 +74,7 @@ pub(crate) fn main() -> ExitCode {
         None => evaluate::run(&cli.evaluate),
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
+        Some(Command::Faults(arguments)) => faults::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),

@@ -1,0 +1,155 @@
+//! `host-sim faults`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::faults::campaign::{self, Campaign};
+use host_sim::faults::table::{self as rows, Place, Row};
+use host_sim::faults::{World, document};
+use host_sim::report::{write_file, write_json};
+
+use super::table::{self, number};
+use super::{BadInput, Outcome, print, print_json, progress};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Rows to run, by name, separated by commas; default: all that run here
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    rows: Vec<String>,
+    /// Runs of each row: seeds 1 to N
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    seeds: u64,
+    /// One seed alone, to run a failure again; shows what the ECU reported
+    #[arg(long, value_name = "K", conflicts_with = "seeds")]
+    seed: Option<u64>,
+    /// Print the table of faults, as docs/safety.md has it, and run nothing
+    #[arg(long, conflicts_with_all = ["rows", "seeds", "seed", "json", "out"])]
+    list: bool,
+    /// Print the results as one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Directory for the results (JSON) and the table of faults (Markdown); default: no files
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    if arguments.list {
+        print(&document::table_of_faults())?;
+        return Ok(Outcome::Good);
+    }
+    let chosen = choose(&arguments.rows)?;
+    let seeds = match arguments.seed {
+        Some(seed) => seed..seed + 1,
+        None => 1..arguments.seeds + 1,
+    };
+    let bar = progress::bar(chosen.len() as u64 * (seeds.end - seeds.start), "runs");
+    let world = World::new();
+    let campaign = campaign::run(&world, &chosen, seeds, || bar.inc(1));
+    bar.finish_and_clear();
+    if let Some(directory) = &arguments.out {
+        write_json(&directory.join("faults.json"), &campaign)?;
+        let text = document::table_of_faults();
+        write_file(&directory.join("faults.md"), |f| f.write_all(text.as_bytes()))?;
+    }
+    if arguments.json {
+        print_json(&campaign)?;
+    } else {
+        print(&readable(&campaign))?;
+        if let Some(seed) = arguments.seed {
+            for row in &chosen {
+                print(&story(&world, row, seed))?;
+            }
+        }
+    }
+    Ok(if campaign.failures().next().is_some() {
+        Outcome::Failed
+    } else {
+        Outcome::Good
+    })
+}
+
+fn choose(names: &[String]) -> Result<Vec<&'static Row>, BadInput> {
+    if names.is_empty() {
+        return Ok(rows::rows().filter(|row| row.place != Place::Target).collect());
+    }
+    names
+        .iter()
+        .map(|name| match rows::rows().find(|row| row.name == name) {
+            None => Err(BadInput(format!(
+                "--rows: there is no fault {name}; --list shows them all"
+            ))),
+            Some(row) if row.place == Place::Target => Err(BadInput(format!(
+                "--rows: {name} happens on a target only and runs in QEMU"
+            ))),
+            Some(row) => Ok(row),
+        })
+        .collect()
+}
+
+fn readable(campaign: &Campaign) -> String {
+    let headings = [
+        "fault",
+        "class",
+        "runs",
+        "seen",
+        "cycles",
+        "reaction/ms",
+        "deadline/ms",
+        "peak |T|/N.m",
+        "bound/N.m",
+        "",
+    ];
+    let mut lines = vec![headings.map(String::from).to_vec()];
+    for row in &campaign.rows {
+        let reaction = row.deadline_ms.and(row.worst_reaction_ms);
+        let verdict = match row.failures.len() {
+            0 => "pass".into(),
+            n => format!("FAIL in {n}"),
+        };
+        lines.push(vec![
+            row.name.into(),
+            row.class.to_string(),
+            row.runs.to_string(),
+            row.seen.to_string(),
+            row.cycles.to_string(),
+            number(reaction.map(f64::from), 0),
+            number(row.deadline_ms.map(f64::from), 0),
+            number(Some(row.peak_torque_nm), 3),
+            number(Some(row.torque_bound_nm), 1),
+            verdict,
+        ]);
+    }
+    let mut text = table::text(&lines);
+    for failure in campaign.failures() {
+        text.push_str(&format!(
+            "\n{} seed {}, cycle {}: {}\n    {}\n",
+            failure.row, failure.seed, failure.cycle, failure.what, failure.replay
+        ));
+    }
+    text.push_str(&format!(
+        "\n{} rows, {} runs, {} cycles checked, {} failed",
+        campaign.rows.len(),
+        campaign.runs,
+        campaign.cycles,
+        campaign.failures().count()
+    ));
+    text
+}
+
+/// What the ECU reported in one run.
+fn story(world: &World, row: &'static Row, seed: u64) -> String {
+    let outcome = world.run(row, seed);
+    let mut text = format!(
+        "\n{}: {}; {}, {} km/h, fault at {:.3} s\n",
+        row.name,
+        row.injected,
+        outcome.driver,
+        outcome.speed_kmh,
+        f64::from(outcome.onset_ms) * 1e-3
+    );
+    for event in outcome.reported {
+        text.push_str(&format!("  {:.3} s  {}\n", event.time_s, event.what));
+    }
+    text
+}

@@ -1,0 +1,52 @@
+//! The table of faults in words, as `host-sim faults --list` prints it and `docs/safety.md` holds it.
+
+use super::table::{Expect, GROUPS, Row};
+
+/// All rows as Markdown tables, one for each group.
+pub fn table_of_faults() -> String {
+    let mut text = String::new();
+    for group in GROUPS {
+        text.push_str(&format!(
+            "### {}\n\n| fault | what is injected | class | reaction | torque at most | where |\n\
+             |---|---|---|---|---|---|\n",
+            group.name
+        ));
+        for row in group.rows {
+            text.push_str(&format!(
+                "| `{}` | {} | {} | {} | {} N.m | {} |\n",
+                row.name,
+                row.injected,
+                row.class,
+                reaction(row),
+                row.torque_nm,
+                row.place
+            ));
+        }
+        text.push('\n');
+    }
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+    text
+}
+
+fn reaction(row: &Row) -> String {
+    let within = |what: &str| format!("{what} within {} ms {}", row.deadline_ms, row.seen.since());
+    match row.expect {
+        Expect::GoesOn { rejects: true } => "goes on, rejects".into(),
+        Expect::GoesOn { rejects: false } => "goes on".into(),
+        Expect::Uncut => "goes on, not cut".into(),
+        Expect::MayHandOver => "goes on, or hands over once it looks impossible".into(),
+        Expect::OnlyRules => "whatever the rules of every cycle allow".into(),
+        Expect::MayStop => "goes on, or zero and latched".into(),
+        Expect::HandsOverOrStops => within("hands over, or zero and latched,"),
+        Expect::Reaches { mode, .. } => within(match mode {
+            super::guard::ACTIVE => "engages from zero",
+            super::guard::FADE => "fades",
+            super::guard::HANDOVER => "hands over",
+            super::guard::FAULT => "zero and latched",
+            _ => "locked",
+        }),
+        Expect::Restarts { .. } => within("starts anew into Standby, says the cause,"),
+        Expect::Yields => within("zero while opposed"),
+    }
+}

@@ -1,0 +1,33 @@
+//! The fault campaign: every fault that the ECU must survive, injected by name into the closed loop.
+//!
+//! A *row* is one fault of the table with its class, deadline and torque bound. A *trial* is one run of a row with
+//! one seed. Faults are injected between the world and the ECU, in a sensor's value, on the bus, in the clock, in
+//! memory, in the motor; whatever reaches the ECU goes through the shipping receive and step. In every cycle a
+//! guard that shares nothing with the core checks what must always hold.
+//!
+//! ```text
+//! world -> senders -> bus -> Ecu -> motor -> world        guard: frames in and out, every cycle
+//!            ^         ^      ^       ^                   residual: since when the fault can be seen
+//!            +--- one injection ------+                   verdict: class, deadline, torque bound
+//! ```
+//!
+//! Not here: faults that only a target has (watchdog, stack, processor fault). They are in the table, marked Q,
+//! and run in QEMU.
+
+mod bytes;
+pub mod campaign;
+pub mod document;
+pub mod drivers;
+mod guard;
+mod injection;
+mod residual;
+mod seat;
+mod senders;
+pub mod table;
+mod trial;
+mod verdict;
+mod wire;
+
+pub use guard::Broken;
+pub use residual::Seen;
+pub use trial::{Outcome, World};

@@ -1,0 +1,405 @@
+//! The table of faults: what a row is, and all of them. The rows themselves are in `rows`.
+//!
+//! | class | when | what |
+//! |---|---|---|
+//! | L | an extreme but valid input | limit, stay Active |
+//! | R | a bad frame | reject it, go on with the last good one |
+//! | A | the request ends, the vehicle is too slow | planned fade |
+//! | B | an input is lost or cannot be true | handover over 2 s |
+//! | C | computation, memory, time, output | zero within 20 ms, latched |
+//! | D | the driver opposes | the override bound, at once |
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::injection::{Injection, Start};
+use super::residual::Seen;
+
+mod bus;
+mod inputs;
+mod memory;
+mod time;
+
+/// Class of a reaction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Class {
+    /// Limit and go on.
+    L,
+    /// Reject and go on.
+    R,
+    /// Planned fade.
+    A,
+    /// Handover.
+    B,
+    /// Zero at once.
+    C,
+    /// Leave it to the driver.
+    D,
+}
+
+impl fmt::Display for Class {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::L => "L",
+            Self::R => "R",
+            Self::A => "A",
+            Self::B => "B",
+            Self::C => "C",
+            Self::D => "D",
+        })
+    }
+}
+
+/// Where a row is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Place {
+    /// Here only.
+    Host,
+    /// Here, and on the target in QEMU.
+    Both,
+    /// On the target only: a host has no watchdog, no stack to overflow.
+    Target,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Host => "host",
+            Self::Both => "host, Q",
+            Self::Target => "Q",
+        })
+    }
+}
+
+/// What has to happen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Expect {
+    /// Guidance goes on; no frame that was tampered with is accepted if `rejects`.
+    GoesOn {
+        /// Whether tampered frames must be rejected.
+        rejects: bool,
+    },
+    /// Guidance goes on and no limit for the driver's sake acts.
+    Uncut,
+    /// Guidance goes on until the fault can be seen, and may then hand over.
+    MayHandOver,
+    /// Guidance goes on, or stops for good.
+    MayStop,
+    /// Nothing but the rules of every cycle.
+    OnlyRules,
+    /// Hands over or stops for good.
+    HandsOverOrStops,
+    /// The first mode after Active, or after a fade where there is one on the way.
+    Reaches {
+        /// The mode.
+        mode: u64,
+        /// Whether a fade may come before.
+        fading: bool,
+    },
+    /// The ECU starts anew with this cause in its status frame, and waits in Standby.
+    Restarts {
+        /// The cause.
+        reset: u64,
+    },
+    /// The torque is zero in Active while the driver opposes.
+    Yields,
+}
+
+/// One fault of the list.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// By which it is asked for.
+    pub name: &'static str,
+    /// What is injected.
+    pub injected: &'static str,
+    /// Class of the reaction.
+    pub class: Class,
+    /// What has to happen.
+    pub expect: Expect,
+    /// Within this time of the instant in which the fault can be seen, ms.
+    pub deadline_ms: u32,
+    /// What it can be seen by.
+    pub seen: Seen,
+    /// Largest torque from the onset on, N.m.
+    pub torque_nm: f64,
+    /// Where it is run.
+    pub place: Place,
+    pub(super) injections: &'static [Injection],
+    /// How long it lasts, ms; to the end of the run if `None`.
+    pub(super) lasts_ms: Option<u32>,
+    pub(super) start: Start,
+    /// Whether the onset follows a lane preview, and not any instant.
+    pub(super) after_sample: bool,
+}
+
+/// A list of rows under a heading.
+#[derive(Debug, Clone, Copy)]
+pub struct Group {
+    /// Its name.
+    pub name: &'static str,
+    /// Its rows.
+    pub rows: &'static [Row],
+}
+
+/// Every row.
+pub const GROUPS: [Group; 4] = [
+    Group {
+        name: "Inputs",
+        rows: inputs::ROWS,
+    },
+    Group {
+        name: "Bus",
+        rows: bus::ROWS,
+    },
+    Group {
+        name: "Time",
+        rows: time::ROWS,
+    },
+    Group {
+        name: "Memory and power",
+        rows: memory::ROWS,
+    },
+];
+
+/// Every row, in order.
+pub fn rows() -> impl Iterator<Item = &'static Row> {
+    GROUPS.iter().flat_map(|group| group.rows)
+}
+
+/// Reaction to an input that is stale: 30 ms of age, seen in the next cycle. The last good sample may be older
+/// than the onset, never younger.
+const STALE_MS: u32 = 31;
+/// Reaction to a contradiction, from the instant in which it can be seen.
+const CONTRADICTION_MS: u32 = 200;
+/// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
+/// no fault may draw more.
+const ORDINARY_NM: f64 = 2.0;
+
+/// A row that goes on unless it says otherwise.
+const fn row(name: &'static str, injected: &'static str, injections: &'static [Injection]) -> Row {
+    Row {
+        name,
+        injected,
+        class: Class::L,
+        expect: Expect::GoesOn { rejects: false },
+        deadline_ms: 0,
+        seen: Seen::AtOnce,
+        torque_nm: ORDINARY_NM,
+        place: Place::Host,
+        injections,
+        lasts_ms: None,
+        start: Start::Engaged,
+        after_sample: false,
+    }
+}
+
+const fn reaches(mode: u64) -> Expect {
+    Expect::Reaches { mode, fading: false }
+}
+
+impl Row {
+    /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.
+    pub fn deadline_ms(&self) -> Option<u32> {
+        let asked = !matches!(
+            self.expect,
+            Expect::GoesOn { .. } | Expect::Uncut | Expect::MayHandOver | Expect::MayStop | Expect::OnlyRules
+        );
+        asked.then_some(self.deadline_ms)
+    }
+
+    const fn rejected(self) -> Self {
+        Self {
+            class: Class::R,
+            expect: Expect::GoesOn { rejects: true },
+            ..self
+        }
+    }
+
+    /// Nothing to reject, nothing to react to: the last good value bridges it.
+    const fn bridged(self) -> Self {
+        Self {
+            class: Class::R,
+            ..self
+        }
+    }
+
+    const fn fades(self, deadline_ms: u32) -> Self {
+        Self {
+            class: Class::A,
+            expect: reaches(super::guard::FADE),
+            deadline_ms,
+            ..self
+        }
+    }
+
+    const fn hands_over(self, deadline_ms: u32) -> Self {
+        Self {
+            class: Class::B,
+            expect: reaches(super::guard::HANDOVER),
+            deadline_ms,
+            ..self
+        }
+    }
+
+    /// Once what arrives contradicts itself.
+    const fn contradicts(self) -> Self {
+        Self {
+            seen: Seen::Contradiction,
+            ..self.hands_over(CONTRADICTION_MS)
+        }
+    }
+
+    const fn may_hand_over(self) -> Self {
+        Self {
+            expect: Expect::MayHandOver,
+            deadline_ms: CONTRADICTION_MS,
+            seen: Seen::Contradiction,
+            ..self
+        }
+    }
+
+    const fn stops(self, deadline_ms: u32) -> Self {
+        Self {
+            class: Class::C,
+            expect: reaches(super::guard::FAULT),
+            deadline_ms,
+            ..self
+        }
+    }
+
+    const fn locks(self) -> Self {
+        Self {
+            class: Class::C,
+            expect: reaches(super::guard::LOCKED),
+            deadline_ms: 20,
+            torque_nm: 0.0,
+            ..self
+        }
+    }
+
+    const fn yields(self, deadline_ms: u32) -> Self {
+        Self {
+            class: Class::D,
+            expect: Expect::Yields,
+            deadline_ms,
+            ..self
+        }
+    }
+
+    const fn opposed(self) -> Self {
+        Self {
+            class: Class::D,
+            ..self
+        }
+    }
+
+    /// Frames that a fault leaves too far apart may be stale.
+    const fn gaps_may_hand_over(self) -> Self {
+        Self {
+            class: Class::R,
+            expect: Expect::MayHandOver,
+            ..self
+        }
+    }
+
+    const fn hands_over_or_stops(self, deadline_ms: u32) -> Self {
+        Self {
+            expect: Expect::HandsOverOrStops,
+            ..self.hands_over(deadline_ms)
+        }
+    }
+
+    const fn only_rules(self) -> Self {
+        Self {
+            expect: Expect::OnlyRules,
+            ..self
+        }
+    }
+
+    const fn may_stop(self) -> Self {
+        Self {
+            class: Class::C,
+            expect: Expect::MayStop,
+            ..self
+        }
+    }
+
+    const fn after_fade(self) -> Self {
+        Self {
+            expect: Expect::Reaches {
+                mode: super::guard::FAULT,
+                fading: true,
+            },
+            ..self
+        }
+    }
+
+    /// `reset` is the cause in the status frame: 1 watchdog, 2 processor fault, 3 panic, 4 stack, 5 brown-out.
+    const fn restarts(self, reset: u64, deadline_ms: u32) -> Self {
+        Self {
+            class: Class::C,
+            expect: Expect::Restarts { reset },
+            deadline_ms,
+            ..self
+        }
+    }
+
+    const fn engages(self) -> Self {
+        Self {
+            expect: reaches(super::guard::ACTIVE),
+            deadline_ms: 12,
+            ..self
+        }
+    }
+
+    const fn uncut(self) -> Self {
+        Self {
+            expect: Expect::Uncut,
+            ..self
+        }
+    }
+
+    const fn seen(self, seen: Seen) -> Self {
+        Self { seen, ..self }
+    }
+
+    const fn after_sample(self) -> Self {
+        Self {
+            after_sample: true,
+            ..self
+        }
+    }
+
+    const fn torque(self, torque_nm: f64) -> Self {
+        Self { torque_nm, ..self }
+    }
+
+    const fn lasts(self, ms: u32) -> Self {
+        Self {
+            lasts_ms: Some(ms),
+            ..self
+        }
+    }
+
+    const fn from(self, start: Start) -> Self {
+        Self { start, ..self }
+    }
+
+    /// Also run in QEMU.
+    const fn q(self) -> Self {
+        Self {
+            place: Place::Both,
+            ..self
+        }
+    }
+
+    /// Run in QEMU only.
+    const fn only_q(self) -> Self {
+        Self {
+            place: Place::Target,
+            ..self
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The bus between the senders and the ECU, and what is wrong with it.
+//!
+//! Without a fault a frame arrives in the step in which it is sent, in order. A frame that a fault has touched is
+//! marked, so that a run can tell whether the ECU accepted what it had to reject.
+
+use std::collections::VecDeque;
+
+use haptic_core::bus::Frame;
+use rand::RngExt;
+use rand::rngs::Xoshiro256PlusPlus;
+
+use super::bytes::{self, COLUMN, DEMAND, LANE, VEHICLE};
+use super::injection::{Injection, Wire};
+
+/// The senders' messages, in the order of their counters.
+pub(super) const MESSAGES: [u16; 4] = [LANE, COLUMN, VEHICLE, DEMAND];
+
+/// A frame at the ECU's door.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrival {
+    pub(super) frame: Frame,
+    /// Whether a receiver has to reject it.
+    pub(super) bad: bool,
+}
+
+/// What the bus remembers.
+#[derive(Debug, Clone)]
+pub(super) struct Bus {
+    /// Everything sent, by step, as long as a replay may need it.
+    log: VecDeque<Vec<Frame>>,
+    log_length: usize,
+    /// By message: frames since the onset.
+    since_onset: [u32; 4],
+    /// By message: counter at the onset.
+    counters: [Option<u8>; 4],
+    /// By message: a frame that waits for its successor.
+    waiting: [Option<Frame>; 4],
+    /// Frames on their way, with the step in which they arrive.
+    late: VecDeque<(u32, Frame)>,
+    /// By message: when the last one arrives.
+    last_due: [u32; 4],
+}
+
+impl Bus {
+    pub(super) fn new(injections: &[Injection]) -> Self {
+        let log_length = injections.iter().find_map(|injection| match injection {
+            Injection::Wire(Wire::Replayed(ms)) => Some(*ms),
+            _ => None,
+        });
+        Self {
+            log: VecDeque::new(),
+            log_length: log_length.unwrap_or(0),
+            since_onset: [0; 4],
+            counters: [None; 4],
+            waiting: [None; 4],
+            late: VecDeque::new(),
+            last_due: [0; 4],
+        }
+    }
+
+    /// How often the senders have to send in this step, where it is not once.
+    pub(super) fn rush(injections: &[Injection], acts: bool) -> Option<u8> {
+        injections.iter().find_map(|injection| match injection {
+            Injection::Wire(Wire::Rushed(times)) if acts => Some(*times),
+            _ => None,
+        })
+    }
+
+    /// Takes what is sent in a step, returns what arrives.
+    pub(super) fn carry(
+        &mut self,
+        step: u32,
+        sent: &[Frame],
+        injections: &[Injection],
+        acts: bool,
+        dice: &mut Xoshiro256PlusPlus,
+        arrivals: &mut Vec<Arrival>,
+    ) {
+        arrivals.clear();
+        if self.log_length > 0 {
+            self.log.push_back(sent.to_vec());
+        }
+        let replayed = (self.log.len() > self.log_length)
+            .then(|| self.log.pop_front())
+            .flatten();
+        let wire = injections.iter().find_map(|injection| match injection {
+            Injection::Wire(wire) if acts => Some(*wire),
+            _ => None,
+        });
+        if let Some(Wire::Replayed(_)) = wire {
+            let frames = replayed.unwrap_or_default();
+            arrivals.extend(frames.iter().map(|frame| Arrival {
+                frame: *frame,
+                bad: true,
+            }));
+            return;
+        }
+        for frame in sent {
+            let sender = MESSAGES.iter().position(|id| *id == frame.id()).unwrap_or(0);
+            match wire {
+                Some(wire) => {
+                    self.disturb(wire, step, sender, frame, dice, arrivals);
+                    self.since_onset[sender] += 1;
+                }
+                None => arrivals.push(good(*frame)),
+            }
+        }
+        while self.late.front().is_some_and(|(due, _)| *due <= step) {
+            arrivals.extend(self.late.pop_front().map(|(_, frame)| good(frame)));
+        }
+    }
+
+    fn disturb(
+        &mut self,
+        wire: Wire,
+        step: u32,
+        sender: usize,
+        frame: &Frame,
+        dice: &mut Xoshiro256PlusPlus,
+        arrivals: &mut Vec<Arrival>,
+    ) {
+        let within = |frames: Option<u32>| frames.is_none_or(|n| self.since_onset[sender] < n);
+        let counter = bytes::unsigned(frame, 8, 4) as u8;
+        match wire {
+            Wire::Lost(ids, frames) => {
+                if !(ids.contains(&frame.id()) && within(frames)) {
+                    arrivals.push(good(*frame));
+                }
+            }
+            Wire::Twice => arrivals.extend([good(*frame), bad(*frame)]),
+            Wire::Swapped => match self.waiting[sender].take() {
+                None => self.waiting[sender] = Some(*frame),
+                Some(earlier) => arrivals.extend([good(*frame), bad(earlier)]),
+            },
+            Wire::CounterFrozen => {
+                let frozen = *self.counters[sender].get_or_insert(counter);
+                let first = self.since_onset[sender] == 0;
+                let frame = bytes::with_counter(frame, frozen);
+                arrivals.push(Arrival { frame, bad: !first });
+            }
+            Wire::Flipped(frames) => {
+                if within(frames) {
+                    let bit = dice.random_range(0..64);
+                    arrivals.push(bad(bytes::with_bit_flipped(frame, bit)));
+                } else {
+                    arrivals.push(good(*frame));
+                }
+            }
+            Wire::Field {
+                id,
+                start,
+                bits,
+                value,
+                frames,
+            } => {
+                if frame.id() == id && within(frames) {
+                    arrivals.push(bad(bytes::with_field(frame, start, bits, value)));
+                } else {
+                    arrivals.push(good(*frame));
+                }
+            }
+            Wire::Masquerade => {
+                let other = MESSAGES[(sender + 1) % MESSAGES.len()];
+                arrivals.extend([good(*frame), bad(bytes::renamed(other, frame.data()))]);
+            }
+            Wire::Short => arrivals.push(bad(bytes::renamed(frame.id(), &frame.data()[..7]))),
+            Wire::Renamed => arrivals.push(good(bytes::renamed(frame.id() ^ 0x400, frame.data()))),
+            Wire::Rushed(times) => {
+                let again = |ahead| good(bytes::with_counter(frame, counter.wrapping_add(ahead)));
+                arrivals.extend((0..times).map(again));
+            }
+            Wire::Jittered(ms) => {
+                // In order: none arrives before the one that was sent before it.
+                let due = (step + dice.random_range(0..=ms)).max(self.last_due[sender]);
+                self.last_due[sender] = due;
+                let place = self.late.partition_point(|(other, _)| *other <= due);
+                self.late.insert(place, (due, *frame));
+            }
+            // Handled with the whole step.
+            Wire::Replayed(_) => {}
+        }
+    }
+}
+
+fn good(frame: Frame) -> Arrival {
+    Arrival { frame, bad: false }
+}
+
+fn bad(frame: Frame) -> Arrival {
+    Arrival { frame, bad: true }
+}

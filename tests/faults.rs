@@ -1,0 +1,137 @@
+//! The fault campaign in small: a few seeds of every fault, and the table of faults as the document has it.
+
+use std::collections::BTreeSet;
+
+use host_sim::faults::table::{Place, Row, rows};
+use host_sim::faults::{World, campaign, document};
+
+#[test]
+fn every_fault_with_a_few_seeds_breaks_no_rule() {
+    let here: Vec<&'static Row> = rows().filter(|row| row.place != Place::Target).collect();
+    let campaign = campaign::run(&World::new(), &here, 1..5, || ());
+    let failed: Vec<_> = campaign.failures().collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    // Four runs of 4.7 to 6.2 s each; a step every millisecond but for the faults of time.
+    let least = here.len() as u64 * 4 * 4700;
+    assert!(campaign.cycles > least * 9 / 10, "{} cycles", campaign.cycles);
+}
+
+/// A campaign that cannot see its faults would pass as well: a fault that is declared must be seen often enough.
+#[test]
+fn contradictions_are_seen() {
+    let by_name = |name: &str| rows().find(|row| row.name == name).expect("a row of the table");
+    let seen = |name| {
+        let campaign = campaign::run(&World::new(), &[by_name(name)], 1..11, || ());
+        campaign.rows[0].seen
+    };
+    for name in [
+        "lateral-error-frozen",
+        "lateral-error-flipped",
+        "yaw-error-flipped",
+        "all-frozen",
+        "motor-half",
+    ] {
+        assert!(seen(name) >= 8, "{name}: {} of 10", seen(name));
+    }
+}
+
+/// The list that a controller has to survive, by the number of rows that each entry needs at least.
+#[test]
+fn names_are_unique_and_every_group_is_there() {
+    let names: BTreeSet<&str> = rows().map(|row| row.name).collect();
+    assert_eq!(names.len(), rows().count(), "a name is used twice");
+    for wanted in [
+        "lateral-error-frozen",
+        "yaw-error-frozen",
+        "all-frozen",
+        "lane-invalid",
+        "lateral-error-beyond",
+        "lateral-error-step",
+        "lateral-error-flipped",
+        "lateral-rate-flipped",
+        "lateral-error-drifting",
+        "lateral-error-x0",
+        "lateral-error-x2",
+        "lateral-error-x10",
+        "noise-3-sigma",
+        "noise-10-sigma",
+        "driver-torque-zero",
+        "driver-torque-full-left",
+        "driver-torque-flipped",
+        "driver-torque-scaled",
+        "driver-opposes-0.80",
+        "driver-opposes-0.81",
+        "driver-opposes-2.47",
+        "driver-opposes-10",
+        "driver-taps",
+        "speed-zero",
+        "speed-negative",
+        "speed-jumping",
+        "speeds-apart",
+        "heading-wraps",
+        "silence-20",
+        "silence-31",
+        "silence-1000",
+        "lost-1",
+        "lost-3",
+        "lost-4",
+        "lost-10",
+        "duplicates",
+        "reordering",
+        "replay",
+        "counter-frozen",
+        "counter-wrap",
+        "crc-wrong-1",
+        "crc-wrong-5",
+        "crc-wrong",
+        "masquerade",
+        "wrong-length",
+        "wrong-identifier",
+        "ten-times-the-rate",
+        "jitter",
+        "request-toggles",
+        "bus-off",
+        "clock-fast",
+        "clock-slow",
+        "clock-wraps",
+        "tick-late-2",
+        "tick-late-5",
+        "tick-late-15",
+        "deadline-missed-1",
+        "deadline-missed-2",
+        "two-runs",
+        "endless-loop",
+        "task-skipped",
+        "hard-fault",
+        "panic",
+        "stack-overflow",
+        "flip-state",
+        "flip-gains",
+        "parameters-bad",
+        "parameters-absurd",
+        "page-half-written",
+        "law-forced",
+        "law-random",
+        "monitor-agrees",
+        "motor-ignores",
+        "motor-half",
+        "brown-out",
+        "three-resets",
+        "engage-in-curve",
+        "request-drops",
+        "motor-dead",
+        "motor-reversed",
+    ] {
+        assert!(names.contains(wanted), "{wanted} is missing");
+    }
+}
+
+#[test]
+fn the_document_has_the_table_of_faults() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/safety.md");
+    let text = std::fs::read_to_string(path).expect("docs/safety.md");
+    assert!(
+        text.contains(&document::table_of_faults()),
+        "docs/safety.md is not what `host-sim faults --list` prints"
+    );
+}
