@@ -117,7 +117,7 @@ enum Work {
     Conclude(Change),
 }
 
-/// A supposed change: its squared significance, and the mean and the number of readings since.
+/// A supposed change: its significance, 1 where it is one, and the mean and the number of readings since.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Change {
     significance: f32,
@@ -149,8 +149,12 @@ const FIRST_REPORT: u8 = 5;
 const LONGEST: usize = 14;
 /// The fewest readings on either side of a change.
 const SHORTEST: u8 = 3;
-/// Squared significance of a change. Lower, and noise alone drops the memory too often.
-const CHANGE: f32 = 3.3 * 3.3;
+/// How many standard deviations the means before and after a change differ by, at least; more where few
+/// readings are all there is. Noise alone drops the memory once in 15 minutes. Squared.
+const CHANGE: f32 = 3.1 * 3.1;
+const CHANGE_OF_FEW: f32 = 3.8 * 3.8;
+/// So many are few no longer.
+const FEW: u8 = 6;
 /// Variance of a reading before the first one, at the amplitude of [`PRIOR_NM`], and how many readings this
 /// prior counts for: 0.1 N.m of driver noise gives 0.15 to 0.2.
 const PRIOR_VARIANCE: f32 = 0.18 * 0.18;
@@ -325,7 +329,8 @@ impl Average {
         let mean_before = (f32::from(self.count) * self.mean - sum) / old;
         let difference = mean - mean_before;
         let variance = OVERLAP_DIFFERENCE * self.variance() * (1.0 / new + 1.0 / old);
-        let significance = difference * difference / variance;
+        let least = if length < FEW { CHANGE_OF_FEW } else { CHANGE };
+        let significance = difference * difference / (variance * least);
         let better = length >= SHORTEST && significance > best.significance;
         let best = if better {
             Change {
@@ -340,7 +345,7 @@ impl Average {
     }
 
     fn conclude(&mut self, change: Change) -> Option<Reading> {
-        if change.significance > CHANGE {
+        if change.significance > 1.0 {
             (self.mean, self.count) = (change.mean, change.count);
         }
         let variance = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;

@@ -110,11 +110,13 @@ pub fn observe<O: Observer>(
     Ok(match (scenario.condition, scenario.sensors) {
         (Condition::Manual, _) => drive(scenario, centreline, &mut NoGuidance, observer),
         (_, Sensors::Exact) => {
-            let mut guidance = Direct::new(&setup).with_probe(probe);
+            let mut guidance = Direct::new(&setup);
+            guidance.set_probe(probe);
             drive(scenario, centreline, &mut guidance, observer)
         }
         (_, Sensors::Paper) => {
-            let mut guidance = OverBus::new(&setup).with_probe(probe);
+            let mut guidance = OverBus::new(&setup);
+            guidance.set_probe(probe);
             drive(scenario, centreline, &mut guidance, observer)
         }
     })

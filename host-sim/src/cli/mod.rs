@@ -11,6 +11,7 @@ mod faults;
 mod handover;
 mod pil;
 mod progress;
+mod reliance;
 mod run;
 mod table;
 
@@ -48,6 +49,8 @@ enum Command {
     Pil(pil::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
+    /// How well the ECU reads the drivers' reliance from its probe, against the truth
+    Reliance(reliance::Arguments),
 }
 
 /// How a command ended that could do its work.
@@ -78,6 +81,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
+        Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };
     match result {
         Ok(Outcome::Good) => ExitCode::SUCCESS,

@@ -46,6 +46,14 @@ fn readable(single: &SingleRun) -> String {
         let value = number((definition.value)(&record.metrics), 4);
         lines.push(vec![definition.label.into(), value, definition.unit.into()]);
     }
+    if let Some([k_hg, deviation]) = results.reliance {
+        let line = [
+            "K_hg, as the ECU reads it",
+            &format!("{k_hg:.3}"),
+            &format!("+- {deviation:.3}"),
+        ];
+        lines.push(line.map(String::from).to_vec());
+    }
     let ended = if record.diverged {
         format!("DIVERGED at {:.0} m", record.end_m)
     } else {

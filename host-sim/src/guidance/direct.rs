@@ -28,9 +28,9 @@ impl Direct {
         }
     }
 
-    /// As it is, with the probe asked for or not.
-    pub fn with_probe(self, probe: bool) -> Self {
-        Self { probe, ..self }
+    /// Whether the host asks for the probe from now on. At first it does not.
+    pub fn set_probe(&mut self, probe: bool) {
+        self.probe = probe;
     }
 }
 

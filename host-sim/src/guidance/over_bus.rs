@@ -54,9 +54,9 @@ impl OverBus {
         }
     }
 
-    /// As it is, with the probe asked for or not.
-    pub fn with_probe(self, probe: bool) -> Self {
-        Self { probe, ..self }
+    /// Whether the host asks for the probe from now on. At first it does not.
+    pub fn set_probe(&mut self, probe: bool) {
+        self.probe = probe;
     }
 
     /// The frames that the senders put on the bus in this step.

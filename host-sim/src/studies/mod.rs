@@ -5,6 +5,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`run`]: one scenario.
 //! - [`bus_load`]: how full the CAN bus is at worst.
+//! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //! - [`processor`]: one scenario with the ECU's image in QEMU beside the host's.
 //!
 //! Not here: options and exit codes (the command line), how a metric is computed, how a figure is drawn.
@@ -15,8 +16,14 @@ mod curves;
 pub mod evaluate;
 mod evaluation_files;
 pub mod handover;
+/// The participants of the paper's experiment.
+pub mod experiment {
+    mod participants;
+    pub use participants::{Participant, PublishedDriver, participants};
+}
 pub mod processor;
 mod record;
+pub mod reliance;
 pub mod run;
 mod run_files;
 

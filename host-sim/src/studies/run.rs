@@ -5,8 +5,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::record::default_window;
+use super::reliance::Readings;
 use super::{OutputError, RunRecord, run_files};
-use crate::closed_loop::{Run, observe, simulate};
+use crate::closed_loop::{Cycle, Observer, Run, observe, simulate};
 use crate::ecu_events::EcuEvents;
 use crate::models::road::Centreline;
 use crate::report::Event;
@@ -21,6 +22,8 @@ pub struct SingleRun {
     pub run: Run,
     /// What the ECU said of itself, from its frames.
     pub reported: Vec<Event>,
+    /// What the ECU said of the driver's reliance; nothing past the bus.
+    pub readings: Readings,
     /// What is handed on.
     pub results: SingleResults,
 }
@@ -40,6 +43,8 @@ pub struct SingleResults {
     pub failure_time_s: Option<f64>,
     /// Seed of the remnant.
     pub seed: u64,
+    /// The ECU's last estimate of K_hg and its standard deviation, if it identified any.
+    pub reliance: Option<[f64; 2]>,
     /// Stretch that was measured, m: the paper's curve on its course, else all of it.
     pub window_m: [f64; 2],
     /// The run's record.
@@ -54,8 +59,11 @@ pub struct SingleResults {
 pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
     let centreline = Centreline::new(&scenario.course);
     let window = default_window(&scenario.course);
-    let mut ecu = EcuEvents::new();
-    let run = observe(&scenario, &centreline, &mut ecu)?;
+    let (mut ecu, mut readings) = (EcuEvents::new(), Readings::default());
+    let run = observe(&scenario, &centreline, &mut |cycle: &Cycle| {
+        ecu.cycle(cycle);
+        readings.cycle(cycle);
+    })?;
     let nominal_peak_m = if scenario.failure.at_s().is_some() {
         let failure = Failure {
             kind: FailureKind::None,
@@ -79,6 +87,7 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
         sensors: scenario.sensors,
         failure_time_s: scenario.failure.at_s(),
         seed: scenario.seed,
+        reliance: readings.readings.iter().rev().find_map(|r| r.estimate),
         window_m: [window.from_m, window.to_m],
         record: RunRecord::new(&scenario, &run, window, nominal_peak_m),
     };
@@ -86,6 +95,7 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
         scenario,
         run,
         reported: ecu.into_events(),
+        readings,
         results,
     })
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::reliance::reliance_panel;
 use super::run::SingleRun;
 use super::{OutputError, curves};
 use crate::closed_loop::Ending;
@@ -45,6 +46,36 @@ fn figure(single: &SingleRun) -> Figure {
         .failure
         .at_s()
         .and_then(|t| samples.iter().find(|s| s.time_s >= t));
+    let mut panels = vec![
+        panel("Lateral error (m)", vec![line("", 0, |s| s.lateral_error_m)]),
+        panel(
+            "Wheel angle (deg)",
+            vec![line("", 0, |s| s.wheel_angle_rad.to_degrees())],
+        ),
+        panel(
+            "Torque (N.m)",
+            vec![
+                line("driver", 0, |s| s.driver_torque_nm),
+                line("guidance", 1, |s| s.guidance_torque_nm),
+            ],
+        ),
+    ];
+    if single.scenario.guidance.probe {
+        let place = |time_s: f64| {
+            let next = samples.partition_point(|s| s.time_s < time_s);
+            samples.get(next).or(samples.last()).map_or(0.0, |s| s.s_m)
+        };
+        let truth: Vec<_> = true_reliance(single)
+            .into_iter()
+            .map(|(t, k_hg)| (place(t), k_hg))
+            .collect();
+        panels.push(reliance_panel(
+            String::new(),
+            &single.readings.readings,
+            &truth,
+            place,
+        ));
+    }
     Figure {
         title: String::new(),
         x: Axis {
@@ -52,20 +83,7 @@ fn figure(single: &SingleRun) -> Figure {
             limits: None,
         },
         same_y: false,
-        panels: vec![
-            panel("Lateral error (m)", vec![line("", 0, |s| s.lateral_error_m)]),
-            panel(
-                "Wheel angle (deg)",
-                vec![line("", 0, |s| s.wheel_angle_rad.to_degrees())],
-            ),
-            panel(
-                "Torque (N.m)",
-                vec![
-                    line("driver", 0, |s| s.driver_torque_nm),
-                    line("guidance", 1, |s| s.guidance_torque_nm),
-                ],
-            ),
-        ],
+        panels,
         markers: failed
             .map(|s| Marker {
                 label: "failure".into(),
@@ -74,6 +92,21 @@ fn figure(single: &SingleRun) -> Figure {
             .into_iter()
             .collect(),
         bands: curves::bands(&single.scenario.course),
+    }
+}
+
+/// K_hg over time, s, for as long as there is guidance.
+fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
+    let scenario = &single.scenario;
+    let last_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
+    let end_s = scenario.failure.at_s().map_or(last_s, |t| t.min(last_s));
+    let start = scenario.gains.k_hg;
+    match &scenario.driver_change {
+        Some(change) if change.time_s < end_s => {
+            let t = change.time_s;
+            vec![(0.0, start), (t, start), (t, change.k_hg), (end_s, change.k_hg)]
+        }
+        _ => vec![(0.0, start), (end_s, start)],
     }
 }
 
@@ -102,7 +135,11 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
                 blocks: vec![
                     Block::Figure {
                         figure,
-                        caption: "Lateral error, wheel angle and torques.".into(),
+                        caption: if single.scenario.guidance.probe {
+                            "Lateral error, wheel angle, torques, and what the ECU says of K_hg.".into()
+                        } else {
+                            "Lateral error, wheel angle and torques.".into()
+                        },
                     },
                     Block::Events(events(single)),
                 ],

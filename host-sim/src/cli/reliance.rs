@@ -1,0 +1,132 @@
+//! `host-sim reliance`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::studies::reliance::{NEAR, Plan, Results, SETTLING_S, study};
+
+use super::table::{self, number};
+use super::{BadInput, Outcome, print, print_json, progress};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Participants of table 6: a number, a list (1,5,9) or a range (1..14)
+    #[arg(long, value_name = "LIST", default_value = "1..14")]
+    participants: String,
+    /// Drives of each participant, each with its own remnant
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    seeds: u32,
+    /// Frequency of the probe, Hz
+    #[arg(long, value_name = "HZ", default_value_t = 2.5)]
+    frequency: f64,
+    /// Amplitude of the probe, N.m
+    #[arg(long, value_name = "NM", default_value_t = 0.2)]
+    amplitude: f64,
+    /// Directory for a figure, the results and a report; default: no files
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the results as one JSON object instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let plan = Plan {
+        participants: numbers(&arguments.participants)?,
+        seeds: arguments.seeds,
+        amplitude_nm: arguments.amplitude,
+        frequency_hz: arguments.frequency,
+    };
+    let drives = plan.participants.len() as u64 * u64::from(plan.seeds);
+    let bar = progress::bar(drives, "drives");
+    let results = study(&plan, || bar.inc(1))?;
+    bar.finish_and_clear();
+    if let Some(directory) = &arguments.out {
+        results.write(directory)?;
+        eprintln!("Report: {}", directory.join("report.html").display());
+    }
+    if arguments.json {
+        print_json(&results)?;
+    } else {
+        print(&readable(&results))?;
+    }
+    Ok(Outcome::Good)
+}
+
+/// `3`, `1,5,9` or `1..14`, the end included.
+fn numbers(text: &str) -> Result<Vec<u32>, String> {
+    let number = |part: &str| part.trim().parse::<u32>();
+    let list = match text.split_once("..") {
+        Some((from, to)) => number(from).and_then(|from| Ok((from..=number(to)?).collect())),
+        None => text.split(',').map(number).collect(),
+    };
+    list.map_err(|e| format!("participants '{text}': {e}; a number, a list (1,5,9) or a range (1..14)"))
+}
+
+fn readable(results: &Results) -> String {
+    let times = || results.pooled.iter().map(|a| format!("{} s", a.after_s));
+    let head = ["participant", "K_hg", "estimate"].map(String::from).into_iter();
+    let head = head
+        .chain(times().map(|t| format!("bias {t}")))
+        .chain(times().map(|t| format!("rms {t}")));
+    let mut lines = vec![head.collect::<Vec<_>>()];
+    for p in &results.participants {
+        let line = [
+            p.participant.to_string(),
+            number(Some(p.truth), 3),
+            number(Some(p.estimate), 3),
+        ];
+        let bias = p.accuracy.iter().map(|a| number(Some(a.bias), 3));
+        let rms = p.accuracy.iter().map(|a| number(Some(a.rms), 3));
+        lines.push(line.into_iter().chain(bias).chain(rms).collect());
+    }
+    let heads = [
+        "after",
+        "estimates",
+        "bias",
+        "rms",
+        "deviation reported",
+        "coverage of 95 %",
+    ];
+    let mut pooled = vec![heads.map(String::from).to_vec()];
+    for a in &results.pooled {
+        pooled.push(vec![
+            format!("{} s", a.after_s),
+            a.count.to_string(),
+            number(Some(a.bias), 4),
+            number(Some(a.rms), 4),
+            number(Some(a.deviation), 4),
+            number(Some(a.coverage), 3),
+        ]);
+    }
+    let settling = &results.settling;
+    let [limited, steps] = results.limited_steps;
+    format!(
+        "Reliance read live: probe {} N.m at {} Hz, {} seeds\n\n{}\n{}\n{} changes of the driver: {:.1} % within \
+         {NEAR} after {SETTLING_S} s (changes by more than 0.3: {:.1} %), rms {:.3}\nlimited: {limited} of {steps} \
+         steps; diverged: {} drives",
+        results.amplitude_nm,
+        results.frequency_hz,
+        results.seeds,
+        table::text(&lines),
+        table::text(&pooled),
+        settling.count,
+        100.0 * settling.near,
+        100.0 * settling.near_after_large,
+        settling.rms,
+        results.diverged,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn participants_as_a_number_a_list_or_a_range() {
+        assert_eq!(numbers("3"), Ok(vec![3]));
+        assert_eq!(numbers("1, 5,9"), Ok(vec![1, 5, 9]));
+        assert_eq!(numbers("2..4"), Ok(vec![2, 3, 4]));
+        assert!(numbers("2..x").unwrap_err().starts_with("participants '2..x': "));
+    }
+}
