@@ -56,6 +56,8 @@ impl Run {
 /// One step as an observer sees it, after the guidance has decided.
 #[derive(Debug, Clone, Copy)]
 pub struct Cycle<'a> {
+    /// Lane errors at the driver's points.
+    pub seen: LaneErrors,
     /// What the guidance could look at.
     pub view: View,
     /// The torque that it gave.
@@ -191,6 +193,7 @@ pub fn drive<G: Guidance, O: Observer>(
             given
         };
         observer.cycle(&Cycle {
+            seen,
             view,
             given,
             applied_torque_nm: applied.torque_nm,

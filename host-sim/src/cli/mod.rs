@@ -7,8 +7,10 @@
 
 mod bus;
 mod evaluate;
+mod experiment;
 mod faults;
 mod handover;
+mod identify;
 mod pil;
 mod progress;
 mod reliance;
@@ -39,6 +41,10 @@ struct Cli {
 enum Command {
     /// The paper's evaluation: 3 drivers, 4 conditions, with and without failure of the guidance
     Evaluate(evaluate::Arguments),
+    /// The paper's participants as drivers with a known truth: driven, identified, driven again
+    Experiment(experiment::Arguments),
+    /// A driver's parameters from a recorded drive, with their uncertainty
+    Identify(identify::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
@@ -76,6 +82,8 @@ pub(crate) fn main() -> ExitCode {
     let result = match cli.command {
         None => evaluate::run(&cli.evaluate),
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
+        Some(Command::Experiment(arguments)) => experiment::run(&arguments),
+        Some(Command::Identify(arguments)) => identify::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),

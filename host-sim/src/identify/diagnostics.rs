@@ -30,25 +30,33 @@ pub fn fit_percent(measured: &[f64], model: impl Iterator<Item = f64>) -> f64 {
     }
 }
 
+/// Autocorrelation of `residual` at lags 1 to `lags`, about zero.
+pub fn autocorrelation(residual: &[f64], lags: usize) -> Vec<f64> {
+    let power: f64 = residual.iter().map(|e| e * e).sum();
+    let at = |lag: usize| {
+        residual
+            .iter()
+            .zip(&residual[lag..])
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / power
+    };
+    (1..=lags.min(residual.len() / 4))
+        .map(|lag| if power > 0.0 { at(lag) } else { 0.0 })
+        .collect()
+}
+
 /// Ljung-Box test of `residual`, of which `estimated` noise parameters were fitted.
 pub(crate) fn whiteness(residual: &[f64], estimated: usize) -> Whiteness {
     let n = residual.len() as f64;
-    let power: f64 = residual.iter().map(|e| e * e).sum();
-    let lags = LAGS.min(residual.len() / 4);
+    let correlations = autocorrelation(residual, LAGS);
+    let lags = correlations.len();
     let mut largest: f64 = 0.0;
     let mut statistic = 0.0;
-    if power > 0.0 {
-        for lag in 1..=lags {
-            let r = residual
-                .iter()
-                .zip(&residual[lag..])
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                / power;
-            statistic += n * (n + 2.0) * r * r / (n - lag as f64);
-            if r.abs() > largest.abs() {
-                largest = r;
-            }
+    for (r, lag) in correlations.into_iter().zip(1..) {
+        statistic += n * (n + 2.0) * r * r / (n - f64::from(lag));
+        if r.abs() > largest.abs() {
+            largest = r;
         }
     }
     let freedom = (lags - estimated.min(lags - 1)) as f64;

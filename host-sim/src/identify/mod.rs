@@ -19,7 +19,7 @@ mod search;
 mod signals;
 mod tracking;
 
-pub use diagnostics::fit_percent;
+pub use diagnostics::{autocorrelation, fit_percent};
 pub use log::{COLUMNS, DriveLog, LogError};
 pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};
 pub use options::{FixError, Options};
@@ -30,4 +30,4 @@ pub use result::{
 };
 pub use search::Termination;
 pub use signals::Muscle;
-pub use tracking::{Course, Tracking, WANDERING_PER_ROOT_S, track};
+pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, track};

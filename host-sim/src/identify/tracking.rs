@@ -41,7 +41,7 @@ const SENSOR_SD_NM: f64 = 0.0015;
 
 /// A parameter over time.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Course {
+pub struct History {
     /// Estimate at each of [`Tracking::time_s`].
     pub estimate: Vec<f64>,
     /// Its standard deviation.
@@ -54,11 +54,11 @@ pub struct Tracking {
     /// Time, s.
     pub time_s: Vec<f64>,
     /// (K_d + K_nms)*a_i.
-    pub gain: [Course; 3],
+    pub gain: [History; 3],
     /// Reaction to the guidance torque.
-    pub k_hg: Course,
+    pub k_hg: History,
     /// Processing delay, s.
-    pub t_p: Course,
+    pub t_p: History,
 }
 
 /// Follows the driver of `log`. Parameters fixed in `options` stay fixed; of a manual drive K_hg stays zero.

@@ -2,7 +2,9 @@
 //!
 //! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
 //! - [`claims`]: what that evaluation must show.
+//! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
+//! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
@@ -15,12 +17,11 @@ pub mod claims;
 mod curves;
 pub mod evaluate;
 mod evaluation_files;
+pub mod experiment;
+mod experiment_files;
 pub mod handover;
-/// The participants of the paper's experiment.
-pub mod experiment {
-    mod participants;
-    pub use participants::{Participant, PublishedDriver, participants};
-}
+pub mod identify;
+mod identify_files;
 pub mod processor;
 mod record;
 pub mod reliance;

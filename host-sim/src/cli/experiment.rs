@@ -1,0 +1,180 @@
+//! `host-sim experiment`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::identify::Muscle;
+use host_sim::studies::experiment::{Drive, Experiment, Plan, experiment};
+
+use super::table::{self, number};
+use super::{BadInput, Outcome, print, print_json, progress};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Participants: numbers and ranges such as 1,3..5
+    #[arg(long, value_name = "LIST", default_value = "1..14", value_parser = numbers)]
+    participants: Numbers,
+    /// Amplitude of the probe in the guided drives, N.m (0: none)
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.0)]
+    probe: f64,
+    /// Seed of the remnants
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Directory for figures, results and a report
+    #[arg(long, value_name = "DIR", default_value = "out/experiment")]
+    out: PathBuf,
+    /// Print the results as one JSON object instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone)]
+struct Numbers(Vec<u32>);
+
+/// Reads `1,3..5` as 1, 3, 4, 5.
+fn numbers(text: &str) -> Result<Numbers, String> {
+    let number = |s: &str| {
+        s.trim()
+            .parse::<u32>()
+            .map_err(|_| format!("{s:?} is not a participant's number"))
+    };
+    let mut all = Vec::new();
+    for part in text.split(',') {
+        match part.split_once("..") {
+            Some((from, to)) => {
+                let (from, to) = (number(from)?, number(to.trim_start_matches('='))?);
+                if from > to || to > 1000 {
+                    return Err(format!("{part:?} is no range of participants"));
+                }
+                all.extend(from..=to);
+            }
+            None => all.push(number(part)?),
+        }
+    }
+    Ok(Numbers(all))
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let plan = Plan {
+        participants: arguments.participants.0.clone(),
+        probe_nm: arguments.probe,
+        seed: arguments.seed,
+    };
+    let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
+    let result = experiment(&plan, || bar.inc(1))?;
+    bar.finish_and_clear();
+    result.write(&arguments.out)?;
+    if arguments.json {
+        print_json(&result)?;
+    } else {
+        print(&readable(&result))?;
+    }
+    eprintln!("Report: {}", arguments.out.join("report.html").display());
+    Ok(Outcome::Good)
+}
+
+fn readable(result: &Experiment) -> String {
+    let headings = [
+        "no",
+        "drive",
+        "",
+        "fit %",
+        "gain_1",
+        "gain_2",
+        "gain_3",
+        "t_p/s",
+        "K_hg",
+        "std error",
+        "path/m",
+    ];
+    let mut lines = vec![headings.map(String::from).to_vec()];
+    for drive in &result.drives {
+        lines.push(truth(drive));
+        for finding in [&drive.noise_model, &drive.paper] {
+            let found = &finding.identification;
+            let p = &found.parameters;
+            // The published method names a number whatever the data say.
+            let value = |p: &host_sim::identify::Parameter, decimals| {
+                number(
+                    if found.method == "paper" {
+                        p.optimum
+                    } else {
+                        p.estimate
+                    },
+                    decimals,
+                )
+            };
+            lines.push(vec![
+                String::new(),
+                String::new(),
+                found.method.into(),
+                number(Some(found.fit_percent), 1),
+                value(&p.gain_1, 3),
+                value(&p.gain_2, 3),
+                value(&p.gain_3, 2),
+                value(&p.t_p, 3),
+                value(&p.k_hg, 3),
+                number(p.k_hg.standard_error, 3),
+                number(finding.trajectory_error_m, 3),
+            ]);
+        }
+    }
+    let mean = |guided: bool, value: fn(&Drive) -> Option<f64>| {
+        let values: Vec<f64> = result
+            .drives
+            .iter()
+            .filter(|d| d.guided == guided)
+            .filter_map(value)
+            .collect();
+        number(
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64),
+            3,
+        )
+    };
+    let [low, middle, high] = result.published_trajectory_error_m;
+    format!(
+        "{}, probe {} N.m, seed {}; a dash: not identified\n\n{}\n\
+         Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69)\n\
+         Mean trajectory error, guided: noise model {} m, published method {} m (the paper: {middle}, {low} to {high})",
+        result.course,
+        result.probe_nm,
+        result.seed,
+        table::text(&lines),
+        mean(false, |d| Some(d.paper.identification.fit_percent)),
+        mean(true, |d| Some(d.paper.identification.fit_percent)),
+        mean(true, |d| d.noise_model.trajectory_error_m),
+        mean(true, |d| d.paper.trajectory_error_m),
+    )
+}
+
+fn truth(drive: &Drive) -> Vec<String> {
+    let t = &drive.truth;
+    let sum = t.k_d + Muscle::default().k_nms;
+    vec![
+        drive.participant.to_string(),
+        if drive.guided { "guided" } else { "manual" }.into(),
+        "truth".into(),
+        number(Some(t.fitness), 1),
+        number(Some(sum * t.a_1), 3),
+        number(Some(sum * t.a_2), 3),
+        number(Some(sum * t.a_3), 2),
+        number(Some(t.t_p), 3),
+        number(t.k_hg, 3),
+        number(None, 0),
+        number(None, 0),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::numbers;
+
+    #[test]
+    fn lists_and_ranges_of_participants() {
+        assert_eq!(numbers("1,3..5").unwrap().0, [1, 3, 4, 5]);
+        assert_eq!(numbers("2..=3").unwrap().0, [2, 3]);
+        for bad in ["", "a", "5..3", "1..99999999"] {
+            assert!(numbers(bad).is_err(), "{bad}");
+        }
+    }
+}

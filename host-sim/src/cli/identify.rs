@@ -1,0 +1,209 @@
+//! `host-sim identify LOG.csv`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use host_sim::identify::{DriveLog, Identification, Options};
+use host_sim::models::road::{Course, PAPER_COURSE};
+use host_sim::scenario::DEFAULT_SPEED_KMH;
+use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
+
+use super::table::{self, number};
+use super::{BadInput, Outcome, print, print_json};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Recorded drive (CSV): time_s, e_y_m, e_theta_rad (the driver's points), wheel_angle_rad,
+    /// guidance_torque_nm, driver_torque_nm
+    #[arg(value_name = "LOG.csv")]
+    log: PathBuf,
+    /// A drive without guidance: there is no K_hg, and guidance_torque_nm may be missing
+    #[arg(long)]
+    manual: bool,
+    /// Prediction errors with a disturbance model, or the published way
+    #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
+    method: MethodArgument,
+    /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms);
+    /// may be repeated
+    #[arg(long, value_name = "NAME=VALUE")]
+    fix: Vec<String>,
+    /// Let the identified driver drive this course (TOML, or paper-course)
+    #[arg(long, value_name = "FILE")]
+    course: Option<PathBuf>,
+    /// Speed on that course, km/h (20 to 250)
+    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH)]
+    speed: f64,
+    /// Directory for figures, results and a report
+    #[arg(long, value_name = "DIR", default_value = "out/identify")]
+    out: PathBuf,
+    /// Print the results as one JSON object instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MethodArgument {
+    Paper,
+    NoiseModel,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let mut options = Options {
+        manual: arguments.manual,
+        ..Options::default()
+    };
+    for assignment in &arguments.fix {
+        options.fix(assignment)?;
+    }
+    let method = match arguments.method {
+        MethodArgument::Paper => Method::Paper,
+        MethodArgument::NoiseModel => Method::NoiseModel,
+    };
+    let log = DriveLog::open(&arguments.log, arguments.manual)?;
+    let name = arguments.log.display().to_string();
+    let mut drive = identify(&name, &log, &options, method)?;
+    if let Some(path) = &arguments.course {
+        let course = if path.as_os_str() == PAPER_COURSE {
+            Course::paper()
+        } else {
+            Course::load(path)?
+        };
+        drive.drive_again(course, arguments.speed, &options)?;
+    }
+    drive.write(&arguments.out)?;
+    if arguments.json {
+        print_json(&drive.results)?;
+    } else {
+        print(&readable(&drive))?;
+    }
+    eprintln!("Report: {}", arguments.out.join("report.html").display());
+    Ok(Outcome::Good)
+}
+
+fn readable(drive: &IdentifiedDrive) -> String {
+    let found = &drive.results.identification;
+    let mut text = format!(
+        "{}: method {}, {} rows, fit of the driver torque {:.1} %\n\n{}",
+        drive.name,
+        found.method,
+        found.rows,
+        found.fit_percent,
+        parameters(found)
+    );
+    if !found.combinations.is_empty() {
+        let mut lines = vec![
+            ["determined instead", "estimate", "std error"]
+                .map(String::from)
+                .to_vec(),
+        ];
+        for c in &found.combinations {
+            lines.push(vec![
+                c.name.clone(),
+                number(Some(c.estimate), 4),
+                number(Some(c.standard_error), 4),
+            ]);
+        }
+        text.push_str(&format!("\n{}", table::text(&lines)));
+    }
+    text.push_str(&format!("\nCorrelation of the errors\n{}", correlation(found)));
+    text.push_str(&format!("\n{}", residuals(found)));
+    let losses: Vec<String> = found.loss_history.iter().map(|l| format!("{l:.6e}")).collect();
+    text.push_str(&format!(
+        "\nLoss {}; ended by {:?}\n",
+        losses.join(", "),
+        found.termination
+    ));
+    for note in &found.notes {
+        text.push_str(&format!("\n- {note}"));
+    }
+    if let Some(again) = &drive.results.drives_again {
+        let m = &again.metrics;
+        text.push_str(&format!(
+            "\n\nOn the course the identified driver's peak lateral error is {} m, in the mean {} m{}",
+            number(m.peak_lateral_error_m, 4),
+            number(m.mean_abs_lateral_error_m, 4),
+            if again.diverged {
+                "; it leaves the road"
+            } else {
+                ""
+            }
+        ));
+    }
+    text
+}
+
+fn parameters(found: &Identification) -> String {
+    let headings = [
+        "parameter",
+        "estimate",
+        "std error",
+        "95 % from",
+        "to",
+        "unit",
+        "verdict",
+    ];
+    let mut lines = vec![headings.map(String::from).to_vec()];
+    for (name, unit, p) in found.parameters.list() {
+        let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
+        let identified = if p.fixed {
+            "given"
+        } else if p.identified {
+            "identified"
+        } else {
+            "not identified"
+        };
+        lines.push(vec![
+            name.into(),
+            number(p.estimate, 4),
+            number(p.standard_error, 4),
+            number(low, 4),
+            number(high, 4),
+            unit.into(),
+            format!("{identified}{}", if p.on_bound { ", on a bound" } else { "" }),
+        ]);
+    }
+    table::text(&lines)
+}
+
+fn correlation(found: &Identification) -> String {
+    let names = &found.correlation.names;
+    let mut lines = vec![
+        std::iter::once("")
+            .chain(names.iter().copied())
+            .map(String::from)
+            .collect::<Vec<_>>(),
+    ];
+    for (name, row) in names.iter().zip(&found.correlation.matrix) {
+        let cells = row.iter().map(|&c| number(c, 3));
+        lines.push(std::iter::once((*name).to_owned()).chain(cells).collect());
+    }
+    table::text(&lines)
+}
+
+fn residuals(found: &Identification) -> String {
+    let w = found.whiteness;
+    let mut text = format!(
+        "Residuals {}: Ljung-Box {:.1} over {} lags, p = {:.3}",
+        if w.white { "white" } else { "NOT WHITE" },
+        w.statistic,
+        w.lags,
+        w.p_value
+    );
+    for test in &found.input_correlation {
+        let verdict = if test.independent {
+            "independent of"
+        } else {
+            "CORRELATED with"
+        };
+        text.push_str(&format!(
+            "\nResiduals {verdict} {}: {:.2} standard deviations",
+            test.input, test.largest_z
+        ));
+    }
+    if let Some(remnant) = found.remnant
+        && let (Some(corner), Some(sd)) = (remnant.corner_hz, remnant.sd_nm)
+    {
+        text.push_str(&format!("\nRemnant {sd:.4} N.m, corner {corner:.3} Hz"));
+    }
+    text
+}
