@@ -57,7 +57,7 @@ fn shipping(sensors: Sensors) -> Results {
     let evaluation = evaluate(&base, None, || ()).unwrap();
     assert_eq!(evaluation.results.runs.len(), 21);
     // The metrics are the ones that this test computes from the traces.
-    for ((_, run), record) in evaluation.runs.iter().zip(&evaluation.results.runs) {
+    for ((_, run), record) in evaluation.runs.iter().zip(evaluation.results.records()) {
         let [peak, mean] = figures(run);
         assert_eq!(record.metrics.peak_lateral_error_m, Some(peak));
         assert!((record.metrics.mean_abs_lateral_error_m.unwrap() - mean).abs() < 1e-12);

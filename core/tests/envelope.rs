@@ -334,7 +334,8 @@ impl Reference {
             (self.anchor, self.anchor_at_us) = (applied, now_us);
         }
         let dt = f64::from(elapsed_us.min(2000)) * 1e-6;
-        let (growth, fall) = (4.0 * dt, 8.0 * dt);
+        // What rounding to the bus may take away is kept back from the fall.
+        let (growth, fall) = (4.0 * dt, (8.0 * dt - 1.0 / 4096.0).max(0.0));
         let size = applied.abs();
         let high = size + growth;
         let low = if size > fall { size - fall } else { -growth };
@@ -388,7 +389,7 @@ fn random_sequences_stay_inside_the_f64_bounds_and_reach_them() {
             let (low, high) = reference.bounds(now_us, applied.nm(), elapsed_us, driver_nm.nm());
             let slack = 4.0 * LSB;
             // On the kink between falling and crossing zero a rate's own error decides.
-            let fall = 8.0 * f64::from(elapsed_us.min(2000)) * 1e-6;
+            let fall = (8.0 * f64::from(elapsed_us.min(2000)) * 1e-6 - 1.0 / 4096.0).max(0.0);
             if (applied.nm().abs() - fall).abs() <= RATE_ERROR {
                 applied = torque;
                 continue;

@@ -163,6 +163,7 @@ mod tests {
             Demand {
                 engage: true,
                 authority: haptic_core::quantity::Gain::ONE,
+                probe: false,
             }
             .encode(9),
         ];

@@ -161,7 +161,8 @@ impl<'a> Seat<'a> {
             row,
             onset,
             end,
-            senders: Senders::new(),
+            // One run in four has the probe on.
+            senders: Senders::new(dice.random_ratio(1, 4)),
             bus: Bus::new(row.injections),
             ecu,
             setup,

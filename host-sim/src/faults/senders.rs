@@ -34,15 +34,18 @@ pub(super) struct Senders {
     held: [Option<f64>; Signal::COUNT],
     toggled: bool,
     wishes: u32,
+    /// Whether the host wants the probe as well.
+    probe: bool,
 }
 
 impl Senders {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(probe: bool) -> Self {
         Self {
             counters: [0; 4],
             held: [None; Signal::COUNT],
             toggled: false,
             wishes: 0,
+            probe,
         }
     }
 
@@ -151,6 +154,7 @@ impl Senders {
             let message = Demand {
                 engage: self.wish(requested, injections, acts),
                 authority: Gain::ONE,
+                probe: self.probe,
             };
             frames.push(message.encode(counter));
         }

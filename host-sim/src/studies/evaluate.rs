@@ -24,7 +24,8 @@ pub const RUNS: usize = 30;
 /// An evaluation with everything that was simulated.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
-    /// The runs, driver by driver: nominal ones first, then those with failure.
+    /// The runs of section 5, driver by driver: nominal ones first, then those with failure. Behind them the
+    /// runs whose guidance input fails.
     pub runs: Vec<(Scenario, Run)>,
     /// What is handed on.
     pub results: Results,
@@ -45,8 +46,10 @@ pub struct Results {
     pub sensors: Sensors,
     /// Stretch that was measured, m.
     pub window_m: [f64; 2],
-    /// One record for each run.
+    /// One record for each run of section 5: no failure, or a sudden loss of the torque.
     pub runs: Vec<RunRecord>,
+    /// One record for each run in which the guidance's input fails and the ECU hands over.
+    pub runs_with_failing_input: Vec<RunRecord>,
     /// What the evaluation must show; empty where it was not run as the paper ran it.
     pub claims: Vec<Claim>,
 }
@@ -54,9 +57,13 @@ pub struct Results {
 impl Results {
     /// The record of a run, if there is one.
     pub fn record(&self, t_p: f64, condition: Condition, failure: FailureKind) -> Option<&RunRecord> {
-        self.runs
-            .iter()
+        self.records()
             .find(|r| r.t_p == t_p && r.condition == condition && r.failure == failure)
+    }
+
+    /// Every record, in the order of the runs.
+    pub fn records(&self) -> impl Iterator<Item = &RunRecord> {
+        self.runs.iter().chain(&self.runs_with_failing_input)
     }
 
     /// Whether no claim is broken.
@@ -97,10 +104,10 @@ pub fn evaluate(
             .metrics
             .peak_lateral_error_m
     };
-    let records = runs
+    let (runs_with_failing_input, records) = runs
         .iter()
         .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
-        .collect();
+        .partition(|record: &RunRecord| record.failure == FailureKind::Input);
     let mut results = Results {
         course: base.course.name().into(),
         course_length_m: base.course.length_m(),
@@ -109,6 +116,7 @@ pub fn evaluate(
         sensors: base.sensors,
         window_m: [window.from_m, window.to_m],
         runs: records,
+        runs_with_failing_input,
         claims: Vec::new(),
     };
     if claims::apply_to(base, window) {
@@ -146,5 +154,7 @@ fn scenarios(base: &Scenario) -> Vec<Scenario> {
             }
         }
     }
+    // Stable: the others stay driver by driver.
+    scenarios.sort_by_key(|scenario| scenario.failure.kind == FailureKind::Input);
     scenarios
 }
