@@ -9,7 +9,7 @@ use crate::bus::messages::{Message, Telemetry};
 use crate::quantity::Torque;
 use crate::reliance::{Reliance, RelianceState, Sample};
 
-/// Telemetry comes every so many steps.
+/// Telemetry comes every so many steps, or one later.
 const TURN: u32 = 20;
 
 /// What the last step left to think about, and what came of it so far.
@@ -21,6 +21,8 @@ pub(crate) struct Advice {
     sample: Option<Sample>,
     probe: Option<Torque>,
     steps: u32,
+    /// The telemetry stood back for a sample.
+    postponed: bool,
 }
 
 impl Advice {
@@ -32,6 +34,7 @@ impl Advice {
             sample: None,
             probe: None,
             steps: 0,
+            postponed: false,
         }
     }
 
@@ -42,16 +45,21 @@ impl Advice {
 
     /// The work for one step, and the telemetry when it is its turn.
     pub(crate) fn step(&mut self) -> Option<Frame> {
+        let sample = self.sample.take();
         if self.probe.is_some() {
             let state = self.reliance.get_or_insert_with(|| self.estimator.start());
-            self.estimator.step(state, self.sample.take().as_ref());
+            self.estimator.step(state, sample.as_ref());
         } else {
             // What a driver did before is no evidence of what he does now.
             self.reliance = None;
         }
         let steps = self.steps;
         self.steps = steps.wrapping_add(1);
-        steps.is_multiple_of(TURN).then(|| {
+        // A sample is the most work there is; its step is spared the telemetry.
+        let due = steps.is_multiple_of(TURN);
+        let now = if due { sample.is_none() } else { self.postponed };
+        self.postponed = due && !now;
+        now.then(|| {
             let telemetry = Telemetry {
                 probe: self.probe,
                 reliance: self.reliance.as_ref().and_then(RelianceState::reading),

@@ -9,7 +9,7 @@
 pub(crate) const ONE: i32 = 1 << 30;
 
 /// Coefficients of x, x^3, x^5, x^7 in 2^-30, for x = 1 at a quarter turn.
-const C: [i64; 4] = [1_686_623_910, -693_521_754, 85_290_965, -4_651_906];
+const C: [i32; 4] = [1_686_623_910, -693_521_754, 85_290_965, -4_651_906];
 
 /// The phase a quarter turn ahead of another: `sine(phase + QUARTER)` is the cosine.
 pub(crate) const QUARTER: u32 = 1 << 30;
@@ -24,18 +24,18 @@ pub(crate) fn sine(phase: u32) -> i32 {
     } else {
         turn
     };
-    let x = x as i64;
     let square = times(x, x);
-    let tail = C[2].saturating_add(times(square, C[3]));
-    let tail = C[1].saturating_add(times(square, tail));
-    let sine = times(x, C[0].saturating_add(times(square, tail)));
+    let tail = C[2].wrapping_add(times(square, C[3]));
+    let tail = C[1].wrapping_add(times(square, tail));
+    let sine = times(x, C[0].wrapping_add(times(square, tail)));
     // The polynomial may pass one by its error.
-    sine.min(i64::from(ONE)).max(-i64::from(ONE)) as i32
+    sine.clamp(-ONE, ONE)
 }
 
-/// A product in 2^-30: both below 2^32 in magnitude.
-const fn times(a: i64, b: i64) -> i64 {
-    a.saturating_mul(b) >> 30
+/// A product in 2^-30. No product or sum here reaches 2, the end of an `i32`: `abs(x)` is at most 1, and each
+/// partial sum of the polynomial at most 1.6.
+fn times(a: i32, b: i32) -> i32 {
+    ((a as i64).wrapping_mul(b as i64) >> 30) as i32
 }
 
 #[cfg(test)]

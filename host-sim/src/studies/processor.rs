@@ -44,11 +44,13 @@ pub fn run(
         at: Instant::from_us(0),
     };
     let mut pil = Pil::start(channel, &params, start, count).map_err(ProcessorError::Target)?;
+    let mut guidance = OverBus::new(&setup);
+    guidance.set_probe(scenario.guidance.probe);
     let mut broken = None;
     drive(
         scenario,
         &Centreline::new(&scenario.course),
-        &mut OverBus::new(&setup),
+        &mut guidance,
         &mut |cycle: &Cycle| {
             // The host's loop needs no answer, so it simply runs out when the target is gone.
             if broken.is_none() {
