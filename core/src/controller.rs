@@ -452,8 +452,9 @@ impl Step<'_> {
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
-                // Half a wave of the probe must not stand in the wheel for two seconds.
-                let applied = without(self.applied, Some(v.probe_applied));
+                // Half a wave of the probe must not stand in the wheel for two seconds, and what the other half
+                // took away does not come back.
+                let applied = lesser(self.applied, without(self.applied, Some(v.probe_applied)));
                 v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), HANDOVER);
             }
             _ => {}

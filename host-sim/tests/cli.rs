@@ -23,14 +23,17 @@ fn stderr(output: &Output) -> String {
 }
 
 #[test]
-fn an_evaluation_prints_21_records_and_leaves_its_files() {
+fn an_evaluation_prints_its_records_and_leaves_its_files() {
     let directory = tempfile::tempdir().unwrap();
     let output = host_sim(directory.path(), &["evaluate", "--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let results = json(&output);
     let runs = results["runs"].as_array().unwrap();
-    assert_eq!(runs.len(), 21);
-    assert_eq!(runs.iter().filter(|r| r["failure"] == "torque").count(), 9);
+    // 3 drivers x 4 conditions without failure; manual has none to fail. The paper's 21 come first.
+    let with = |failure: &str| runs.iter().filter(|r| r["failure"] == failure).count();
+    assert_eq!((with("none"), with("torque"), with("input")), (12, 9, 9));
+    assert_eq!(runs.len(), 30);
+    assert!(runs[..21].iter().all(|r| r["failure"] != "input"));
     assert_eq!(runs.iter().filter(|r| r["condition"] == "manual").count(), 3);
     for run in runs {
         assert!([0.1, 0.3, 0.5].contains(&run["t_p"].as_f64().unwrap()));
@@ -63,7 +66,7 @@ fn an_evaluation_prints_21_records_and_leaves_its_files() {
         let bytes = std::fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(String::from_utf8_lossy(&bytes).starts_with(start), "{name}");
     }
-    assert_eq!(std::fs::read_dir(out.join("runs")).unwrap().count(), 21);
+    assert_eq!(std::fs::read_dir(out.join("runs")).unwrap().count(), 30);
     let file: Value = serde_json::from_slice(&std::fs::read(out.join("results.json")).unwrap()).unwrap();
     assert_eq!(file, results);
 }

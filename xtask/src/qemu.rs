@@ -32,10 +32,10 @@ pub(crate) struct Options {
     /// `tcp:127.0.0.1:3333,server,nowait`. With `stdio` the run ends with the input.
     #[arg(long, default_value = "null")]
     can: String,
-    /// Let the clock count instructions, 32 ns each, about the board's speed: work of the host is then no time of
-    /// the target.
-    #[arg(long)]
-    icount: bool,
+    /// Let the clock count instructions, 2^SHIFT ns each: work of the host is then no time of the target. 5 is about
+    /// the board's speed; a smaller one gives whoever is on the bus more time to answer.
+    #[arg(long, value_name = "SHIFT", value_parser = clap::value_parser!(u8).range(0..=10))]
+    icount: Option<u8>,
     /// Stop after this many seconds, with exit code 124.
     #[arg(long, default_value_t = 60)]
     timeout: u64,
@@ -118,8 +118,8 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
         } else {
             Stdio::null()
         });
-    if options.icount {
-        command.args(["-icount", "shift=5"]);
+    if let Some(shift) = options.icount {
+        command.args(["-icount", &format!("shift={shift}")]);
     }
     let mut child = command.spawn().context("qemu-system-arm does not start")?;
     if let Some(to) = child.stdin.take() {

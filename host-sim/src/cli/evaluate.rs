@@ -95,7 +95,7 @@ fn readable(evaluation: &Evaluation) -> String {
         "",
     ];
     let mut lines = vec![headings.map(String::from).to_vec()];
-    for run in results.records() {
+    for run in &results.runs {
         let m = &run.metrics;
         lines.push(vec![
             run.t_p.to_string(),

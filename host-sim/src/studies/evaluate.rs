@@ -46,10 +46,9 @@ pub struct Results {
     pub sensors: Sensors,
     /// Stretch that was measured, m.
     pub window_m: [f64; 2],
-    /// One record for each run of section 5: no failure, or a sudden loss of the torque.
+    /// One record for each run: the 21 of section 5 (no failure, or a sudden loss of the torque), then the 9 in
+    /// which the guidance's input fails and the ECU hands over.
     pub runs: Vec<RunRecord>,
-    /// One record for each run in which the guidance's input fails and the ECU hands over.
-    pub runs_with_failing_input: Vec<RunRecord>,
     /// What the evaluation must show; empty where it was not run as the paper ran it.
     pub claims: Vec<Claim>,
 }
@@ -57,13 +56,9 @@ pub struct Results {
 impl Results {
     /// The record of a run, if there is one.
     pub fn record(&self, t_p: f64, condition: Condition, failure: FailureKind) -> Option<&RunRecord> {
-        self.records()
+        self.runs
+            .iter()
             .find(|r| r.t_p == t_p && r.condition == condition && r.failure == failure)
-    }
-
-    /// Every record, in the order of the runs.
-    pub fn records(&self) -> impl Iterator<Item = &RunRecord> {
-        self.runs.iter().chain(&self.runs_with_failing_input)
     }
 
     /// Whether no claim is broken.
@@ -104,10 +99,10 @@ pub fn evaluate(
             .metrics
             .peak_lateral_error_m
     };
-    let (runs_with_failing_input, records) = runs
+    let records = runs
         .iter()
         .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
-        .partition(|record: &RunRecord| record.failure == FailureKind::Input);
+        .collect();
     let mut results = Results {
         course: base.course.name().into(),
         course_length_m: base.course.length_m(),
@@ -116,7 +111,6 @@ pub fn evaluate(
         sensors: base.sensors,
         window_m: [window.from_m, window.to_m],
         runs: records,
-        runs_with_failing_input,
         claims: Vec::new(),
     };
     if claims::apply_to(base, window) {

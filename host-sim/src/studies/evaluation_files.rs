@@ -249,7 +249,7 @@ fn table(results: &Results, caption: &str, shown: impl Fn(&Definition) -> bool) 
         .chain(texts)
         .collect()
     };
-    let rows: Vec<(Vec<Cell>, _)> = results.records().map(|r| (keys(r), r.metrics)).collect();
+    let rows: Vec<(Vec<Cell>, _)> = results.runs.iter().map(|r| (keys(r), r.metrics)).collect();
     metrics_table(
         caption,
         &["t_p (s)", "Condition", "Failure", "Ended"],
