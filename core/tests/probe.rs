@@ -107,8 +107,8 @@ fn is_refused_outside_active() {
     }
 }
 
-/// The handover follows the line that it would follow without a probe, or stays below it: half a wave of the
-/// probe neither stands in the wheel for 2 s nor makes the torque grow.
+/// The handover follows the line that it would follow without a probe, or the lower one from the torque that the
+/// probe left: half a wave of it neither stands in the wheel for 2 s nor makes the torque grow.
 #[test]
 fn a_handover_keeps_no_wave_of_it() {
     for ms in (500..900).step_by(23) {
@@ -117,12 +117,11 @@ fn a_handover_keeps_no_wave_of_it() {
         rig.silent[0] = true;
         rig.run_until(60, |step| step.command.mode == Mode::Handover);
         let mut last = rig.applied;
-        let floor = last;
+        let applied = last;
         for k in 1..2_000 {
             rig.tick();
             // The step that saw the silence was the line's first millisecond.
-            let line = 0.4 * (1.0 - f64::from(k + 1) / 2_000.0);
-            let expected = line.min(floor);
+            let expected = applied.min(0.4) * (1.0 - f64::from(k + 1) / 2_000.0);
             assert!(rig.applied <= last + 1e-9, "{ms}: grows at {k}");
             last = rig.applied;
             // 8 N.m/s bring the crest of a wave down in 25 ms; 0.01 for the steady curve's own rounding.

@@ -18,6 +18,14 @@ pub struct Campaign {
 }
 
 impl Campaign {
+    pub(super) fn of(rows: Vec<RowResult>) -> Self {
+        Self {
+            runs: rows.iter().map(|row| row.runs).sum(),
+            cycles: rows.iter().map(|row| row.cycles).sum(),
+            rows,
+        }
+    }
+
     /// Every run that failed.
     pub fn failures(&self) -> impl Iterator<Item = &Failure> {
         self.rows.iter().flat_map(|row| &row.failures)
@@ -89,16 +97,13 @@ pub fn run(
     let rows: Vec<RowResult> = rows
         .iter()
         .zip(outcomes.chunks(per_row))
-        .map(|(row, outcomes)| result(row, outcomes))
+        .map(|(row, outcomes)| result(row, outcomes, ""))
         .collect();
-    Campaign {
-        runs: rows.iter().map(|row| row.runs).sum(),
-        cycles: rows.iter().map(|row| row.cycles).sum(),
-        rows,
-    }
+    Campaign::of(rows)
 }
 
-fn result(row: &'static Row, outcomes: &[Outcome]) -> RowResult {
+/// What a row's runs showed; `again` is what its command needs beside row and seed.
+pub(super) fn result(row: &'static Row, outcomes: &[Outcome], again: &str) -> RowResult {
     let failures = outcomes.iter().filter_map(|outcome| {
         let broken = outcome.failure.as_ref()?;
         Some(Failure {
@@ -106,7 +111,10 @@ fn result(row: &'static Row, outcomes: &[Outcome]) -> RowResult {
             seed: outcome.seed,
             cycle: broken.step,
             what: broken.what.clone(),
-            replay: format!("host-sim faults --rows {} --seed {}", row.name, outcome.seed),
+            replay: format!(
+                "host-sim faults --rows {} --seed {}{again}",
+                row.name, outcome.seed
+            ),
         })
     });
     RowResult {

@@ -11,8 +11,10 @@
 //!            +--- one injection ------+                   verdict: class, deadline, torque bound
 //! ```
 //!
-//! Not here: faults that only a target has (watchdog, stack, processor fault). They are in the table, marked Q,
-//! and run in QEMU.
+//! What is marked Q runs in QEMU as well, with the image in the place of the ECU (`target`).
+//!
+//! Not here: faults that only an image has (watchdog, stack, processor fault). They are in the table, and in
+//! `tests/resets.rs`.
 
 mod bytes;
 pub mod campaign;
@@ -24,6 +26,7 @@ mod residual;
 mod seat;
 mod senders;
 pub mod table;
+pub mod target;
 mod trial;
 mod verdict;
 mod wire;

@@ -4,6 +4,7 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
 use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::lockstep::{self, StartState};
 use haptic_core::params::{Params, Setup};
 use haptic_core::quantity::{Instant, Torque};
 use haptic_core::stored::{BYTES, load, save};
@@ -83,13 +84,37 @@ pub(super) struct Seat<'a> {
     /// Torque of the motor at the onset.
     stuck_nm: f64,
     sent: Vec<Frame>,
+    /// What has arrived and was not yet received: a step that is lost or late leaves it to the next.
     arrivals: Vec<Arrival>,
     record: Record,
+    start: (Params, lockstep::Start),
+    trace: Option<Trace>,
+}
+
+/// Everything that went into an ECU and came out of it, so that another can be put in its place.
+#[derive(Debug, Clone)]
+pub(super) struct Trace {
+    pub(super) params: Params,
+    pub(super) start: lockstep::Start,
+    pub(super) ticks: Vec<Tick>,
+}
+
+/// One run of the ECU.
+#[derive(Debug, Clone)]
+pub(super) struct Tick {
+    /// In the world, ms.
+    pub(super) step: u32,
+    /// On the ECU's clock.
+    pub(super) now: Instant,
+    /// What it received before, and whether it accepted it.
+    pub(super) frames: Vec<(Frame, bool)>,
+    /// What it sent: guidance first.
+    pub(super) answer: Vec<Frame>,
 }
 
 /// Every parameter of the law and the envelope at the end of its range that does most, and the monitor with them.
-fn absurd() -> Setup {
-    let params = Params {
+fn absurd() -> Params {
+    Params {
         k_1: 4.0,
         a_1: 8.0,
         a_2: 8.0,
@@ -98,12 +123,11 @@ fn absurd() -> Setup {
         rate_corner_hz: 60.0,
         least_speed_mps: 0.5,
         ..Params::PAPER
-    };
-    Setup::new(&params).expect("each in range")
+    }
 }
 
-/// What a boot finds in the memory of the parameters: the set in use before, or none.
-fn stored(start: Start, dice: &mut Xoshiro256PlusPlus) -> Option<Setup> {
+/// Whether a boot finds the set in use before in the memory of the parameters.
+fn finds_previous(start: Start, dice: &mut Xoshiro256PlusPlus) -> bool {
     let previous = Params::PAPER;
     let other = Params {
         torque_limit_nm: 3.0,
@@ -119,10 +143,7 @@ fn stored(start: Start, dice: &mut Xoshiro256PlusPlus) -> Option<Setup> {
             copy[dice.random_range(0..BYTES)] ^= 1 << dice.random_range(0..8);
         }
     }
-    let found = load([&older, &newer])?;
-    (found.params == previous)
-        .then(|| Setup::new(&found.params).ok())
-        .flatten()
+    load([&older, &newer]).is_some_and(|found| found.params == previous)
 }
 
 impl<'a> Seat<'a> {
@@ -140,23 +161,25 @@ impl<'a> Seat<'a> {
             0
         };
         let now = Instant::from_us(clock_base_us);
-        let setup = match row.start {
+        let params = match row.start {
             Start::Absurd => absurd(),
-            _ => scenario.setup().expect("a checked scenario"),
+            _ => scenario.controller_params(),
         };
-        let boot = |setup, recent_resets| {
-            let boot = Boot {
-                recent_resets,
-                ..Boot::default()
-            };
-            Ecu::new(setup, boot, now)
+        let boot = |recent_resets| Boot {
+            recent_resets,
+            ..Boot::default()
         };
-        let ecu = match row.start {
-            Start::Engaged | Start::Absurd | Start::HeadingWraps => Ecu::engaged(&setup, now),
-            Start::Boot => boot(Some(&setup), 0),
-            Start::NoParameters | Start::HalfWritten => boot(stored(row.start, &mut dice).as_ref(), 0),
-            Start::ThirdReset => boot(Some(&setup), 3),
+        let state = match row.start {
+            Start::Engaged | Start::Absurd | Start::HeadingWraps => StartState::Engaged,
+            Start::Boot => StartState::Boot(boot(0)),
+            Start::NoParameters | Start::HalfWritten if finds_previous(row.start, &mut dice) => {
+                StartState::Boot(boot(0))
+            }
+            Start::NoParameters | Start::HalfWritten => StartState::WithoutParameters(boot(0)),
+            Start::ThirdReset => StartState::Boot(boot(3)),
         };
+        let start = lockstep::Start { state, at: now };
+        let ecu = start.ecu(&params).expect("a checked scenario");
         Self {
             row,
             onset,
@@ -165,7 +188,7 @@ impl<'a> Seat<'a> {
             senders: Senders::new(dice.random_ratio(1, 4)),
             bus: Bus::new(row.injections),
             ecu,
-            setup,
+            setup: Setup::new(&params).expect("a checked scenario"),
             guard: Guard::new(is_engaged(row.start), clock_base_us),
             residual: Residual::new(&scenario.vehicle, scenario.speed_mps()),
             side: if dice.random_bool(0.5) { 1.0 } else { -1.0 },
@@ -177,7 +200,24 @@ impl<'a> Seat<'a> {
             sent: Vec::new(),
             arrivals: Vec::new(),
             record: Record::default(),
+            trace: None,
+            start: (params, start),
         }
+    }
+
+    /// Keeps a trace from here on.
+    pub(super) fn keep_trace(&mut self) {
+        let (params, start) = self.start;
+        self.trace = Some(Trace {
+            params,
+            start,
+            ticks: Vec::new(),
+        });
+    }
+
+    /// The trace, if one was kept.
+    pub(super) fn take_trace(&mut self) -> Option<Trace> {
+        self.trace.take()
     }
 
     pub(super) fn into_record(self) -> Record {
@@ -231,7 +271,7 @@ impl<'a> Seat<'a> {
         }
     }
 
-    fn tell(&mut self, view: &View, now_us: u32) {
+    fn tell(&mut self, view: &View) {
         let (step, acts) = (view.step, self.acts(view.step));
         let since_s = acts.then(|| self.since(step) as f64 * 1e-3);
         let readings = self
@@ -262,10 +302,16 @@ impl<'a> Seat<'a> {
             &mut self.arrivals,
         );
         if acts && self.has(Injection::Inside(Inside::ReceiverSkipped)) {
-            return;
+            self.arrivals.clear();
         }
-        for arrival in &self.arrivals {
+    }
+
+    /// Hands the ECU what has arrived.
+    fn receive(&mut self, step: u32, now_us: u32) -> Vec<(Frame, bool)> {
+        let mut received = Vec::new();
+        for arrival in self.arrivals.drain(..) {
             let accepted = self.ecu.receive(&arrival.frame, Instant::from_us(now_us)).is_ok();
+            received.push((arrival.frame, accepted));
             if accepted {
                 self.guard.accepted(&arrival.frame, now_us);
             }
@@ -277,6 +323,7 @@ impl<'a> Seat<'a> {
                 (false, _) => {}
             }
         }
+        received
     }
 
     fn watch_contradictions(&mut self, view: &View, readings: &Readings) {
@@ -386,9 +433,23 @@ impl Guidance for Seat<'_> {
         self.record.steps = step;
         let (ticks, count) = self.ticks(step);
         self.disturb_inside(step, ticks[0]);
-        self.tell(view, ticks[0]);
+        self.tell(view);
         for now_us in ticks.into_iter().take(count) {
-            let out = self.ecu.step(Instant::from_us(now_us));
+            let now = Instant::from_us(now_us);
+            let frames = self.receive(step, now_us);
+            let out = self.ecu.step(now);
+            let advice = self.ecu.advise();
+            if let Some(trace) = &mut self.trace {
+                trace.ticks.push(Tick {
+                    step,
+                    now,
+                    frames,
+                    answer: std::iter::once(out.guidance)
+                        .chain(out.others.iter().copied())
+                        .chain(advice)
+                        .collect(),
+                });
+            }
             let world_us = u64::from(step) * 1000;
             self.guard
                 .cycle(step, world_us, now_us, &out.guidance, &out.others);

@@ -14,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use super::drivers::{Driver, everyone};
 use super::guard::Broken;
 use super::injection::Start;
-use super::seat::Seat;
+use super::seat::{Seat, Trace};
 use super::table::Row;
 use super::verdict::judge;
 use crate::closed_loop::drive;
@@ -107,6 +107,11 @@ impl World {
 
     /// Runs a row with a seed.
     pub fn run(&self, row: &Row, seed: u64) -> Outcome {
+        self.trial(row, seed, false).0
+    }
+
+    /// Runs a row with a seed, and with `traced` keeps what went into the ECU and came out of it.
+    pub(super) fn trial(&self, row: &Row, seed: u64, traced: bool) -> (Outcome, Option<Trace>) {
         let mut dice = Xoshiro256PlusPlus::seed_from_u64(seed);
         let driver = &self.drivers[dice.random_range(0..self.drivers.len())];
         let speed = dice.random_range(0..SPEEDS_KMH.len());
@@ -135,7 +140,11 @@ impl World {
             ..Default::default()
         };
         let mut seat = Seat::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, dice);
+        if traced {
+            seat.keep_trace();
+        }
         let run = catch_unwind(AssertUnwindSafe(|| drive(&scenario, line, &mut seat, &mut ())));
+        let trace = seat.take_trace();
         let mut record = seat.into_record();
         if let Err(panic) = run {
             let what = panic
@@ -150,7 +159,7 @@ impl World {
         let reported = std::mem::take(&mut record.ecu).into_events();
         let verdict = judge(row, onset_ms, &record);
         let seen_at = record.seen_at.unwrap_or(onset_ms);
-        Outcome {
+        let outcome = Outcome {
             seed,
             driver: driver.name.clone(),
             speed_kmh: scenario.speed_kmh,
@@ -165,7 +174,8 @@ impl World {
             peak_nm: record.peak_nm,
             seen: record.seen_at.is_some(),
             failure: verdict.err(),
-        }
+        };
+        (outcome, trace)
     }
 }
 

@@ -66,7 +66,7 @@ impl Bus {
         })
     }
 
-    /// Takes what is sent in a step, returns what arrives.
+    /// Takes what is sent in a step, appends what arrives.
     pub(super) fn carry(
         &mut self,
         step: u32,
@@ -76,7 +76,6 @@ impl Bus {
         dice: &mut Xoshiro256PlusPlus,
         arrivals: &mut Vec<Arrival>,
     ) {
-        arrivals.clear();
         if self.log_length > 0 {
             self.log.push_back(sent.to_vec());
         }

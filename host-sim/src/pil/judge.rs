@@ -1,10 +1,7 @@
 //! Reads the target's answers and compares them with what the host's controller said.
 
 use std::fmt;
-use std::io::Read;
-use std::process::ChildStdout;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::Duration;
+use std::sync::mpsc::Receiver;
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, Message};
@@ -12,14 +9,9 @@ use haptic_core::lockstep::{StackUse, StepCost};
 use haptic_core::quantity::Instant;
 use serde::Serialize;
 
-use super::link::Decoder;
-use super::qemu::{Qemu, instructions};
+use super::answers::Answers;
+use super::qemu::instructions;
 use super::{Channel, PilError, Report};
-
-/// Longest wait for the next bytes of a target that owes an answer. Starting takes a tenth of a second.
-const SILENCE: Duration = Duration::from_secs(20);
-/// Longest wait for a target to quit after its run.
-const EXIT: Duration = Duration::from_secs(5);
 
 /// Most frames of one answer: guidance, a warning, a line of the fault history, telemetry.
 const ANSWER_MAX: usize = 4;
@@ -113,24 +105,18 @@ pub struct Instructions {
 }
 
 pub(super) struct Judge {
-    qemu: Qemu,
-    bytes: Receiver<Vec<u8>>,
-    decoder: Decoder,
-    pending: std::vec::IntoIter<u8>,
+    answers: Answers,
     count: bool,
     report: Report,
 }
 
 impl Judge {
-    pub(super) fn new(qemu: Qemu, output: ChildStdout, channel_kind: Channel, count: bool) -> Self {
+    pub(super) fn new(answers: Answers, channel: Channel, count: bool) -> Self {
         Self {
-            qemu,
-            bytes: pump(output),
-            decoder: Decoder::new(channel_kind),
-            pending: Vec::new().into_iter(),
+            answers,
             count,
             report: Report {
-                channel: channel_kind,
+                channel,
                 steps: 0,
                 frames_compared: 0,
                 mismatches: 0,
@@ -152,19 +138,16 @@ impl Judge {
                 *total += u64::from(spent);
             }
             self.report.steps += 1;
+            self.answers.steps = self.report.steps;
             self.report.steps_per_second = self.report.steps as f64 / start.elapsed().as_secs_f64();
         }
         if let Some(instructions) = &mut self.report.instructions {
             [instructions.mean, instructions.mean_advice] =
                 total.map(|total| total as f64 / self.report.steps as f64);
         }
-        match self.qemu.wait(EXIT) {
-            Some(status) if status.success() => {}
-            Some(_) => return Err(self.gone("failed at the end of the run")),
-            None => return Err(self.gone("does not end")),
-        }
+        self.answers.end()?;
         if self.report.mismatches == 0 {
-            self.qemu.discard_log();
+            self.answers.discard_log();
         }
         Ok(self.report)
     }
@@ -173,7 +156,7 @@ impl Judge {
     fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
-            let frame = self.frame()?;
+            let frame = self.answers.frame()?;
             if let Some(StackUse { bytes }) = StackUse::decode(&frame) {
                 self.report.stack_bytes = bytes;
                 continue;
@@ -217,50 +200,4 @@ impl Judge {
         counted.worst_advice = counted.worst_advice.max(advice);
         [spent, advice]
     }
-
-    /// The next frame from the target.
-    fn frame(&mut self) -> Result<Frame, PilError> {
-        loop {
-            for byte in self.pending.by_ref() {
-                match self.decoder.push(byte) {
-                    Ok(Some(frame)) => return Ok(frame),
-                    Ok(None) => {}
-                    Err(what) => return Err(self.gone(&format!("answered with {what}"))),
-                }
-            }
-            self.pending = match self.bytes.recv_timeout(SILENCE) {
-                Ok(bytes) => bytes.into_iter(),
-                Err(RecvTimeoutError::Timeout) => {
-                    return Err(self.gone(&format!("was silent for {} s", SILENCE.as_secs())));
-                }
-                Err(RecvTimeoutError::Disconnected) => return Err(self.gone("quit")),
-            };
-        }
-    }
-
-    fn gone(&mut self, what: &str) -> PilError {
-        let status = self
-            .qemu
-            .wait(Duration::from_millis(500))
-            .map_or(String::new(), |status| format!(" ({status})"));
-        PilError(format!(
-            "the target {what} after {} steps{status}; its log: cargo xtask log {}",
-            self.report.steps,
-            self.qemu.log().display()
-        ))
-    }
-}
-
-/// Reads on a thread of its own, so that waiting for bytes can have a limit.
-fn pump(mut output: ChildStdout) -> Receiver<Vec<u8>> {
-    let (to, from) = channel();
-    std::thread::spawn(move || {
-        let mut buffer = [0; 65536];
-        while let Ok(n @ 1..) = output.read(&mut buffer) {
-            if to.send(buffer[..n].to_vec()).is_err() {
-                return;
-            }
-        }
-    });
-    from
 }

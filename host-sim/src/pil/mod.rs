@@ -7,14 +7,18 @@
 //! under way at once, over SLCAN one, as an outside client of the bus would do it.
 //!
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`link`]: frames as bytes.
-//! - [`judge`]: reads the answers, on its own thread.
+//! - [`judge`]: compares the answers, on its own thread. - [`stepped`]: a target for whoever judges by himself,
+//!   and may reach into its memory.
 //!
 //! Not here: the plant and the scenario.
 
+mod answers;
+mod gdb;
 pub mod image;
 pub mod judge;
 mod link;
 pub mod qemu;
+pub mod stepped;
 
 use std::fmt;
 use std::io::{BufWriter, Write};
@@ -30,9 +34,10 @@ use haptic_core::params::Params;
 use haptic_core::quantity::Instant;
 use serde::Serialize;
 
+use answers::Answers;
 use judge::{Expected, Judge};
 pub use judge::{Instructions, Mismatch};
-use qemu::Qemu;
+use qemu::{Extras, Qemu};
 
 /// How frames reach the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -127,9 +132,9 @@ impl Pil {
     /// What is missing or fails on the way to a running image.
     pub fn start(channel: Channel, params: &Params, start: Start, count: bool) -> Result<Self, PilError> {
         let elf = image::build()?;
-        let (qemu, input, output) = Qemu::start(&elf, channel, count)?;
+        let (qemu, input, output) = Qemu::start(&elf, channel, Extras { count, gdb: None })?;
         let (expected, expectations) = sync_channel(channel.window());
-        let judge = Judge::new(qemu, output, channel, count);
+        let judge = Judge::new(Answers::new(qemu, output, channel), channel, count);
         let mut pil = Self {
             input: Some(BufWriter::new(input)),
             expected: Some(expected),

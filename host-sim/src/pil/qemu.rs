@@ -24,6 +24,15 @@ pub fn instructions(cycles: u32) -> u32 {
     u32::try_from((ns + NS_PER_INSTRUCTION / 2) / NS_PER_INSTRUCTION).unwrap_or(u32::MAX)
 }
 
+/// What a machine does beside running.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Extras {
+    /// Counts instructions.
+    pub count: bool,
+    /// Serves a debugger on this port of the local host.
+    pub gdb: Option<u16>,
+}
+
 /// A running machine.
 pub struct Qemu {
     child: Child,
@@ -38,7 +47,7 @@ impl Qemu {
     pub fn start(
         elf: &Path,
         channel: Channel,
-        count: bool,
+        extras: Extras,
     ) -> Result<(Self, ChildStdin, ChildStdout), PilError> {
         let log = elf.with_file_name(format!("lockstep-{channel}-{}.log", std::process::id()));
         let mut command = Command::new(PROGRAM);
@@ -51,8 +60,11 @@ impl Qemu {
         command
             .arg("-semihosting-config")
             .arg(format!("enable=on,target=native,arg=lockstep,arg={channel}"));
-        if count {
+        if extras.count {
             command.args(["-icount", "shift=10"]);
+        }
+        if let Some(port) = extras.gdb {
+            command.arg("-gdb").arg(format!("tcp:127.0.0.1:{port}"));
         }
         command.arg("-kernel").arg(elf);
         let mut child = command

@@ -45,6 +45,8 @@ mod target {
 
     #[entry]
     fn main() -> ! {
+        // By itself, so that a debugger finds the controller's memory.
+        static mut ECU: Option<Ecu> = None;
         static mut RUN: Run = Run::NEW;
         stack::paint();
         let mut board = ThisBoard::start();
@@ -52,25 +54,25 @@ mod target {
         #[cfg(feature = "semihosting")]
         crate::fifo::serve_if_asked(|fifo| {
             while let Ok(frame) = nb::block!(fifo.receive()) {
-                RUN.take(frame, fifo);
+                RUN.take(frame, ECU, fifo);
             }
             RUN.end()
         });
         board.start_tick();
         loop {
-            serve(&mut board, RUN);
+            serve(&mut board, RUN, ECU);
             RUN.end();
         }
     }
 
     /// A run on the bus port, from the client's opening of the channel to its closing.
-    fn serve(board: &mut ThisBoard, run: &mut Run) {
+    fn serve(board: &mut ThisBoard, run: &mut Run, ecu: &mut Option<Ecu>) {
         let mut last = None;
         loop {
             match (board.can().receive(), last) {
                 (Ok(frame), _) => {
                     last = Some(ThisBoard::now());
-                    run.take(frame, board.can());
+                    run.take(frame, ecu, board.can());
                 }
                 (Err(_), Some(_)) if board.is_hung_up() => return,
                 (Err(_), Some(at)) if cfg!(feature = "semihosting") && ThisBoard::now().since(at) > IDLE => {
@@ -81,10 +83,9 @@ mod target {
         }
     }
 
-    /// One run: the controller and the frames of the tick under way.
+    /// One run: its parameters and the frames of the tick under way.
     struct Run {
         params: Params,
-        ecu: Option<Ecu>,
         frames: Vec<Frame, FRAMES_PER_TICK>,
         steps: u32,
         rejected: u32,
@@ -93,29 +94,28 @@ mod target {
     impl Run {
         const NEW: Self = Self {
             params: Params::PAPER,
-            ecu: None,
             frames: Vec::new(),
             steps: 0,
             rejected: 0,
         };
 
-        fn take(&mut self, frame: Frame, can: &mut impl Can<Frame = Frame>) {
+        fn take(&mut self, frame: Frame, ecu: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
             if let Some(SimTime(now)) = SimTime::decode(&frame) {
-                self.tick(now, can);
+                self.tick(now, ecu, can);
             } else if let Some(start) = Start::decode(&frame) {
-                self.ecu = Some(start_ecu(start, &self.params));
+                *ecu = Some(start_ecu(start, &self.params));
                 self.frames.clear();
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
             }
         }
 
-        fn tick(&mut self, now: Instant, can: &mut impl Can<Frame = Frame>) {
+        fn tick(&mut self, now: Instant, ecu: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
             let boot = Start {
                 state: StartState::Boot(Boot::default()),
                 at: now,
             };
-            let ecu = self.ecu.get_or_insert_with(|| start_ecu(boot, &self.params));
+            let ecu = ecu.get_or_insert_with(|| start_ecu(boot, &self.params));
             let start = ThisBoard::cycles();
             for frame in &self.frames {
                 if ecu.receive(frame, now).is_err() {

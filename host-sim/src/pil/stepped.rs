@@ -1,0 +1,175 @@
+//! A target that takes ticks and gives back its answers, for whoever judges them by himself; and whose memory can be
+//! changed between two ticks, as a particle would.
+
+use std::io::{BufWriter, Write};
+use std::net::TcpListener;
+use std::process::ChildStdin;
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::SimTime;
+use haptic_core::lockstep::{StackUse, Start, StepCost, parameter_frames};
+use haptic_core::params::Params;
+use haptic_core::quantity::Instant;
+use object::{Object, ObjectSymbol};
+
+use super::answers::Answers;
+use super::gdb::Gdb;
+use super::qemu::{Extras, Qemu};
+use super::{Channel, PilError, image, link};
+
+/// Name of the static that holds the controller (`firmware/src/bin/lockstep`).
+const CONTROLLER: &str = "3ECU";
+
+/// The lock-step image in QEMU. Any number of runs, one after the other; dropping it ends the machine.
+pub struct Stepped {
+    // Declared first, so that the machine's input closes before its end is waited for.
+    input: BufWriter<ChildStdin>,
+    answers: Answers,
+    channel: Channel,
+    /// Port of the debugger's stub.
+    port: Option<u16>,
+    /// Address and bytes of the controller.
+    controller: (u32, u32),
+}
+
+impl Stepped {
+    /// Builds the image and starts it. With `memory` its memory can be reached; QEMU then has to be on the bus
+    /// channel, for a machine that waits in a pipe's read answers no debugger.
+    ///
+    /// # Errors
+    /// What is missing or fails on the way to a running image.
+    pub fn start(memory: bool) -> Result<Self, PilError> {
+        let elf = image::build()?;
+        let controller = symbol(&elf)?;
+        let channel = if memory { Channel::Slcan } else { Channel::Fifo };
+        // The port is free now; QEMU takes it at once.
+        let port = memory
+            .then(|| TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()))
+            .transpose()
+            .map_err(|e| PilError(format!("no port for the debugger's stub: {e}")))?
+            .map(|address| address.port());
+        let extras = Extras {
+            count: false,
+            gdb: port,
+        };
+        let (qemu, input, output) = Qemu::start(&elf, channel, extras)?;
+        let mut stepped = Self {
+            input: BufWriter::new(input),
+            answers: Answers::new(qemu, output, channel),
+            channel,
+            port,
+            controller,
+        };
+        if channel == Channel::Slcan {
+            stepped.write(link::OPEN)?;
+        }
+        Ok(stepped)
+    }
+
+    /// A new controller, with these parameters.
+    ///
+    /// # Errors
+    /// The target is gone.
+    pub fn begin(&mut self, params: &Params, start: Start) -> Result<(), PilError> {
+        for frame in parameter_frames(params) {
+            self.send(&frame)?;
+        }
+        self.send(&start.encode())
+    }
+
+    /// Sends a tick: the frames that come, and the time at which the controller takes them and steps.
+    ///
+    /// # Errors
+    /// The target is gone.
+    pub fn tick(&mut self, now: Instant, frames: &[Frame]) -> Result<(), PilError> {
+        for frame in frames {
+            self.send(frame)?;
+        }
+        self.send(&SimTime(now).encode())
+    }
+
+    /// The answer to the earliest tick that has none yet.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn answer(&mut self) -> Result<Vec<Frame>, PilError> {
+        if self.input.flush().is_err() {
+            return Err(self.answers.gone("closed its input"));
+        }
+        let mut answer = Vec::new();
+        loop {
+            let frame = self.answers.frame()?;
+            if StepCost::decode(&frame).is_some() {
+                self.answers.steps += 1;
+                return Ok(answer);
+            }
+            if StackUse::decode(&frame).is_none() {
+                answer.push(frame);
+            }
+        }
+    }
+
+    /// Bits of the controller's memory.
+    #[must_use]
+    pub const fn bits(&self) -> u32 {
+        8 * self.controller.1
+    }
+
+    /// Flips a bit of the controller's memory, through the debugger's stub, between two ticks: no answer may be due.
+    ///
+    /// # Errors
+    /// The stub's.
+    pub fn flip(&mut self, bit: u32) -> Result<(), PilError> {
+        let port = self
+            .port
+            .ok_or_else(|| PilError("the target was started without a debugger's stub".into()))?;
+        let address = self.controller.0 + bit / 8;
+        let flip = || -> std::io::Result<()> {
+            let mut gdb = Gdb::halt(port)?;
+            let byte = gdb.read(address)?;
+            gdb.write(address, byte ^ (1 << (bit % 8)))?;
+            gdb.resume()
+        };
+        flip().map_err(|e| PilError(format!("the debugger's stub of QEMU: {e}")))
+    }
+
+    /// Ends the machine.
+    ///
+    /// # Errors
+    /// It does not end well.
+    pub fn end(mut self) -> Result<(), PilError> {
+        if self.channel == Channel::Slcan {
+            self.write(link::CLOSE)?;
+        }
+        let Self {
+            input, mut answers, ..
+        } = self;
+        drop(input);
+        answers.end()?;
+        answers.discard_log();
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), PilError> {
+        let bytes = link::encode(self.channel, frame);
+        self.write(&bytes)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PilError> {
+        match self.input.write_all(bytes) {
+            Ok(()) => Ok(()),
+            Err(_) => Err(self.answers.gone("closed its input")),
+        }
+    }
+}
+
+/// Address and length of the controller in the image.
+fn symbol(elf: &std::path::Path) -> Result<(u32, u32), PilError> {
+    let bad = |what: String| PilError(format!("{}: {what}", elf.display()));
+    let bytes = std::fs::read(elf).map_err(|e| bad(e.to_string()))?;
+    let file = object::File::parse(&*bytes).map_err(|e| bad(e.to_string()))?;
+    file.symbols()
+        .find(|symbol| symbol.name().is_ok_and(|name| name.contains(CONTROLLER)))
+        .map(|symbol| (symbol.address() as u32, symbol.size() as u32))
+        .ok_or_else(|| bad("has no symbol for the controller".into()))
+}

@@ -1,0 +1,33 @@
+//! The rows of the fault campaign that a target has to show as well, with one seed each; bits flip in its memory.
+//! More of them: `host-sim faults --target --seeds 20`.
+
+use host_sim::faults::table::{Class, Place, Row, rows};
+use host_sim::faults::{World, target};
+
+#[test]
+fn the_image_survives_what_the_host_survives() {
+    let marked: Vec<&'static Row> = rows().filter(|row| row.place == Place::Both).collect();
+    let campaign = target::run(&World::new(), &marked, 1..2, || ()).unwrap();
+    let failed: Vec<_> = campaign.failures().collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    assert_eq!(campaign.runs, marked.len() as u64);
+}
+
+/// About half of the controller's memory is guarded state, and whatever flips there stops it at once.
+#[test]
+fn flipped_bits_of_the_image_stop_it() {
+    let row = rows().find(|row| row.name == "flip-state").unwrap();
+    let campaign = target::run(&World::new(), &[row], 1..9, || ()).unwrap();
+    let failed: Vec<_> = campaign.failures().collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    let [flips] = &campaign.rows[..] else {
+        panic!("one row")
+    };
+    assert_eq!(flips.class, Class::C);
+    assert!(flips.seen >= 2, "{} of 8 flips were seen", flips.seen);
+    assert!(
+        flips.worst_reaction_ms <= Some(10),
+        "{:?} ms",
+        flips.worst_reaction_ms
+    );
+}
