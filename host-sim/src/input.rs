@@ -4,6 +4,8 @@ use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
+
 /// Bad input: which file or option, and what is wrong with it. Never a fault of the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputError {
@@ -35,6 +37,22 @@ impl std::error::Error for InputError {}
 /// Names the file and what the system says of it.
 pub fn read(path: &Path) -> Result<String, InputError> {
     std::fs::read_to_string(path).map_err(|e| InputError::new(path.display(), e))
+}
+
+/// What a TOML text says.
+///
+/// # Errors
+/// Line, column and what is wrong there: syntax, an unknown field, a value of the wrong kind.
+pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, InputError> {
+    toml::from_str(text).map_err(|e| {
+        // The parser speaks of Rust's types; whoever wrote the file need not know them.
+        let message = e
+            .to_string()
+            .replace("expected f64", "expected a number")
+            .replace("expected u64", "expected a whole number, 0 or more")
+            .replace("expected path string", "expected a string");
+        InputError::new(name, message)
+    })
 }
 
 /// Refuses a value outside `range`, and NaN, in a sentence that names field, value and range.

@@ -1,6 +1,6 @@
-//! The form of a scenario in a TOML file: tables `driver`, `vehicle`, `guidance`, `failure`
-//! and `driver_change`, every field
-//! with a default, an unknown one an error. Ranges are checked by the scenario itself.
+//! The form of a scenario in a TOML file: tables `driver`, `vehicle`, `guidance`, `failure` and
+//! `driver_change`, every field with a default, an unknown one an error. docs/files.md lists them all. Ranges
+//! are checked by the scenario itself.
 
 use std::path::{Path, PathBuf};
 
@@ -8,14 +8,20 @@ use haptic_core::params::Params;
 use serde::Deserialize;
 
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, Sensors};
-use crate::input::InputError;
+use crate::input::{InputError, parse_toml};
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::road::{Course, PAPER_COURSE};
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario, unchecked but for its course.
 pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Scenario, InputError> {
-    let file: ScenarioFile = toml::from_str(text).map_err(|e| InputError::new(name, e))?;
+    let file: ScenarioFile = parse_toml(name, text).map_err(|error| {
+        if Course::from_toml(name, text).is_ok() {
+            let hint = "this is a course, not a scenario: a scenario names it with `course = \"FILE\"`";
+            return InputError::new(name, hint);
+        }
+        error
+    })?;
     let course = if file.course == Path::new(PAPER_COURSE) {
         Course::paper()
     } else {

@@ -6,6 +6,7 @@
 //! drives as manually.
 
 mod file;
+mod names;
 #[cfg(test)]
 mod tests;
 
@@ -21,13 +22,17 @@ use crate::models::road::Course;
 use crate::models::vehicle::VehicleParameters;
 
 /// Speeds that a scenario may have, km/h. The controller guides from 5 m/s on.
-const SPEED_KMH: std::ops::RangeInclusive<f64> = 20.0..=250.0;
+pub const SPEED_KMH: std::ops::RangeInclusive<f64> = 20.0..=250.0;
 /// Speed of the paper's experiment and evaluation, km/h.
 pub const DEFAULT_SPEED_KMH: f64 = 60.0;
 /// When the paper lets the guidance fail, s.
 pub const DEFAULT_FAILURE_TIME_S: f64 = 70.0;
 /// How long the driver takes to notice a failure, s (section 5.2).
 pub const FAILURE_REACTION_S: f64 = 1.0;
+
+/// Shortest run, s. A course has to be longer than the look-ahead by as much, so that there is something to
+/// measure.
+const LEAST_DURATION_S: f64 = 1.0;
 
 /// How the driver drives (section 5.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -234,7 +239,8 @@ impl Scenario {
     ///
     /// # Errors
     /// An unreadable file, a syntax error (with its line), an unknown field (by name), a value out of range
-    /// (by field, value and range), a course shorter than the look-ahead.
+    /// (by field, value and range), a manual driver with something that takes guidance, a course with less
+    /// than a second to drive.
     pub fn load(path: &Path) -> Result<Self, InputError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::from_toml(&path.display().to_string(), &input::read(path)?, folder)
@@ -247,14 +253,15 @@ impl Scenario {
     /// As [`Scenario::load`].
     pub fn from_toml(name: &str, text: &str, folder: &Path) -> Result<Self, InputError> {
         let scenario = file::parse(name, text, folder)?;
-        scenario.check().map_err(|e| InputError::new(name, e))?;
+        let checked = scenario.check().and_then(|()| scenario.check_manual());
+        checked.map_err(|e| InputError::new(name, e))?;
         Ok(scenario)
     }
 
     /// Whether the scenario can be simulated.
     ///
     /// # Errors
-    /// The first field out of range, with its value and range; a course shorter than the look-ahead.
+    /// The first field out of range, with its value and range; a course with less than a second to drive.
     pub fn check(&self) -> Result<(), String> {
         let within = |table: &'static str| move |e: String| format!("{table}.{e}");
         in_range("speed", self.speed_kmh, SPEED_KMH, "km/h")?;
@@ -262,22 +269,74 @@ impl Scenario {
         check_gains(self.gains).map_err(within("driver"))?;
         self.vehicle.check().map_err(within("vehicle"))?;
         in_range("t_n", self.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
-        in_range("t_f", self.guidance.t_f, 0.0..=5.0, "s").map_err(within("guidance"))?;
+        // The controller's range: its plausibility checks divide by it.
+        in_range("t_f", self.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
         self.setup()?;
         in_range("time", self.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
         if let Some(change) = &self.driver_change {
             in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
             check_gains(change.gains()).map_err(within("driver_change"))?;
         }
-        let (length, look_ahead) = (self.course.length_m(), self.look_ahead_m());
-        if length <= look_ahead {
+        if self.duration_s() < LEAST_DURATION_S {
             return Err(format!(
-                "course {} is {length:.1} m long, not longer than the look-ahead of {look_ahead:.1} m \
-                 ({:.2} s at {} km/h)",
+                "course {} is {:.1} m long, but at {} km/h it needs {:.1} m: {:.1} m of look-ahead ({:.2} s) and \
+                 {LEAST_DURATION_S} s to drive",
                 self.course.name(),
+                self.course.length_m(),
+                self.speed_kmh,
+                self.look_ahead_m() + self.speed_mps() * LEAST_DURATION_S,
+                self.look_ahead_m(),
                 self.longest_look_ahead_s(),
-                self.speed_kmh
             ));
+        }
+        Ok(())
+    }
+
+    /// Whether what is to happen in mid-drive happens before the run ends.
+    ///
+    /// # Errors
+    /// The field whose time is too late, with its value and range.
+    pub fn check_times(&self) -> Result<(), String> {
+        let change_s = self.driver_change.map(|change| change.time_s);
+        let times = [
+            ("failure.time", self.failure.at_s()),
+            ("driver_change.time", change_s),
+        ];
+        for (field, time_s) in times {
+            if let Some(time_s) = time_s {
+                self.check_time(field, time_s)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a time lies within the run.
+    ///
+    /// # Errors
+    /// `field`, the value and its range.
+    pub fn check_time(&self, field: &str, time_s: f64) -> Result<(), String> {
+        // Whole tenths, for people to read.
+        let end_s = (10.0 * self.duration_s()).floor() / 10.0;
+        in_range(field, time_s, 0.0..=end_s, "s").map_err(|e| format!("{e}: the run ends there"))
+    }
+
+    /// A manual driver has no guidance that could fail, probe or be weighed.
+    fn check_manual(&self) -> Result<(), String> {
+        if self.condition != Condition::Manual {
+            return Ok(());
+        }
+        let refused = |what: String| Err(format!("condition = \"manual\" has no guidance, but {what}"));
+        if self.failure.kind != FailureKind::None {
+            return refused(format!("failure.kind = \"{}\"; leave it out", self.failure.kind));
+        }
+        if self.guidance.probe {
+            return refused("guidance.probe = true; leave it out".into());
+        }
+        let changed = self.driver_change.map_or(0.0, |change| change.k_hg);
+        for (field, k_hg) in [("driver.K_hg", self.gains.k_hg), ("driver_change.K_hg", changed)] {
+            if k_hg != 0.0 {
+                return refused(format!("{field} = {k_hg}; it can only be 0"));
+            }
         }
         Ok(())
     }
@@ -287,7 +346,7 @@ impl Scenario {
     /// # Errors
     /// The first parameter out of range, with its value and range.
     pub fn setup(&self) -> Result<Setup, String> {
-        Setup::new(&self.controller_params()).map_err(|e| format!("guidance.{e}"))
+        Setup::new(&self.controller_params()).map_err(|e| names::in_words_of_the_file(&e))
     }
 
     /// The controller's parameters with what it knows of the vehicle.
@@ -337,6 +396,18 @@ impl Scenario {
     /// course. With table 8 it is the driver's far point.
     pub fn look_ahead_m(&self) -> f64 {
         self.speed_mps() * self.longest_look_ahead_s()
+    }
+
+    /// Arc length that the centre of gravity reaches in a run that does not diverge, m: the course's, less the
+    /// look-ahead.
+    pub fn reach_m(&self) -> f64 {
+        self.course.length_m() - self.look_ahead_m()
+    }
+
+    /// How long a run lasts that does not diverge, s. In curves the points ahead lie a little further along
+    /// the road than their distance, so a run may end some hundredths of a second earlier.
+    pub fn duration_s(&self) -> f64 {
+        self.reach_m() / self.speed_mps()
     }
 
     fn longest_look_ahead_s(&self) -> f64 {

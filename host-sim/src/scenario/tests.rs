@@ -80,6 +80,9 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ("speed = 0", "speed = 0 km/h is outside 20 to 250 km/h"),
         ("speed = nan", "speed = NaN"),
         ("speed = 'fast'", "line 1"),
+        ("speed = 'fast'", "expected a number"),
+        ("seed = -1", "expected a whole number, 0 or more"),
+        ("[[segment]]\nlength = 500", "this is a course, not a scenario"),
         ("condition = 'custom'", "custom"),
         ("sensors = 'perfect'", "perfect"),
         ("[failure]\nkind = 'brakes'", "brakes"),
@@ -90,7 +93,30 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ),
         ("[driver]\nremnant_sd = -1", "driver.remnant_sd = -1"),
         ("[vehicle]\nm = 0", "vehicle.m = 0 kg"),
-        ("[guidance]\nK_1 = 50", "guidance.k_1 = 50"),
+        (
+            "[guidance]\nK_1 = 50",
+            "guidance.K_1 = 50 N.m is outside 0 to 4 N.m",
+        ),
+        (
+            "[guidance]\na3 = 1e3",
+            "guidance.a3 = 1000 1/rad is outside 0 to 100 1/rad",
+        ),
+        (
+            "[guidance]\na4 = -1",
+            "guidance.a4 = -1 s/rad is outside 0 to 100 s/rad",
+        ),
+        (
+            "[guidance]\nK_1 = 4\na1 = 9",
+            "guidance: K_1*a1 = 36 N.m/m is outside 0 to 32 N.m/m",
+        ),
+        (
+            "[guidance]\nt_f = 0.05",
+            "guidance.t_f = 0.05 s is outside 0.1 to 3 s",
+        ),
+        (
+            "[vehicle]\nK_t = 0.2\nl_f = 0.1\nl_r = 0.1",
+            "vehicle: K_t/(l_f + l_r) = 1 1/m is outside 0.001 to 0.1 1/m",
+        ),
         ("[guidance]\nt_n = -0.1", "guidance.t_n = -0.1"),
         ("[failure]\ntime = -3", "failure.time = -3"),
         ("[driver_change]\ntime = 3\nK_d = 2", "K_hg"),
@@ -104,7 +130,7 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ),
         (
             "[driver]\nt_f = 5\n[guidance]\nt_f = 5.5",
-            "guidance.t_f = 5.5 s is outside 0 to 5 s",
+            "guidance.t_f = 5.5 s is outside 0.1 to 3 s",
         ),
     ];
     for (text, expected) in cases {
@@ -123,28 +149,79 @@ fn every_bad_field_is_named_with_its_value_and_range() {
     );
 }
 
+/// What only guidance could use, and what a manual driver may have all the same.
 #[test]
-fn a_course_shorter_than_the_look_ahead_is_refused() {
-    let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength = {length}")).unwrap();
-    // 1.0 s at 60 km/h is 16.667 m.
-    let short = Scenario {
-        course: course(16.6),
-        ..Default::default()
+fn a_manual_driver_has_nothing_that_needs_guidance() {
+    let manual = |rest: &str| parse(&format!("condition = 'manual'\n{rest}"));
+    for (text, expected) in [
+        ("[failure]\nkind = 'torque'", "failure.kind = \"torque\""),
+        ("[failure]\nkind = 'input'", "failure.kind = \"input\""),
+        ("[driver]\nK_hg = 0.5", "driver.K_hg = 0.5"),
+        ("[guidance]\nprobe = true", "guidance.probe = true"),
+        (
+            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0.25",
+            "driver_change.K_hg = 0.25",
+        ),
+    ] {
+        let error = manual(text).unwrap_err().to_string();
+        assert!(
+            error.starts_with("s.toml: condition = \"manual\"") && error.contains(expected),
+            "{error}"
+        );
     }
-    .check()
-    .unwrap_err();
-    assert!(
-        short.contains("16.6 m long") && short.contains("16.7 m"),
-        "{short}"
-    );
+    let own_arm =
+        manual("[driver]\nK_d = 3\nK_hg = 0\n[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0").unwrap();
+    assert_eq!((own_arm.condition, own_arm.gains.k_d), (Condition::Manual, 3.0));
+}
+
+/// At 60 km/h, 516.7 m less 1 s of look-ahead are 30 s.
+#[test]
+fn what_happens_in_mid_drive_happens_before_the_run_ends() {
+    let after = |failure_s, kind| Scenario {
+        course: Course::from_toml("c", "[[segment]]\nlength = 516.7").unwrap(),
+        failure: Failure {
+            kind,
+            time_s: failure_s,
+        },
+        ..Default::default()
+    };
+    assert!((after(0.0, FailureKind::None).duration_s() - 30.002).abs() < 1e-9);
+    assert_eq!(after(30.0, FailureKind::Torque).check_times(), Ok(()));
+    assert_eq!(after(70.0, FailureKind::None).check_times(), Ok(()));
     assert_eq!(
-        Scenario {
-            course: course(16.7),
-            ..Default::default()
-        }
-        .check(),
-        Ok(())
+        after(30.1, FailureKind::Input).check_times(),
+        Err("failure.time = 30.1 s is outside 0 to 30 s: the run ends there".into())
     );
+    let changing = Scenario {
+        driver_change: Some(DriverChange {
+            time_s: 31.0,
+            k_d: 3.0,
+            k_hg: 0.5,
+        }),
+        ..after(0.0, FailureKind::None)
+    };
+    let error = changing.check_times().unwrap_err();
+    assert!(error.starts_with("driver_change.time = 31 s"), "{error}");
+}
+
+#[test]
+fn a_course_with_less_than_a_second_to_drive_is_refused() {
+    let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength = {length}")).unwrap();
+    // 1.0 s of look-ahead and 1 s to drive, at 60 km/h, are 33.333 m.
+    let short = |length| {
+        let scenario = Scenario {
+            course: course(length),
+            ..Default::default()
+        };
+        scenario.check()
+    };
+    assert_eq!(
+        short(33.2),
+        Err("course c is 33.2 m long, but at 60 km/h it needs 33.3 m: 16.7 m of look-ahead (1.00 s) and 1 s to \
+             drive"
+            .into())
+    );
+    assert_eq!(short(33.4), Ok(()));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::input::{InputError, in_range};
+use crate::input::{InputError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
 pub const PAPER_COURSE: &str = "paper-course";
@@ -121,7 +121,7 @@ impl Course {
     /// # Errors
     /// As [`Course::load`].
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
-        let file: CourseFile = toml::from_str(text).map_err(|e| InputError::new(name, e))?;
+        let file: CourseFile = parse_toml(name, text)?;
         let fail = |e: String| InputError::new(name, e);
         in_range("lane_width", file.lane_width, LANE_WIDTH_M, "m").map_err(fail)?;
         if file.segment.is_empty() {
@@ -267,6 +267,7 @@ mod tests {
             ("lanes = 2\n[[segment]]\nlength = 9", "lanes"),
             ("[[segment]]\ncurvature = 0", "length"),
             ("[[segment]]\nlength = \"long\"", "line 2"),
+            ("[[segment]]\nlength = \"long\"", "expected a number"),
             ("[[segment]\nlength = 9", "line 1"),
             (
                 "[[segment]]\nlength = 150000\n[[segment]]\nlength = 150000",
