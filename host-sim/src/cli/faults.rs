@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let bar = progress::bar(chosen.len() as u64 * (seeds.end - seeds.start), "runs");
     let world = World::new();
     let campaign = if arguments.target {
-        target::run(&world, &chosen, seeds, || bar.inc(1)).map_err(|error| BadInput(error.0))?
+        target::run(&world, &chosen, seeds, || bar.inc(1))?
     } else {
         campaign::run(&world, &chosen, seeds, || bar.inc(1))
     };

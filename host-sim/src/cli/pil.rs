@@ -1,9 +1,10 @@
 //! `host-sim pil [SCENARIO.toml]`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::pil::Channel;
+use host_sim::input::InputError;
+use host_sim::pil::{Channel, PilError};
 use host_sim::scenario::Scenario;
 use host_sim::studies::processor::{self, ProcessorError};
 
@@ -41,7 +42,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     bar.finish_and_clear();
     let report = match result {
         Ok(report) => report,
-        Err(ProcessorError::Scenario(message)) => return Err(message.into()),
+        Err(ProcessorError::Scenario(message)) => {
+            let name = arguments
+                .scenario
+                .as_deref()
+                .map_or("pil".into(), Path::to_string_lossy);
+            return Err(InputError::new(name, message).into());
+        }
+        Err(ProcessorError::Target(error @ PilError::Missing(_))) => return Err(error.into()),
         // A target that cannot be built, started or heard is a comparison that failed, not bad usage.
         Err(ProcessorError::Target(error)) => {
             eprintln!("error: {error}");

@@ -62,7 +62,7 @@ impl Answers {
             .qemu
             .wait(Duration::from_millis(500))
             .map_or(String::new(), |status| format!(" ({status})"));
-        PilError(format!(
+        PilError::Failed(format!(
             "the target {what} after {} steps{status}; its log: cargo xtask log {}",
             self.steps,
             self.qemu.log().display()

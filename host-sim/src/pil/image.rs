@@ -15,7 +15,7 @@ const BOARD: &str = "mps2-an386";
 pub fn build() -> Result<PathBuf, PilError> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     if !root.join("firmware/Cargo.toml").is_file() {
-        return Err(PilError(format!(
+        return Err(PilError::Missing(format!(
             "the firmware's sources are not at {}: run from the repository that this program was built in",
             root.display()
         )));
@@ -29,19 +29,26 @@ pub fn build() -> Result<PathBuf, PilError> {
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::piped())
         .output()
-        .map_err(|e| PilError(format!("cargo does not start: {e}")))?;
+        .map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => PilError::Missing(
+                "cargo is missing, which builds the target's image: see https://rustup.rs".into(),
+            ),
+            _ => PilError::Failed(format!("cargo does not start: {e}")),
+        })?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         if text.contains("can't find crate for `core`") {
-            return Err(PilError(format!(
+            return Err(PilError::Missing(format!(
                 "the Rust target is missing: rustup target add {TARGET}"
             )));
         }
-        return Err(PilError(format!("the lock-step image does not build:\n{text}")));
+        return Err(PilError::Failed(format!(
+            "the lock-step image does not build:\n{text}"
+        )));
     }
     String::from_utf8_lossy(&output.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
         .find_map(|message| message["executable"].as_str().map(PathBuf::from))
-        .ok_or_else(|| PilError("cargo names no executable for the lock-step image".into()))
+        .ok_or_else(|| PilError::Failed("cargo names no executable for the lock-step image".into()))
 }

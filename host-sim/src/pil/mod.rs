@@ -82,11 +82,17 @@ impl FromStr for Channel {
 
 /// What went wrong, in one line, with what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PilError(pub String);
+pub enum PilError {
+    /// Something that has to be installed first.
+    Missing(String),
+    /// The image does not build, or the target does not start, answer or end as it should.
+    Failed(String),
+}
 
 impl fmt::Display for PilError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        let (Self::Missing(text) | Self::Failed(text)) = self;
+        f.write_str(text)
     }
 }
 
@@ -131,6 +137,8 @@ impl Pil {
     /// # Errors
     /// What is missing or fails on the way to a running image.
     pub fn start(channel: Channel, params: &Params, start: Start, count: bool) -> Result<Self, PilError> {
+        // Before the build, which takes longer than to say what is missing.
+        Qemu::check()?;
         let elf = image::build()?;
         let (qemu, input, output) = Qemu::start(&elf, channel, Extras { count, gdb: None })?;
         let (expected, expectations) = sync_channel(channel.window());
@@ -205,7 +213,7 @@ impl Pil {
     fn failure(&mut self) -> PilError {
         match self.end() {
             Err(error) => error,
-            Ok(report) => PilError(format!(
+            Ok(report) => PilError::Failed(format!(
                 "the target ended the run by itself after {} steps",
                 report.steps
             )),
@@ -224,10 +232,12 @@ impl Pil {
         let judge = self
             .judge
             .take()
-            .ok_or_else(|| PilError("the run is over".into()))?;
-        judge
-            .join()
-            .unwrap_or_else(|_| Err(PilError("the thread that reads the target panicked".into())))
+            .ok_or_else(|| PilError::Failed("the run is over".into()))?;
+        judge.join().unwrap_or_else(|_| {
+            Err(PilError::Failed(
+                "the thread that reads the target panicked".into(),
+            ))
+        })
     }
 }
 

@@ -40,6 +40,15 @@ pub struct Qemu {
 }
 
 impl Qemu {
+    /// Whether QEMU is installed.
+    ///
+    /// # Errors
+    /// It is not, or does not start.
+    pub fn check() -> Result<(), PilError> {
+        let version = Command::new(PROGRAM).arg("--version").output();
+        version.map(|_| ()).map_err(|e| unstarted(&e))
+    }
+
     /// Starts the lock-step image. Its log goes, still encoded, to a file beside the ELF.
     ///
     /// # Errors
@@ -71,15 +80,10 @@ impl Qemu {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .map_err(|e| match e.kind() {
-                std::io::ErrorKind::NotFound => {
-                    PilError(format!("{PROGRAM} is missing: apt-get install {PROGRAM}"))
-                }
-                _ => PilError(format!("{PROGRAM} does not start: {e}")),
-            })?;
+            .map_err(|e| unstarted(&e))?;
         let pipes = child.stdin.take().zip(child.stdout.take());
         let qemu = Self { child, log };
-        let (input, output) = pipes.ok_or_else(|| PilError(format!("{PROGRAM} has no pipes")))?;
+        let (input, output) = pipes.ok_or_else(|| PilError::Failed(format!("{PROGRAM} has no pipes")))?;
         Ok((qemu, input, output))
     }
 
@@ -104,6 +108,15 @@ impl Qemu {
     /// The run went well: nobody will ask for its log.
     pub fn discard_log(&self) {
         let _ = std::fs::remove_file(&self.log);
+    }
+}
+
+fn unstarted(error: &std::io::Error) -> PilError {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => {
+            PilError::Missing(format!("{PROGRAM} is missing: apt-get install {PROGRAM}"))
+        }
+        _ => PilError::Failed(format!("{PROGRAM} does not start: {error}")),
     }
 }
 

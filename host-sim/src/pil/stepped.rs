@@ -39,6 +39,7 @@ impl Stepped {
     /// # Errors
     /// What is missing or fails on the way to a running image.
     pub fn start(memory: bool) -> Result<Self, PilError> {
+        Qemu::check()?;
         let elf = image::build()?;
         let controller = symbol(&elf)?;
         let channel = if memory { Channel::Slcan } else { Channel::Fifo };
@@ -46,7 +47,7 @@ impl Stepped {
         let port = memory
             .then(|| TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()))
             .transpose()
-            .map_err(|e| PilError(format!("no port for the debugger's stub: {e}")))?
+            .map_err(|e| PilError::Failed(format!("no port for the debugger's stub: {e}")))?
             .map(|address| address.port());
         let extras = Extras {
             count: false,
@@ -122,7 +123,7 @@ impl Stepped {
     pub fn flip(&mut self, bit: u32) -> Result<(), PilError> {
         let port = self
             .port
-            .ok_or_else(|| PilError("the target was started without a debugger's stub".into()))?;
+            .ok_or_else(|| PilError::Failed("the target was started without a debugger's stub".into()))?;
         let address = self.controller.0 + bit / 8;
         let flip = || -> std::io::Result<()> {
             let mut gdb = Gdb::halt(port)?;
@@ -130,7 +131,7 @@ impl Stepped {
             gdb.write(address, byte ^ (1 << (bit % 8)))?;
             gdb.resume()
         };
-        flip().map_err(|e| PilError(format!("the debugger's stub of QEMU: {e}")))
+        flip().map_err(|e| PilError::Failed(format!("the debugger's stub of QEMU: {e}")))
     }
 
     /// Ends the machine.
@@ -165,7 +166,7 @@ impl Stepped {
 
 /// Address and length of the controller in the image.
 fn symbol(elf: &std::path::Path) -> Result<(u32, u32), PilError> {
-    let bad = |what: String| PilError(format!("{}: {what}", elf.display()));
+    let bad = |what: String| PilError::Failed(format!("{}: {what}", elf.display()));
     let bytes = std::fs::read(elf).map_err(|e| bad(e.to_string()))?;
     let file = object::File::parse(&*bytes).map_err(|e| bad(e.to_string()))?;
     file.symbols()

@@ -8,7 +8,7 @@ use crate::closed_loop::{Cycle, drive};
 use crate::guidance::OverBus;
 use crate::models::road::Centreline;
 use crate::pil::{Channel, Pil, PilError, Report};
-use crate::scenario::{Condition, Scenario};
+use crate::scenario::{Condition, Scenario, Sensors};
 
 /// Why there is no comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,22 +19,30 @@ pub enum ProcessorError {
     Target(PilError),
 }
 
-/// Runs a scenario over the bus, whatever its sensors say: the image knows no other way in. With `count`, the
-/// target counts its instructions. `progress` is told each step's number.
+/// Runs a scenario over the bus. With `count`, the target counts its instructions. `progress` is told each
+/// step's number.
 ///
 /// # Errors
-/// A manual scenario, which has no controller to compare; as [`Scenario::check`]; what is missing or fails on
-/// the way to a running image.
+/// A manual scenario, which has no controller to compare, or one past the bus, the image's only way in; as
+/// [`Scenario::check`] and [`Scenario::check_times`]; what is missing or fails on the way to a running image.
 pub fn run(
     scenario: &Scenario,
     channel: Channel,
     count: bool,
     mut progress: impl FnMut(u32),
 ) -> Result<Report, ProcessorError> {
-    scenario.check().map_err(ProcessorError::Scenario)?;
+    let checked = scenario.check().and_then(|()| scenario.check_times());
+    checked.map_err(ProcessorError::Scenario)?;
     if scenario.condition == Condition::Manual {
         return Err(ProcessorError::Scenario(
-            "condition = manual has no controller whose frames could be compared".into(),
+            "condition = \"manual\" has no controller whose frames could be compared; use high, mid or low"
+                .into(),
+        ));
+    }
+    if scenario.sensors == Sensors::Exact {
+        return Err(ProcessorError::Scenario(
+            "sensors = \"exact\" goes past the bus, whose frames are to be compared; use sensors = \"paper\""
+                .into(),
         ));
     }
     let params = scenario.controller_params();
