@@ -92,6 +92,14 @@ fn another_course_speed_and_window_are_measured_without_claims() {
     let results = json(&output);
     assert_eq!(results["window_m"], serde_json::json!([0.0, 250.0]));
     assert_eq!(results["claims"], serde_json::json!([]));
+    // 250 m less 13.9 m of look-ahead last 17 s, and the failure comes at 70 s unless asked for.
+    let note = results["notes"][0].as_str().unwrap();
+    assert!(
+        note.starts_with("no run lasts until the failure at 70 s"),
+        "{note}"
+    );
+    assert!(stderr(&output).contains(note));
+    assert!(results["runs"][4]["failure_s_m"].is_null());
     assert!(directory.path().join("elsewhere/report.html").exists());
 
     let narrow = host_sim(
@@ -115,6 +123,9 @@ fn a_diverged_evaluation_is_flagged_and_has_no_nan() {
             .iter()
             .any(|run| run["diverged"] == true)
     );
+    // 70 s at 120 km/h are 2333 m, behind the window's 1740 m.
+    let note = results["notes"][0].as_str().unwrap();
+    assert!(note.contains("behind the window of 1080 to 1740 m"), "{note}");
     for file in [
         "results.json",
         "report.html",
@@ -163,24 +174,57 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("tight.toml", "[[segment]]\nlength = 100\ncurvature = 3\n");
     write("unknown.toml", "[driver]\nt_q = 1\n");
     write("manual.toml", "condition = 'manual'\n");
-    let cases: [(&[&str], &str); 12] = [
+    write("exact.toml", "sensors = 'exact'\n");
+    write("late.toml", "[failure]\nkind = 'torque'\ntime = 5000\n");
+    write("empty.toml", "");
+    write("course.toml", "[[segment]]\nlength = 500\n");
+    let cases: [(&[&str], &str); 20] = [
         (&["evaluate", "--course", "none.toml"], "none.toml"),
         (&["evaluate", "--course", "short.toml"], "look-ahead"),
         (&["evaluate", "--course", "tight.toml"], "curvature = 3"),
         (
             &["evaluate", "--speed", "5"],
-            "speed = 5 km/h is outside 20 to 250 km/h",
+            "--speed = 5 km/h is outside 20 to 250 km/h",
+        ),
+        (
+            &["--speed", "-60"],
+            "--speed = -60 km/h is outside 20 to 250 km/h",
+        ),
+        (
+            &["evaluate", "--window", "-5", "100"],
+            "--window from = -5 m is outside 0 to 3332.3 m: runs end at 3333.3 m",
+        ),
+        (
+            &["evaluate", "--window", "3340", "3350"],
+            "--window from = 3340 m",
         ),
         (&["evaluate", "--speed", "nan"], "speed = NaN"),
         (&["evaluate", "--window", "500", "100"], "window"),
         (
             &["evaluate", "--window", "100", "9000"],
-            "window to = 9000 m is outside 0 to 3350 m",
+            "--window to = 9000 m is outside 0 to 3350 m",
         ),
-        (&["evaluate", "--failure-time=-1"], "failure.time = -1"),
+        (
+            &["evaluate", "--failure-time", "-1"],
+            "--failure-time = -1 s is outside 0 to 200 s",
+        ),
+        (
+            &["evaluate", "--failure-time", "5000"],
+            "--failure-time = 5000 s is outside 0 to 200 s: the run ends there",
+        ),
+        (
+            &["run", "late.toml"],
+            "late.toml: failure.time = 5000 s is outside 0 to 200 s",
+        ),
+        (
+            &["evaluate", "--course", "empty.toml"],
+            "empty.toml: a course needs",
+        ),
+        (&["run", "course.toml"], "course.toml: this is a course"),
+        (&["pil", "exact.toml"], "exact.toml: sensors = \"exact\""),
         (&["evaluate", "--sensors", "perfect"], "perfect"),
         (&["run", "unknown.toml"], "t_q"),
-        (&["pil", "manual.toml"], "manual"),
+        (&["pil", "manual.toml"], "manual.toml: condition = \"manual\""),
         (&["fly"], "fly"),
     ];
     for (arguments, expected) in cases {
@@ -198,4 +242,37 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         );
         assert!(output.stdout.is_empty(), "{arguments:?}");
     }
+}
+
+/// What to install, in one line, and no failed comparison.
+#[cfg(unix)]
+#[test]
+fn what_a_processor_in_the_loop_lacks_is_named_and_exits_with_2() {
+    use std::os::unix::fs::PermissionsExt;
+    let directory = tempfile::tempdir().unwrap();
+    let script = |name: &str, text: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        path
+    };
+    let cargo = script(
+        "cargo-without-target",
+        "echo \"error[E0463]: can't find crate for \\`core\\`\" >&2; exit 101",
+    );
+    let pil = || {
+        let output = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+            .arg("pil")
+            .env("PATH", directory.path())
+            .env("CARGO", &cargo)
+            .output()
+            .unwrap();
+        assert!(output.stdout.is_empty());
+        (output.status.code(), stderr(&output))
+    };
+    let no_qemu = "error: qemu-system-arm is missing: apt-get install qemu-system-arm\n";
+    assert_eq!(pil(), (Some(2), no_qemu.into()));
+    script("qemu-system-arm", "exit 0");
+    let no_target = "error: the Rust target is missing: rustup target add thumbv7em-none-eabihf\n";
+    assert_eq!(pil(), (Some(2), no_target.into()));
 }

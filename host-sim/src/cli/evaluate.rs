@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use host_sim::input::InputError;
+use host_sim::input::in_range;
 use host_sim::metrics::Window;
 use host_sim::models::road::Course;
-use host_sim::scenario::{DEFAULT_FAILURE_TIME_S, DEFAULT_SPEED_KMH, Failure, Scenario, Sensors};
+use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH, Scenario, Sensors};
+use host_sim::studies::check_window;
 use host_sim::studies::evaluate::{Evaluation, RUNS, evaluate};
 
 use super::table::{self, number};
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -18,13 +19,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     course: Option<PathBuf>,
     /// Speed, km/h (20 to 250)
-    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH)]
+    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
     speed: f64,
-    /// When the guidance fails in the runs with failure, s after the start
-    #[arg(long, value_name = "S", default_value_t = DEFAULT_FAILURE_TIME_S)]
-    failure_time: f64,
+    /// When the guidance fails in the runs with failure, s after the start; default: 70
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    failure_time: Option<f64>,
     /// Stretch of road to measure, m; default: 1080 1740 on paper-course, else the whole course
-    #[arg(long, num_args = 2, value_names = ["FROM", "TO"])]
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true)]
     window: Option<Vec<f64>>,
     /// What the controller sees: full resolution every millisecond, or the paper's sensors over the bus
     #[arg(long, value_enum, default_value_t = SensorsArgument::Paper)]
@@ -44,29 +45,35 @@ enum SensorsArgument {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let course = match &arguments.course {
         Some(path) => Course::load(path)?,
         None => Course::paper(),
     };
-    let base = Scenario {
+    let mut base = Scenario {
         course,
         speed_kmh: arguments.speed,
         sensors: match arguments.sensors {
             SensorsArgument::Exact => Sensors::Exact,
             SensorsArgument::Paper => Sensors::Paper,
         },
-        failure: Failure {
-            time_s: arguments.failure_time,
-            ..Failure::default()
-        },
         ..Scenario::default()
     };
+    base.check()?;
+    // On a course too short for the default, the results say so.
+    if let Some(time_s) = arguments.failure_time {
+        base.check_time("--failure-time", time_s)?;
+        base.failure.time_s = time_s;
+    }
     let window = match arguments.window.as_deref() {
         Some(&[from_m, to_m]) => Some(Window { from_m, to_m }),
         _ => None,
     };
+    if let Some(window) = window {
+        check_window(window, &base).map_err(|e| format!("--{e}"))?;
+    }
     let bar = progress::bar(RUNS as u64, "runs");
-    let evaluation = evaluate(&base, window, || bar.inc(1)).map_err(|e| InputError::new("evaluate", e))?;
+    let evaluation = evaluate(&base, window, || bar.inc(1))?;
     bar.finish_and_clear();
     evaluation.write(&arguments.out)?;
     if arguments.json {
@@ -74,6 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&readable(&evaluation))?;
     }
+    print_notes(&evaluation.results.notes);
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(if evaluation.results.all_claims_hold() {
         Outcome::Good

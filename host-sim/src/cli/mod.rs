@@ -1,6 +1,7 @@
 //! The command line: options in, tables, files and exit codes out.
 //!
-//! Exit codes: 0 all is well; 1 a check or a comparison failed; 2 bad input or usage. Results go to stdout, all
+//! Exit codes: 0 all is well; 1 a check or a comparison failed; 2 bad input or usage, or a program that is not
+//! installed. Results go to stdout, all
 //! else (progress, where the files are, what is wrong) to stderr; with `--json` stdout holds one JSON object.
 //!
 //! One file per subcommand. Not here: anything that a study or a model decides.
@@ -27,7 +28,8 @@ use serde::Serialize;
 ///
 /// Without a subcommand: the evaluation, as `evaluate` with the same options.
 ///
-/// Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage.
+/// Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage, or a program that is not
+/// installed.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true)]
 struct Cli {
@@ -104,6 +106,13 @@ pub(crate) fn main() -> ExitCode {
 /// One JSON object on stdout.
 fn print_json(value: &impl Serialize) -> Result<(), BadInput> {
     print(&serde_json::to_string_pretty(value)?)
+}
+
+/// What a reader of the results has to know, on stderr: stdout is the results' own.
+fn print_notes(notes: &[String]) {
+    for note in notes {
+        eprintln!("note: {note}");
+    }
 }
 
 /// Text on stdout. A reader that has seen enough (`| head`) is no error.

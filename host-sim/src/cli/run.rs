@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use host_sim::input::InputError;
 use host_sim::metrics::DEFINITIONS;
 use host_sim::scenario::Scenario;
 use host_sim::studies::run::{SingleRun, run as simulate};
 
 use super::table::{self, number};
-use super::{BadInput, Outcome, print, print_json};
+use super::{BadInput, Outcome, print, print_json, print_notes};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -24,7 +25,8 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let single = simulate(Scenario::load(&arguments.scenario)?)?;
+    let scenario = Scenario::load(&arguments.scenario)?;
+    let single = simulate(scenario).map_err(|e| InputError::new(arguments.scenario.display(), e))?;
     if let Some(directory) = &arguments.out {
         single.write(directory)?;
         eprintln!("Report: {}", directory.join("report.html").display());
@@ -34,6 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&readable(&single))?;
     }
+    print_notes(&single.results.notes);
     Ok(Outcome::Good)
 }
 

@@ -122,11 +122,14 @@ metrics! {
         "level of haptic authority: Abbink, Mulder and Boer 2012, Cogn. Tech. Work 14:19-28; the ratio of \
          integrals is ours";
     peak_lateral_error_after_failure_m, "Peak after failure", "m",
-        "Largest |e| from the instant of the failure to the end of the window.",
+        "Largest |e| from the instant of the failure to the end of the window, a stretch between the failure and \
+         the window included; no value if the failure comes behind the window.",
         "Wang et al. 2022, section 5.2";
     time_to_recover_s, "Time to recover", "s",
         "Time from the failure to the first sample from which |e| stays at or below the peak of the same run \
-         without failure until the window ends. 0: never above it. No value: above it at the end.",
+         without failure until the window ends. Both are taken over the window and, if the failure comes before \
+         it, from the failure on. 0: never above it. No value: above it at the end, or the failure comes behind \
+         the window.",
         "ours";
 }
 

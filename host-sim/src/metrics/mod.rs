@@ -43,8 +43,9 @@ pub struct Window {
 pub struct Failure {
     /// Instant of the failure, s since the start of the run.
     pub time_s: f64,
-    /// Peak lateral error of the same run without the failure over the same window, m: recovered means at or
-    /// below it. `None`: not known, and no time to recover is given.
+    /// Peak lateral error of the same run without the failure, m, over the window and, if the failure comes
+    /// before it, from then on: recovered means at or below it. `None`: not known, and no time to recover is
+    /// given.
     pub nominal_peak_lateral_error_m: Option<f64>,
 }
 
@@ -104,7 +105,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
     }
     let recovery = circumstances
         .failure
-        .map(|failure| recovery(samples, &failure))
+        .map(|failure| recovery(&trace.samples[..range.end], &failure))
         .unwrap_or_default();
     let reversals_per_min = |(gap_deg, cut_off_hz)| {
         // The whole run is filtered, so that the ends of the window carry no transient of the filter.
@@ -197,9 +198,14 @@ struct Recovery {
     time_to_recover_s: Option<f64>,
 }
 
+/// Of the samples up to the end of the window. What happens between a failure and a window that begins later
+/// counts: it is what the driver has to recover from.
 fn recovery(samples: &[Sample], failure: &Failure) -> Recovery {
     let start = samples.partition_point(|s| s.time_s < failure.time_s);
     let after = &samples[start..];
+    if !after.iter().all(is_finite) {
+        return Recovery::default();
+    }
     let peak_lateral_error_m = after.iter().map(|s| s.lateral_error_m.abs()).reduce(f64::max);
     let time_to_recover_s = failure.nominal_peak_lateral_error_m.and_then(|threshold| {
         match after.iter().rposition(|s| s.lateral_error_m.abs() > threshold) {

@@ -217,12 +217,12 @@ fn recovery_lasts_to_the_end_of_the_window() {
         lateral_error_m: error(t),
         ..Sample::default()
     });
-    let with = |threshold, to_m| {
+    let within = |threshold, from_m, to_m| {
         let failure = Failure {
             time_s: 2.0,
             nominal_peak_lateral_error_m: threshold,
         };
-        let window = Some(Window { from_m: 0.0, to_m });
+        let window = Some(Window { from_m, to_m });
         let metrics = measure(
             &trace,
             &Circumstances {
@@ -236,7 +236,13 @@ fn recovery_lasts_to_the_end_of_the_window() {
             metrics.time_to_recover_s,
         )
     };
+    let with = |threshold, to_m| within(threshold, 0.0, to_m);
     assert_eq!(with(Some(0.2), 200.0), (Some(0.5), Some(5.0)));
+    assert_eq!(
+        within(Some(0.4), 90.0, 200.0),
+        (Some(0.5), Some(2.0)),
+        "the window begins at 4.5 s, after the recovery"
+    );
     assert_eq!(with(Some(0.4), 200.0), (Some(0.5), Some(2.0)));
     assert_eq!(with(Some(0.5), 200.0), (Some(0.5), Some(0.0)));
     assert_eq!(

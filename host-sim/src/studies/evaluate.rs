@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::claims::{self, Claim};
-use super::record::default_window;
+use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::{OutputError, RunRecord, evaluation_files};
 use crate::closed_loop::{Run, simulate};
 use crate::metrics::Window;
@@ -51,6 +51,8 @@ pub struct Results {
     pub runs: Vec<RunRecord>,
     /// What the evaluation must show; empty where it was not run as the paper ran it.
     pub claims: Vec<Claim>,
+    /// What a reader has to know of these results.
+    pub notes: Vec<String>,
 }
 
 impl Results {
@@ -71,15 +73,15 @@ impl Results {
 /// failure; its driver's delay, condition and kind of failure are varied. `progress` is called after each run.
 ///
 /// # Errors
-/// As [`Scenario::check`], and a window that does not lie on the course.
+/// As [`Scenario::check`], and a window that does not lie where the runs drive.
 pub fn evaluate(
     base: &Scenario,
     window: Option<Window>,
     progress: impl Fn() + Sync,
 ) -> Result<Evaluation, String> {
     let window = window.unwrap_or_else(|| default_window(&base.course));
-    super::check_window(window, &base.course)?;
     base.check()?;
+    super::check_window(window, base)?;
     let centreline = Centreline::new(&base.course);
     let runs: Vec<(Scenario, Run)> = scenarios(base)
         .into_par_iter()
@@ -91,18 +93,18 @@ pub fn evaluate(
         .collect::<Result<_, String>>()?;
 
     let peak_without_failure = |failed: &Scenario| {
-        let (scenario, run) = runs.iter().find(|(scenario, _)| {
+        let failure_time_s = failed.failure.at_s()?;
+        let (_, run) = runs.iter().find(|(scenario, _)| {
             let same = scenario.driver == failed.driver && scenario.condition == failed.condition;
             same && scenario.failure.kind == FailureKind::None
         })?;
-        RunRecord::new(scenario, run, window, None)
-            .metrics
-            .peak_lateral_error_m
+        nominal_peak_m(run, window, failure_time_s)
     };
-    let records = runs
+    let records: Vec<_> = runs
         .iter()
         .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
         .collect();
+    let notes = failure_notes(base.failure.time_s, &records, window);
     let mut results = Results {
         course: base.course.name().into(),
         course_length_m: base.course.length_m(),
@@ -112,6 +114,7 @@ pub fn evaluate(
         window_m: [window.from_m, window.to_m],
         runs: records,
         claims: Vec::new(),
+        notes,
     };
     if claims::apply_to(base, window) {
         results.claims = claims::check(&results);

@@ -1,9 +1,10 @@
-//! The files that an evaluation leaves: figures 8 and 9, figure 9 beside a handover, time series, results, and the report that shows them.
+//! The files that an evaluation leaves: figures 8 and 9, figure 9 beside a handover, time series, results, and
+//! the report that shows them.
 
 use std::path::Path;
 
 use super::evaluate::{DRIVERS_T_P, Evaluation, Results};
-use super::{OutputError, RunRecord, curves};
+use super::{OutputError, RunRecord, curves, notes};
 use crate::metrics::Definition;
 use crate::models::road::PAPER_COURSE;
 use crate::plot::lateral_error::{DriverPanel, figure};
@@ -207,10 +208,11 @@ fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Repor
         title: "Evaluation of shared steering control".into(),
         summary: format!(
             "Three drivers under four conditions on {}, {} km/h, the shipping controller in the loop, sensors: \
-             {}. {course}Metrics are taken over {from} to {to} m of the road.",
+             {}. {course}Metrics are taken over {from} to {to} m of the road. {}",
             results.course,
             results.speed_kmh,
             format!("{:?}", results.sensors).to_lowercase(),
+            notes(&results.notes),
         ),
         sections,
     }

@@ -33,6 +33,11 @@ pub use record::{RunRecord, check_window};
 use crate::plot::PlotError;
 use crate::report::WriteError;
 
+/// Notes as the end of a report's summary.
+fn notes(notes: &[String]) -> String {
+    notes.iter().map(|note| format!("Note: {note}. ")).collect()
+}
+
 /// Why the files of a study could not be made.
 #[derive(Debug)]
 pub enum OutputError {

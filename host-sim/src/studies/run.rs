@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::record::default_window;
+use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::reliance::Readings;
 use super::{OutputError, RunRecord, run_files};
 use crate::closed_loop::{Cycle, Observer, Run, observe, simulate};
@@ -50,13 +50,17 @@ pub struct SingleResults {
     /// The run's record.
     #[serde(flatten)]
     pub record: RunRecord,
+    /// What a reader has to know of these results.
+    pub notes: Vec<String>,
 }
 
 /// Simulates a scenario; one with a failure also without it, to tell when the driver has recovered.
 ///
 /// # Errors
-/// As [`Scenario::check`].
+/// As [`Scenario::check`] and [`Scenario::check_times`].
 pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
+    scenario.check()?;
+    scenario.check_times()?;
     let centreline = Centreline::new(&scenario.course);
     let window = default_window(&scenario.course);
     let (mut ecu, mut readings) = (EcuEvents::new(), Readings::default());
@@ -64,7 +68,7 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
         ecu.cycle(cycle);
         readings.cycle(cycle);
     })?;
-    let nominal_peak_m = if scenario.failure.at_s().is_some() {
+    let nominal_peak_m = if let Some(failure_time_s) = scenario.failure.at_s() {
         let failure = Failure {
             kind: FailureKind::None,
             ..scenario.failure
@@ -73,13 +77,11 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
             failure,
             ..scenario.clone()
         };
-        let run = simulate(&nominal, &centreline)?;
-        RunRecord::new(&nominal, &run, window, None)
-            .metrics
-            .peak_lateral_error_m
+        nominal_peak_m(&simulate(&nominal, &centreline)?, window, failure_time_s)
     } else {
         None
     };
+    let record = RunRecord::new(&scenario, &run, window, nominal_peak_m);
     let results = SingleResults {
         course: scenario.course.name().into(),
         course_length_m: scenario.course.length_m(),
@@ -89,7 +91,8 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
         seed: scenario.seed,
         reliance: readings.readings.iter().rev().find_map(|r| r.estimate),
         window_m: [window.from_m, window.to_m],
-        record: RunRecord::new(&scenario, &run, window, nominal_peak_m),
+        record,
+        notes: failure_notes(scenario.failure.time_s, &[record], window),
     };
     Ok(SingleRun {
         scenario,

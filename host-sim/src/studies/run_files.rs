@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::reliance::reliance_panel;
 use super::run::SingleRun;
-use super::{OutputError, curves};
+use super::{OutputError, curves, notes};
 use crate::closed_loop::Ending;
 use crate::metrics::DEFINITIONS;
 use crate::plot::{Axis, Figure, Line, Marker, Panel};
@@ -121,13 +121,14 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
     Report {
         title: "A run under shared steering control".into(),
         summary: format!(
-            "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m.",
+            "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
             scenario.course.name(),
             scenario.speed_kmh,
             scenario.driver.t_p,
             scenario.gains.k_d,
             scenario.gains.k_hg,
             scenario.condition,
+            notes(&single.results.notes),
         ),
         sections: vec![
             Section {
