@@ -178,7 +178,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("late.toml", "[failure]\nkind = 'torque'\ntime = 5000\n");
     write("empty.toml", "");
     write("course.toml", "[[segment]]\nlength = 500\n");
-    let cases: [(&[&str], &str); 20] = [
+    let cases: [(&[&str], &str); 22] = [
         (&["evaluate", "--course", "none.toml"], "none.toml"),
         (&["evaluate", "--course", "short.toml"], "look-ahead"),
         (&["evaluate", "--course", "tight.toml"], "curvature = 3"),
@@ -226,6 +226,14 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         (&["run", "unknown.toml"], "t_q"),
         (&["pil", "manual.toml"], "manual.toml: condition = \"manual\""),
         (&["fly"], "fly"),
+        (
+            &["evaluate", "--out", "short.toml/out"],
+            "cannot write short.toml/out: ",
+        ),
+        (
+            &["run", "empty.toml", "--out", "short.toml"],
+            "cannot write short.toml: ",
+        ),
     ];
     for (arguments, expected) in cases {
         let output = host_sim(directory.path(), arguments);
@@ -275,4 +283,35 @@ fn what_a_processor_in_the_loop_lacks_is_named_and_exits_with_2() {
     script("qemu-system-arm", "exit 0");
     let no_target = "error: the Rust target is missing: rustup target add thumbv7em-none-eabihf\n";
     assert_eq!(pil(), (Some(2), no_target.into()));
+}
+
+/// Ctrl-C in the middle of the runs: the files of the last complete run stay, and nothing else.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_evaluation_leaves_the_old_files() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("report.html"), "old").unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .current_dir(directory.path())
+        .stderr(std::process::Stdio::null())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    while !out.join(".unfinished/lock").exists() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before it began");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let interrupt = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(interrupt.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let left: Vec<_> = std::fs::read_dir(&out)
+        .unwrap()
+        .map(|e| e.unwrap().file_name())
+        .collect();
+    assert_eq!(left, ["report.html"]);
+    assert_eq!(std::fs::read_to_string(out.join("report.html")).unwrap(), "old");
 }

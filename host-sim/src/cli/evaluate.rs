@@ -10,6 +10,7 @@ use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH, Scenario, Sensors};
 use host_sim::studies::check_window;
 use host_sim::studies::evaluate::{Evaluation, RUNS, evaluate};
 
+use super::output::Output;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
@@ -72,10 +73,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(window) = window {
         check_window(window, &base).map_err(|e| format!("--{e}"))?;
     }
+    let output = Output::begin(&arguments.out)?;
     let bar = progress::bar(RUNS as u64, "runs");
     let evaluation = evaluate(&base, window, || bar.inc(1))?;
     bar.finish_and_clear();
-    evaluation.write(&arguments.out)?;
+    output.finish(|place| evaluation.write(place))?;
     if arguments.json {
         print_json(&evaluation.results)?;
     } else {

@@ -8,6 +8,7 @@ use host_sim::models::road::{Course, PAPER_COURSE};
 use host_sim::scenario::DEFAULT_SPEED_KMH;
 use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
 
+use super::output::Output;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json};
 
@@ -31,7 +32,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     course: Option<PathBuf>,
     /// Speed on that course, km/h (20 to 250)
-    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH)]
+    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
     speed: f64,
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/identify")]
@@ -59,6 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::Paper => Method::Paper,
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
+    let output = Output::begin(&arguments.out)?;
     let log = DriveLog::open(&arguments.log, arguments.manual)?;
     let name = arguments.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
@@ -70,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         };
         drive.drive_again(course, arguments.speed, &options)?;
     }
-    drive.write(&arguments.out)?;
+    output.finish(|place| drive.write(place))?;
     if arguments.json {
         print_json(&drive.results)?;
     } else {

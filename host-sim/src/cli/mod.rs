@@ -12,6 +12,7 @@ mod experiment;
 mod faults;
 mod handover;
 mod identify;
+mod output;
 mod pil;
 mod progress;
 mod reliance;

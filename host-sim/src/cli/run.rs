@@ -8,6 +8,7 @@ use host_sim::metrics::DEFINITIONS;
 use host_sim::scenario::Scenario;
 use host_sim::studies::run::{SingleRun, run as simulate};
 
+use super::output::Output;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, print_notes};
 
@@ -26,9 +27,10 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let scenario = Scenario::load(&arguments.scenario)?;
+    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let single = simulate(scenario).map_err(|e| InputError::new(arguments.scenario.display(), e))?;
-    if let Some(directory) = &arguments.out {
-        single.write(directory)?;
+    if let (Some(output), Some(directory)) = (output, &arguments.out) {
+        output.finish(|place| single.write(place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if arguments.json {

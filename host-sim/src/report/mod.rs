@@ -2,15 +2,18 @@
 //!
 //! A [`Report`] is a title and sections; a [`Section`] is a heading and blocks: text, tables, figures, events.
 //! Everything in it is data and is escaped when it is written, so a name from a scenario file can hold any
-//! character. The HTML loads nothing from anywhere. Files are written whole or not at all ([`write_file`]).
+//! character. The HTML loads nothing from anywhere. Files are written whole or not at all ([`write_file`]), and
+//! those of a study together or not at all ([`FileSet`]).
 //!
 //! What to report is decided by studies, NOT here.
 
+mod file_set;
 mod files;
 mod html;
 mod metric_tables;
 mod trace_csv;
 
+pub use file_set::FileSet;
 pub use files::{WriteError, write_file, write_json};
 pub use metric_tables::{definitions_table, metrics_table};
 pub use trace_csv::write_trace_csv;
