@@ -16,7 +16,7 @@ use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Course file (TOML: lane_width, [[segment]]); default: the built-in paper-course
+    /// Course file (TOML: lane_width, [[segment]]; see docs/files.md); default: the built-in paper-course
     #[arg(long, value_name = "FILE")]
     course: Option<PathBuf>,
     /// Speed, km/h (20 to 250)

@@ -12,7 +12,7 @@ use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Scenario file (TOML); default: medium reliance on paper-course
+    /// Scenario file (TOML, see docs/files.md); default: medium reliance on paper-course
     #[arg(value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
     /// How frames reach the target: fifo (a pipe) or slcan (ASCII on the UART, much slower)

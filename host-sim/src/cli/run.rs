@@ -14,7 +14,7 @@ use super::{BadInput, Outcome, print, print_json, print_notes};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Scenario file (TOML); every field has a default
+    /// Scenario file (TOML); every field has a default (docs/files.md lists them, examples/ has some)
     #[arg(value_name = "SCENARIO.toml")]
     scenario: PathBuf,
     /// Directory for a figure, the time series, the results and a report; default: no files
