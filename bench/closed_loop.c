@@ -11,6 +11,9 @@
  * `--sensors exact` hands the law exact errors each tick; `--sensors paper` sends them at 120 Hz through protected
  * frames, and the torque comes back in one.
  *
+ * Above 500 lines because it is one file on purpose: a peer that a stranger compiles with one command and reads from
+ * equation to trace, with nothing shared.
+ *
  * Not here: modes, envelope, monitor, noise, courses other than the paper-course.
  *
  *   gcc -O3 -std=c11 -Wall -Wextra -o target/closed_loop bench/closed_loop.c -lm

@@ -1,5 +1,8 @@
 //! The paper's evaluation (section 5, figures 8 and 9): every number of an independent float64 implementation's
 //! table, and the paper's claims as orderings.
+//!
+//! The table itself is data of another program and is kept once, in `host_sim::studies::claims`. What is compared
+//! with it, and how closely, is this test's own: peak and mean from the traces, and the tolerances.
 
 use haptic_core::params::Params;
 use host_sim::closed_loop::{Run, drive};

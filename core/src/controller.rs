@@ -1,5 +1,8 @@
 //! The controller's step: decoded inputs in, one torque command out. The one place that sees the mode
 //! machine, the plausibility checks, the law, the envelope and the ramps together.
+//!
+//! Above 500 lines because the order of the step is its meaning: inputs, modes, torque, limit and feedback share
+//! one state that no other file may touch, and are read in one go. A block that can stand alone has its own file.
 
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
