@@ -28,8 +28,8 @@ pub struct Reference {
 }
 
 /// The independent implementation's table, kept once: here for the report of everybody's evaluation, and read by
-/// `tests/paper_claims.rs`. That test stays independent, for no code made or can change these numbers: it computes
-/// peak and mean from the traces by its own arithmetic, and has its own tolerances.
+/// `tests/paper_claims.rs`. That test stays independent: no code computes these numbers, it takes
+/// peak and mean from the traces by its own arithmetic, and it has its own tolerances.
 pub const TABLE: [Reference; 12] = [
     row(0.1, Manual, [0.1255, 0.0479], None),
     row(0.1, High, [0.1255, 0.0438], Some([0.4408, 0.1002])),
