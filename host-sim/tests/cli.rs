@@ -178,8 +178,12 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("late.toml", "[failure]\nkind = 'torque'\ntime = 5000\n");
     write("empty.toml", "");
     write("course.toml", "[[segment]]\nlength = 500\n");
-    let cases: [(&[&str], &str); 22] = [
+    let cases: [(&[&str], &str); 23] = [
         (&["evaluate", "--course", "none.toml"], "none.toml"),
+        (
+            &["evaluate", "--course", "paper-course", "--window", "0", "3351"],
+            "--window to = 3351 m is outside 0 to 3350 m",
+        ),
         (&["evaluate", "--course", "short.toml"], "look-ahead"),
         (&["evaluate", "--course", "tight.toml"], "curvature = 3"),
         (

@@ -48,7 +48,7 @@ enum SensorsArgument {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let course = match &arguments.course {
-        Some(path) => Course::load(path)?,
+        Some(path) => Course::open(path)?,
         None => Course::paper(),
     };
     let mut base = Scenario {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use host_sim::identify::{DriveLog, Identification, Options};
-use host_sim::models::road::{Course, PAPER_COURSE};
+use host_sim::models::road::Course;
 use host_sim::scenario::DEFAULT_SPEED_KMH;
 use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
 
@@ -65,12 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let name = arguments.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
     if let Some(path) = &arguments.course {
-        let course = if path.as_os_str() == PAPER_COURSE {
-            Course::paper()
-        } else {
-            Course::load(path)?
-        };
-        drive.drive_again(course, arguments.speed, &options)?;
+        drive.drive_again(Course::open(path)?, arguments.speed, &options)?;
     }
     output.finish(|place| drive.write(place))?;
     if arguments.json {

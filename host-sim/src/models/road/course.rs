@@ -107,6 +107,17 @@ impl Course {
         }
     }
 
+    /// The built-in course if `path` is its name, else as [`Course::load`].
+    ///
+    /// # Errors
+    /// As [`Course::load`].
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        if path == Path::new(PAPER_COURSE) {
+            return Ok(Self::paper());
+        }
+        Self::load(path)
+    }
+
     /// Reads and checks a course file.
     ///
     /// # Errors
