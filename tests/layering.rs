@@ -40,7 +40,7 @@ const CORE: Arrows = &[
 const HOST_SIM: Arrows = &[
     ("closed_loop", &["guidance", "models", "scenario", "trace"]),
     ("ecu_events", &["closed_loop", "models", "report"]),
-    ("faults", &["closed_loop", "ecu_events", "guidance", "models", "report", "scenario"]),
+    ("faults", &["closed_loop", "ecu_events", "guidance", "models", "pil", "report", "scenario"]),
     ("guidance", &["models"]),
     ("metrics", &["trace"]),
     ("models", &["input"]),
