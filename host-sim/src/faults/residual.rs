@@ -9,6 +9,9 @@
 
 use crate::models::vehicle::VehicleParameters;
 
+/// Share of a margin from which on sensors cannot hide it: a wheel angle of 0.1 deg is worth up to 1.2 %.
+const SURELY_SEEN: f64 = 1.02;
+
 /// A movement that was predicted and did not come, m.
 pub(super) const LANE_MARGIN_M: f64 = 0.4;
 /// Momentum on the column that did not show in the wheel, N.m.s.
@@ -17,6 +20,9 @@ pub(super) const COLUMN_MARGIN_NMS: f64 = 0.6;
 pub(super) const LANE_STEP_M: f64 = 0.3;
 /// Further than the far-point yaw error can go between two samples, rad.
 pub(super) const YAW_STEP_RAD: f64 = 0.1;
+/// Ends of the signals' ranges on the bus.
+const LANE_RANGE_M: f64 = 4.0;
+const YAW_RANGE_RAD: f64 = 0.5;
 /// Further than a motor may be from what it was told, N.m.
 pub(super) const MOTOR_MARGIN_NM: f64 = 0.1;
 /// For this long a motor may echo an older command, steps.
@@ -71,6 +77,8 @@ pub(super) struct Residual {
     momentum_nms: f64,
     commands_nm: [f64; MOTOR_ECHO],
     motor_nm: f64,
+    /// Steps in a row in which the motor was surely away from what it was told.
+    astray: u32,
 }
 
 impl Residual {
@@ -102,6 +110,7 @@ impl Residual {
             momentum_nms: 0.0,
             commands_nm: [0.0; MOTOR_ECHO],
             motor_nm: 0.0,
+            astray: 0,
         }
     }
 
@@ -134,8 +143,10 @@ impl Residual {
         (self.column_at_s, self.wheel_rad) = (Some(time_s), wheel_rad);
     }
 
-    /// Takes the lane errors that arrive.
+    /// Takes the lane errors that arrive: a sender saturates at the ends of the signals' ranges.
     pub(super) fn lane(&mut self, time_s: f64, e_y_m: f64, e_theta_rad: f64) {
+        let e_y_m = e_y_m.clamp(-LANE_RANGE_M, LANE_RANGE_M);
+        let e_theta_rad = e_theta_rad.clamp(-YAW_RANGE_RAD, YAW_RANGE_RAD);
         if let Some((before_s, y, theta)) = self.lane {
             let dt = time_s - before_s;
             if (e_y_m - y).abs() > LANE_STEP_M || (e_theta_rad - theta).abs() > YAW_STEP_RAD {
@@ -154,6 +165,19 @@ impl Residual {
     pub(super) fn motor(&mut self, commanded_nm: f64, delivered_nm: f64) {
         self.commands_nm.rotate_right(1);
         (self.commands_nm[0], self.motor_nm) = (commanded_nm, delivered_nm);
+        self.astray = if self.used(Seen::Motor) >= SURELY_SEEN {
+            self.astray + 1
+        } else {
+            0
+        };
+    }
+
+    /// Since which step the fault can be seen, if it can be in this one.
+    pub(super) fn seen_since(&self, by: Seen, step: u32) -> Option<u32> {
+        match by {
+            Seen::Motor => (self.astray > 0).then(|| step + 1 - self.astray),
+            _ => (self.used(by) >= SURELY_SEEN).then_some(step),
+        }
     }
 
     /// Share of the lane's margin that is used: 1 and more can be seen.

@@ -12,9 +12,9 @@ use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::bytes::Status;
-use super::guard::{ACTIVE, Broken, Guard};
+use super::guard::{ACTIVE, Broken, FAULT, Guard};
 use super::injection::{Clock, Hand, Injection, Inside, Motor, Start};
-use super::residual::Residual;
+use super::residual::{Residual, Seen};
 use super::senders::{Readings, Senders};
 use super::table::Row;
 use super::wire::{Arrival, Bus};
@@ -23,8 +23,6 @@ use crate::guidance::{Applied, Guidance, View};
 use crate::models::sensors;
 use crate::scenario::Scenario;
 
-/// Share of a margin from which on sensors cannot hide it: a wheel angle of 0.1 deg is worth up to 1.2 %.
-const SURELY_SEEN: f64 = 1.02;
 /// Code of the limit that acts for the driver's sake.
 const DRIVER_OVERRIDE: u64 = 5;
 /// A new random law every so many ms.
@@ -42,6 +40,8 @@ pub(super) struct Record {
     pub(super) seen_at: Option<u32>,
     /// Largest share of the margin used, up to the first change of mode after the onset.
     pub(super) used: f64,
+    /// The same of the margins that a contradiction uses, whatever the row looks at.
+    pub(super) contradicted: f64,
     /// First step from the onset on with no torque in Active.
     pub(super) yielded_at: Option<u32>,
     /// Whether a limit acted for the driver's sake from the onset on.
@@ -346,10 +346,18 @@ impl<'a> Seat<'a> {
         let used = self.residual.used(self.row.seen);
         if self.record.modes.last().is_some_and(|(_, mode)| *mode == ACTIVE) {
             self.record.used = self.record.used.max(used);
+            let contradicted = self.residual.used(Seen::Contradiction);
+            self.record.contradicted = self.record.contradicted.max(contradicted);
         }
-        if used >= SURELY_SEEN {
-            self.record.seen_at.get_or_insert(view.step);
-        }
+        let since = self.residual.seen_since(self.row.seen, view.step);
+        // A motor that came back within the ECU's patience has not been astray.
+        let returned =
+            self.row.seen == Seen::Motor && self.record.modes.last().is_some_and(|(_, m)| *m != FAULT);
+        self.record.seen_at = if returned {
+            since
+        } else {
+            self.record.seen_at.or(since)
+        };
     }
 
     fn disturb_inside(&mut self, step: u32, now_us: u32) {

@@ -173,6 +173,9 @@ pub fn rows() -> impl Iterator<Item = &'static Row> {
 const STALE_MS: u32 = 31;
 /// Reaction to a contradiction, from the instant in which it can be seen.
 const CONTRADICTION_MS: u32 = 200;
+/// From the instant in which the motor is 0.1 N.m away from what it was told, if it stays there: 10 ms of patience, two
+/// periods of the column, and the cycle in which it is seen.
+const MOTOR_MS: u32 = 15;
 /// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
 /// no fault may draw more.
 const ORDINARY_NM: f64 = 2.0;

@@ -158,7 +158,6 @@ impl World {
         }
         let reported = std::mem::take(&mut record.ecu).into_events();
         let verdict = judge(row, onset_ms, &record);
-        let seen_at = record.seen_at.unwrap_or(onset_ms);
         let outcome = Outcome {
             seed,
             driver: driver.name.clone(),
@@ -166,11 +165,10 @@ impl World {
             onset_ms,
             reported,
             cycles: record.cycles,
-            reaction_ms: verdict
-                .as_ref()
-                .ok()
-                .and_then(|at| *at)
-                .map(|at| at.saturating_sub(seen_at)),
+            reaction_ms: record
+                .seen_at
+                .zip(verdict.as_ref().ok().copied().flatten())
+                .map(|(seen_at, at)| at.saturating_sub(seen_at)),
             peak_nm: record.peak_nm,
             seen: record.seen_at.is_some(),
             failure: verdict.err(),

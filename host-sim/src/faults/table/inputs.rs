@@ -426,7 +426,7 @@ pub(super) const ROWS: &[Row] = &[
     // Speed.
     row(
         "speed-falls-to-zero",
-        "speeds fall to 0 at 10 m/s2",
+        "speeds fall to 0 at 10 m/s2 while the vehicle goes on, which may be seen to be impossible first",
         &[
             Sensor(
                 Speed1,

@@ -2,17 +2,13 @@
 
 use haptic_core::ecu::injection::Region;
 
-use super::{Row, row};
+use super::{MOTOR_MS, Row, row};
 use crate::faults::injection::{Hand, Injection, Inside, Motor, Start, Wish};
 use crate::faults::residual::Seen;
 
 const fn inside(inside: Inside) -> Injection {
     Injection::Inside(inside)
 }
-
-/// From the instant in which the motor is 0.1 N.m away from what it was told: 10 ms of patience, a period of
-/// the column, and the cycle in which it is seen.
-const MOTOR_MS: u32 = 15;
 
 pub(super) const ROWS: &[Row] = &[
     row("hard-fault", "the processor faults", &[])
@@ -144,5 +140,7 @@ pub(super) const ROWS: &[Row] = &[
     )
     .engages()
     .from(Start::Boot)
+    // The error that is left when guidance comes is larger than any of ordinary driving.
+    .torque(2.5)
     .q(),
 ];
