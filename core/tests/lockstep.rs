@@ -5,7 +5,8 @@ use haptic_core::bus::messages::ResetCause;
 use haptic_core::ecu::Boot;
 use haptic_core::faults::Fault;
 use haptic_core::lockstep::{
-    PARAMETERS, Start, StartState, StepCost, from_record, parameter_frames, set_parameter, to_record,
+    PARAMETERS, StackUse, Start, StartState, StepCost, from_record, parameter_frames, set_parameter,
+    to_record,
 };
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
@@ -115,4 +116,13 @@ fn costs() {
     assert_eq!(StepCost::decode(&cost.encode()), Some(cost));
     assert_eq!(StepCost::decode(&frame(0x7F0, &[0; 8])), None);
     assert_eq!(StepCost::decode(&frame(0x7F1, &[0; 4])), None);
+}
+
+#[test]
+fn use_of_the_stack() {
+    let used = StackUse { bytes: 0x0102_0304 };
+    assert_eq!(used.encode(), frame(0x7F2, &[4, 3, 2, 1, 0, 0, 0, 0]));
+    assert_eq!(StackUse::decode(&used.encode()), Some(used));
+    assert_eq!(StackUse::decode(&frame(0x7F1, &[0; 8])), None);
+    assert_eq!(StackUse::decode(&frame(0x7F2, &[0; 7])), None);
 }

@@ -5,6 +5,7 @@
 mod bench;
 mod callgrind;
 mod ci;
+mod evidence;
 mod gate;
 mod golden;
 mod image;
@@ -43,6 +44,11 @@ enum Command {
         #[command(subcommand)]
         what: Option<Bench>,
     },
+    /// Line and region coverage of the core by its tests: all of it, or exit code 1.
+    Coverage,
+    /// A defect in every expression of envelope, modes, E2E, monitor and plausibility (needs cargo-mutants); prints
+    /// those that no test notices.
+    Mutants,
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -66,6 +72,8 @@ fn main() -> ExitCode {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Size => size::run(),
+        Command::Coverage => evidence::coverage(),
+        Command::Mutants => evidence::mutants(),
         Command::Bench {
             what: Some(Bench::Speed),
             ..
