@@ -158,7 +158,7 @@ impl Envelope {
             .saturating_sub(i64::from(ROUNDING.bits()))
             .max(0);
         // Judged in the frame where the applied torque is positive.
-        let mirror = at.applied < Torque::ZERO;
+        let mirror = at.applied.bits().is_negative();
         let turn = |t: Torque| if mirror { t.opposite() } else { t };
         let applied = i64::from(at.applied.abs().bits());
         let mut turned = (turn(command.0), command.1);

@@ -47,11 +47,17 @@ pub(crate) fn run_all() -> Result<()> {
     if !failed.is_empty() {
         eprintln!("== failed: {}; the tests follow", failed.join(", "));
     }
+    println!("== fuzz");
+    // About ten seconds for each of its targets.
+    let fuzz = run(cargo()
+        .args(["test", "-p", "haptic-core", "--test", "fuzz"])
+        .env("HAPTIC_FUZZ_BYTES", "60000000"));
     println!("== tests");
     // Apart, because the log decoder switches on features of serde_json that host-sim does not ship with.
     let of_xtask = run(cargo().args(["test", "-p", "xtask"]));
     run(cargo().args(["test", "--workspace", "--exclude", "xtask", "--no-fail-fast"]))?;
     of_xtask?;
+    fuzz?;
     if !failed.is_empty() {
         bail!("failed: {}", failed.join(", "));
     }
