@@ -1,15 +1,22 @@
 //! What becomes of a product that breaks: the image `broken` in QEMU hangs, panics, faults or outgrows its stack half
 //! a second after power-up. Each must reset it, by the watchdog or by its own handler, and the next start must say
-//! why on the bus; one that breaks after every start must lock.
+//! why on the bus; one that breaks after every start must lock. The guard of the stack and the watchdog are shown on
+//! a second core too (Cortex-M7).
 //!
 //! QEMU counts instructions, so the machine's time is that of its program and no load of this computer moves it.
 //! The torque frames are taken apart by hand, from `core/haptic.dbc`.
 
 use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
+/// The reference board, and the same with another core.
+const M4F: &str = "mps2-an386";
+const M7: &str = "mps2-an500";
 /// A value of `Guidance_Mode`.
 const LOCKED: u64 = 6;
 /// Values of `Guidance_Reset`.
@@ -44,15 +51,15 @@ struct Status {
 }
 
 impl Machine {
-    fn start(flaw: &str) -> Self {
+    fn start(board: &str, flaw: &str) -> Self {
         let mut qemu = Command::new("qemu-system-arm")
-            .args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none"])
+            .args(["-machine", board, "-display", "none", "-monitor", "none"])
             .args(["-serial", "stdio", "-serial", "null"])
             .args(["-icount", "shift=5,sleep=off"])
             .arg("-semihosting-config")
             .arg(format!("enable=on,target=native,arg=broken,arg={flaw}"))
             .arg("-kernel")
-            .arg(image())
+            .arg(image(board))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -110,28 +117,36 @@ impl Machine {
     }
 }
 
-/// Builds the image and returns its ELF.
-fn image() -> std::path::PathBuf {
+/// Builds the image of a board and returns a copy of its ELF that no other board's build overwrites.
+fn image(board: &str) -> PathBuf {
+    static BUILDS: Mutex<()> = Mutex::new(());
+    let _one_at_a_time = BUILDS.lock();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .args(["build", "--release", "-p", "haptic-firmware", "--bin", "broken"])
-        .args(["--target", "thumbv7em-none-eabihf", "--features", "mps2-an386"])
+        .args(["--target", "thumbv7em-none-eabihf", "--features", board])
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::inherit())
         .output()
         .unwrap();
     assert!(output.status.success(), "the image does not build");
-    String::from_utf8_lossy(&output.stdout)
+    let elf = String::from_utf8_lossy(&output.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .find_map(|message| message["executable"].as_str().map(Into::into))
-        .unwrap()
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from))
+        .unwrap();
+    // A name for each call: tests run side by side.
+    static COPIES: AtomicU32 = AtomicU32::new(0);
+    let name = format!("broken-{board}-{}", COPIES.fetch_add(1, Ordering::Relaxed));
+    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::copy(elf, &copy).unwrap();
+    copy
 }
 
 /// Power-up, the flaw, and the start after it, which must give `cause` and last.
-fn comes_back(flaw: &str, cause: u64) {
-    let mut machine = Machine::start(flaw);
+fn comes_back(board: &str, flaw: &str, cause: u64) {
+    let mut machine = Machine::start(board, flaw);
     let first = machine.status();
     assert_eq!(first.cause, POWER_ON);
     let (second, frames) = machine.next_other(first);
@@ -145,28 +160,34 @@ fn comes_back(flaw: &str, cause: u64) {
 
 #[test]
 fn a_loop_that_hangs_meets_the_watchdog() {
-    comes_back("hang", WATCHDOG);
+    comes_back(M4F, "hang", WATCHDOG);
 }
 
 #[test]
 fn a_panic_resets_and_says_so() {
-    comes_back("panic", PANIC);
+    comes_back(M4F, "panic", PANIC);
 }
 
 #[test]
 fn a_fault_resets_and_says_so() {
-    comes_back("fault", HARD_FAULT);
+    comes_back(M4F, "fault", HARD_FAULT);
 }
 
 /// Caught by the guard below the stack, before it overwrites data.
 #[test]
 fn a_stack_that_outgrows_its_budget_resets_and_says_so() {
-    comes_back("overflow", STACK_OVERFLOW);
+    comes_back(M4F, "overflow", STACK_OVERFLOW);
+}
+
+#[test]
+fn another_core_has_the_same_guard_and_watchdog() {
+    comes_back(M7, "overflow", STACK_OVERFLOW);
+    comes_back(M7, "hang", WATCHDOG);
 }
 
 #[test]
 fn three_resets_within_ten_seconds_lock() {
-    let mut machine = Machine::start("hang-always");
+    let mut machine = Machine::start(M4F, "hang-always");
     let mut status = machine.status();
     assert_eq!(status.cause, POWER_ON);
     let mut frames = 0;
