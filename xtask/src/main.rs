@@ -3,8 +3,10 @@
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
 mod bench;
+mod boards;
 mod callgrind;
 mod ci;
+mod frames;
 mod gate;
 mod golden;
 mod image;
@@ -43,6 +45,12 @@ enum Command {
         #[command(subcommand)]
         what: Option<Bench>,
     },
+    /// Builds every board's images without a warning; their flash and RAM.
+    Boards,
+    /// Writes an image to a board (needs probe-rs).
+    Flash(boards::Options),
+    /// Writes an image to a board, runs it and prints its log (needs probe-rs).
+    Run(boards::Options),
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -66,6 +74,9 @@ fn main() -> ExitCode {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Size => size::run(),
+        Command::Boards => boards::check(),
+        Command::Flash(options) => boards::flash(&options),
+        Command::Run(options) => boards::run_on(&options),
         Command::Bench {
             what: Some(Bench::Speed),
             ..
