@@ -32,6 +32,9 @@ struct Counts {
     received: u32,
     rejected: u32,
     unsent: u32,
+    /// Cycles of the frames received since the last step, and the most that they and a step took.
+    receiving: u32,
+    worst_cycles: u32,
 }
 
 /// What has to do with parameters.
@@ -56,7 +59,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
     let mut board = ThisBoard::start();
     let boot = reset::boot(board.reset_source());
     let found = parameters(&mut board);
-    let ecu = ecu.insert(Ecu::new(setup(&found).as_ref(), boot, ThisBoard::now()));
+    let ecu = begin(ecu, &found, boot);
     let mut service = Service {
         download: Download::NEW,
         mode: Mode::Boot,
@@ -76,9 +79,12 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
         board.sleep();
         while let Ok(frame) = board.can().receive() {
             counts.received = counts.received.wrapping_add(1);
+            let start = ThisBoard::cycles();
             if ecu.receive(&frame, ThisBoard::now()).is_err() {
                 counts.rejected = counts.rejected.wrapping_add(1);
             }
+            let cycles = ThisBoard::cycles().wrapping_sub(start);
+            counts.receiving = counts.receiving.wrapping_add(cycles);
             if let Some(params) = service.download.receive(&frame, service.mode) {
                 ThisBoard::zero_torque();
                 reset::restart_with(&params);
@@ -92,6 +98,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
 }
 
 /// Stores the set that the last run left, if it did, and looks at what there is.
+#[inline(never)]
 fn parameters(board: &mut ThisBoard) -> Found {
     let found = storage::load(board.flash());
     let Some(params) = reset::take_parameters() else {
@@ -101,6 +108,12 @@ fn parameters(board: &mut ThisBoard) -> Found {
         defmt::error!("the parameters could not be stored");
     }
     storage::load(board.flash())
+}
+
+/// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
+#[inline(never)]
+fn begin(ecu: &'static mut Option<Ecu>, found: &Found, boot: Boot) -> &'static mut Ecu {
+    ecu.insert(Ecu::new(setup(found).as_ref(), boot, ThisBoard::now()))
 }
 
 /// What the controller starts with; None locks it.
@@ -120,7 +133,13 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.rejected = counts.rejected.wrapping_add(1);
         }
     }
+    let start = ThisBoard::cycles();
     let step = ecu.step(ThisBoard::now());
+    let cycles = ThisBoard::cycles()
+        .wrapping_sub(start)
+        .wrapping_add(counts.receiving);
+    counts.receiving = 0;
+    counts.worst_cycles = counts.worst_cycles.max(cycles);
     board.set_torque(step.command.torque);
     if step.permitted {
         board.feed_watchdog();
@@ -152,11 +171,12 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
     }
     if counts.steps.is_multiple_of(STEPS_PER_REPORT) {
         defmt::info!(
-            "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, stack {=u32} of {=u32}",
+            "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, worst step {=u32} cycles, stack {=u32} of {=u32}",
             counts.steps,
             counts.received,
             counts.rejected,
             counts.unsent,
+            counts.worst_cycles,
             stack::used(),
             stack::budget()
         );
