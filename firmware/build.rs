@@ -34,7 +34,7 @@ fn main() {
     println!("cargo:rustc-link-arg-bins=-T{}", source.join("stack.x").display());
     // Sections need not start on a page: the images are not loaded by an operating system.
     println!("cargo:rustc-link-arg-bins=--nmagic");
-    for bin in ["steering-ecu", "lockstep", "broken"] {
+    for bin in ["steering-ecu", "lockstep", "broken", "power-loss"] {
         println!("cargo:rustc-link-arg-bin={bin}=-Tdefmt.x");
     }
 }

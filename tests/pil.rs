@@ -1,7 +1,11 @@
-//! Same bits on host and target: the controller in QEMU answers every tick with the frames of the host's.
+//! Same bits on host and target: the controller in QEMU answers every tick with the frames of the host's; on both
+//! cores, and behind a serial port as a board would be.
 //!
 //! These runs feed frames that the closed loop of the paper's studies never makes: damaged, missing, asking for
 //! guidance again and again. QEMU must be there; without it they fail.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
@@ -9,7 +13,7 @@ use haptic_core::ecu::Boot;
 use haptic_core::lockstep::{Start, StartState};
 use haptic_core::params::Params;
 use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
-use host_sim::pil::{Channel, Pil, Report};
+use host_sim::pil::{Channel, Machine, Pil, PilError, Report, Target, image};
 
 /// xorshift64: the same frames in every run.
 struct Random(u64);
@@ -94,9 +98,18 @@ impl World {
     }
 }
 
-/// Runs `steps` ticks; the host's controller has `host`'s parameters, the target's has `target`'s. Returns the
+/// The reference board in QEMU.
+const fn qemu(channel: Channel) -> Target {
+    Target::Qemu {
+        machine: Machine::An386,
+        channel,
+        count: false,
+    }
+}
+
+/// Runs `steps` ticks; the host's controller has `host`'s parameters, the target's has `other`'s. Returns the
 /// report and how many of the host's torques were not zero.
-fn run(channel: Channel, steps: u32, host: &Params, target: &Params, count: bool) -> (Report, u32) {
+fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u32) {
     // Starts 2 s before the clock's wrap.
     let clock = |k: u32| Instant::from_us((u32::MAX - 2_000_000).wrapping_add(k * 1000));
     let start = Start {
@@ -104,7 +117,7 @@ fn run(channel: Channel, steps: u32, host: &Params, target: &Params, count: bool
         at: clock(0),
     };
     let mut ecu = start.ecu(host).unwrap();
-    let mut pil = Pil::start(channel, target, start, count).unwrap();
+    let mut pil = Pil::on(target, other, start).unwrap();
     let mut world = World {
         random: Random(0x9E37_79B9_7F4A_7C15),
         offset_m: 0.0,
@@ -134,7 +147,7 @@ fn run(channel: Channel, steps: u32, host: &Params, target: &Params, count: bool
 
 #[test]
 fn twenty_seconds_over_the_fifo_are_identical() {
-    let (report, guiding) = run(Channel::Fifo, 20_000, &Params::PAPER, &Params::PAPER, false);
+    let (report, guiding) = run(&qemu(Channel::Fifo), 20_000, &Params::PAPER, &Params::PAPER);
     assert_eq!(report.mismatches, 0, "{}", report.first_mismatch.unwrap());
     assert_eq!(report.steps, 20_000);
     // A torque frame each step, and warnings and fault records beside them.
@@ -144,7 +157,7 @@ fn twenty_seconds_over_the_fifo_are_identical() {
 
 #[test]
 fn two_seconds_over_slcan_are_identical() {
-    let (report, _) = run(Channel::Slcan, 2_000, &Params::PAPER, &Params::PAPER, false);
+    let (report, _) = run(&qemu(Channel::Slcan), 2_000, &Params::PAPER, &Params::PAPER);
     assert_eq!(report.mismatches, 0, "{}", report.first_mismatch.unwrap());
     assert_eq!(report.steps, 2_000);
 }
@@ -156,22 +169,87 @@ fn a_difference_is_found_and_printed() {
         a_3: 40.04,
         ..Params::PAPER
     };
-    let (report, _) = run(Channel::Fifo, 4_000, &Params::PAPER, &other, false);
+    let (report, _) = run(&qemu(Channel::Fifo), 4_000, &Params::PAPER, &other);
     let first = report.first_mismatch.expect("a difference");
     assert!(report.mismatches > 0 && report.mismatches < 4_000);
     let text = first.to_string();
     assert!(text.contains(&format!("step {}", first.step)), "{text}");
     assert!(text.contains("N.m, limit"), "{text}");
     // The same parameters on both ends: the difference was theirs.
-    let (same, _) = run(Channel::Fifo, 4_000, &other, &other, false);
+    let (same, _) = run(&qemu(Channel::Fifo), 4_000, &other, &other);
     assert_eq!(same.mismatches, 0);
+}
+
+#[test]
+fn another_core_gives_the_same_bits() {
+    let target = Target::Qemu {
+        machine: Machine::An500,
+        channel: Channel::Fifo,
+        count: false,
+    };
+    let (report, guiding) = run(&target, 10_000, &Params::PAPER, &Params::PAPER);
+    assert_eq!(report.mismatches, 0, "{}", report.first_mismatch.unwrap());
+    assert!(guiding > 3_000, "only {guiding} steps of the run guide at all");
+}
+
+/// The way to a board, with QEMU's serial port in the adapter's place.
+#[test]
+fn a_board_behind_a_serial_adapter_is_compared() {
+    let elf = image::build(Machine::An386).unwrap();
+    let mut qemu = Command::new("qemu-system-arm")
+        .args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none"])
+        .args(["-serial", "pty", "-serial", "null"])
+        .args([
+            "-semihosting-config",
+            "enable=on,target=native,arg=lockstep,arg=slcan",
+        ])
+        .arg("-kernel")
+        .arg(elf)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    let mut said = BufReader::new(qemu.stdout.take().unwrap());
+    said.read_line(&mut line).unwrap();
+    // "char device redirected to /dev/pts/3 (label serial0)"
+    let port = line.split_whitespace().find(|word| word.starts_with("/dev/"));
+    let target = Target::Board(port.unwrap_or_else(|| panic!("QEMU says: {line}")).into());
+    let (report, _) = run(&target, 1_000, &Params::PAPER, &Params::PAPER);
+    // The image ends QEMU when the channel is closed.
+    assert!(qemu.wait().unwrap().success());
+    assert_eq!(report.mismatches, 0, "{}", report.first_mismatch.unwrap());
+    assert_eq!(report.steps, 1_000);
+    // A board's cost is what its own counter says.
+    assert!(report.cycles.expect("cycles").mean > 0.0);
+    assert_eq!(report.instructions, None);
+}
+
+#[test]
+fn an_adapter_that_is_not_there_is_named() {
+    let start = Start {
+        state: StartState::Engaged,
+        at: Instant::from_us(0),
+    };
+    for name in ["/dev/no-such-adapter", "can99"] {
+        let error = Pil::on(&Target::Board(name.into()), &Params::PAPER, start)
+            .err()
+            .expect("an error");
+        assert!(matches!(error, PilError::Missing(_)), "{error:?}");
+        assert!(error.to_string().contains(name), "{error}");
+    }
 }
 
 /// Instruction counts do not depend on the machine, the load or the run.
 #[test]
 fn counted_instructions_repeat() {
     let count = || {
-        let (report, _) = run(Channel::Fifo, 1_000, &Params::PAPER, &Params::PAPER, true);
+        let target = Target::Qemu {
+            machine: Machine::An386,
+            channel: Channel::Fifo,
+            count: true,
+        };
+        let (report, _) = run(&target, 1_000, &Params::PAPER, &Params::PAPER);
         report.instructions
     };
     let first = count().expect("counted");

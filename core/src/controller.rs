@@ -248,7 +248,7 @@ impl Controller {
     /// The configuration, if its copies agree.
     #[must_use]
     pub fn config(&self) -> Option<Config> {
-        self.config.get()
+        self.config.get().copied()
     }
 
     /// One step of the 1 kHz loop. `applied` is the torque that was really applied since the last one.
@@ -260,21 +260,28 @@ impl Controller {
         applied: Torque,
         inputs: &Inputs,
     ) -> Command {
-        let (Some(config), Some(mut vitals)) = (self.config.get(), state.vitals.get()) else {
+        let Some(config) = self.config.get() else {
             return state.lose_memory(now);
         };
-        let step = Step {
-            config: &config,
-            now,
-            applied,
-            inputs,
-            elapsed: now.since(vitals.last_step),
-            #[cfg(feature = "fault-injection")]
-            forced_law: state.forced_law,
+        #[cfg(feature = "fault-injection")]
+        let forced_law = state.forced_law;
+        let history = &mut state.history;
+        let command = state.vitals.change(|vitals| {
+            let step = Step {
+                config,
+                now,
+                applied,
+                inputs,
+                elapsed: now.since(vitals.last_step),
+                #[cfg(feature = "fault-injection")]
+                forced_law,
+            };
+            vitals.last_step = now;
+            step.run(vitals, history)
+        });
+        let Some(command) = command else {
+            return state.lose_memory(now);
         };
-        let command = step.run(&mut vitals, &mut state.history);
-        vitals.last_step = now;
-        state.vitals.set(vitals);
         state.history.push(now, without(command.torque, command.probe));
         command
     }

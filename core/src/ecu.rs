@@ -79,6 +79,14 @@ impl<T: Vital> Vital for Slot<T> {
             value: self.value.map_words(change),
         }
     }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        self.e2e.is_inverse_of(&other.e2e)
+            & self.has.is_inverse_of(&other.has)
+            & self.fresh.is_inverse_of(&other.fresh)
+            & self.at.is_inverse_of(&other.at)
+            & self.value.is_inverse_of(&other.value)
+    }
 }
 
 impl<T: Copy> Slot<T> {
@@ -172,6 +180,91 @@ impl Vitals {
     }
 }
 
+/// What arrived beside the vital values.
+#[derive(Debug, Clone, Default)]
+struct Arrived {
+    actuator: Actuator,
+    /// Bytes of frames accepted since the last step, for the monitor's own decoding.
+    lane: Option<[u8; 8]>,
+    column: Option<[u8; 8]>,
+    demand: Option<[u8; 8]>,
+}
+
+impl Arrived {
+    fn take_in(&mut self, v: &mut Vitals, frame: &Frame, now: Instant) -> Result<(), Reject> {
+        match frame.id() {
+            LanePreview::ID => {
+                let lane = LanePreview::decode(&mut v.lane.e2e, frame)?;
+                v.lane_invalid = u32::from(!lane.valid);
+                if !lane.valid {
+                    return Ok(());
+                }
+                let at = now.before(lane.age);
+                let sample = LaneSample {
+                    e_y: lane.e_y,
+                    e_theta: lane.e_theta,
+                    at,
+                };
+                if let Some(last) = v.lane.last() {
+                    // A span of almost a whole wrap of the clock is a step back in time: what differences
+                    // samples would take it for a gap and start anew.
+                    if at.since(last.at) > HALF_WRAP {
+                        return Err(Reject::Older);
+                    }
+                    if !lane_step_is_possible(&last, &sample) {
+                        return Err(Reject::Step);
+                    }
+                }
+                v.lane.put(sample, at);
+                self.lane = frame.full_data();
+            }
+            ColumnMessage::ID => {
+                let c = ColumnMessage::decode(&mut v.column.e2e, frame)?;
+                v.column.put(
+                    Column {
+                        driver_torque: c.driver_torque,
+                        wheel_angle: c.wheel_angle,
+                    },
+                    now,
+                );
+                self.actuator.deliver(c.motor_torque);
+                self.column = frame.full_data();
+            }
+            Vehicle::ID => {
+                let speeds = Vehicle::decode(&mut v.speeds.e2e, frame)?.speeds;
+                let follows = |last: [Speed; 2]| {
+                    last.iter()
+                        .zip(&speeds)
+                        .all(|(last, new)| speed_step_is_possible(*last, *new))
+                };
+                if v.speeds.last().is_some_and(|last| !follows(last)) {
+                    return Err(Reject::Step);
+                }
+                v.speeds.put(speeds, now);
+            }
+            Demand::ID => {
+                let demand = Demand::decode(&mut v.request.e2e, frame)?;
+                self.demand = frame.full_data();
+                v.request.put(
+                    Request {
+                        engage: u32::from(demand.engage),
+                        authority: demand.authority,
+                        probe: u32::from(demand.probe),
+                    },
+                    now,
+                );
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The step has seen the frames.
+    fn forget(&mut self) {
+        (self.lane, self.column, self.demand) = (None, None, None);
+    }
+}
+
 /// A controller with its bus and its monitor.
 #[derive(Debug, Clone)]
 pub struct Ecu {
@@ -179,13 +272,9 @@ pub struct Ecu {
     state: ControllerState,
     monitor: Guarded<Monitor>,
     vitals: Guarded<Vitals>,
-    actuator: Actuator,
+    arrived: Arrived,
     history: History,
     boot: Boot,
-    /// Bytes of frames accepted since the last step, for the monitor's own decoding.
-    lane_bytes: Option<[u8; 8]>,
-    column_bytes: Option<[u8; 8]>,
-    demand_bytes: Option<[u8; 8]>,
     warned_at: Option<u32>,
     advice: Advice,
     #[cfg(feature = "fault-injection")]
@@ -245,12 +334,9 @@ impl Ecu {
             state,
             monitor: Guarded::new(setup.monitor),
             vitals: Guarded::new(Vitals::new(e2e, faults, now)),
-            actuator: Actuator::default(),
+            arrived: Arrived::default(),
             history: History::new(now),
             boot,
-            lane_bytes: None,
-            column_bytes: None,
-            demand_bytes: None,
             warned_at: None,
             advice: Advice::new(setup.reliance),
             #[cfg(feature = "fault-injection")]
@@ -263,90 +349,22 @@ impl Ecu {
     /// # Errors
     /// Why a frame with a known identifier is not used; the last good one stays in use until it is stale.
     pub fn receive(&mut self, frame: &Frame, now: Instant) -> Result<(), Reject> {
-        // Damaged vitals are found and reported by the next step.
-        let Some(mut v) = self.vitals.get() else {
-            return Ok(());
-        };
-        let result = self.take_in(&mut v, frame, now);
-        // Even a rejected frame may have moved a counter.
-        self.vitals.set(v);
-        result
-    }
-
-    fn take_in(&mut self, v: &mut Vitals, frame: &Frame, now: Instant) -> Result<(), Reject> {
-        match frame.id() {
-            LanePreview::ID => {
-                let lane = LanePreview::decode(&mut v.lane.e2e, frame)?;
-                v.lane_invalid = u32::from(!lane.valid);
-                if !lane.valid {
-                    return Ok(());
-                }
-                let at = now.before(lane.age);
-                let sample = LaneSample {
-                    e_y: lane.e_y,
-                    e_theta: lane.e_theta,
-                    at,
-                };
-                if let Some(last) = v.lane.last() {
-                    // A span of almost a whole wrap of the clock is a step back in time: what differences
-                    // samples would take it for a gap and start anew.
-                    if at.since(last.at) > HALF_WRAP {
-                        return Err(Reject::Older);
-                    }
-                    if !lane_step_is_possible(&last, &sample) {
-                        return Err(Reject::Step);
-                    }
-                }
-                v.lane.put(sample, at);
-                self.lane_bytes = frame.full_data();
-            }
-            ColumnMessage::ID => {
-                let c = ColumnMessage::decode(&mut v.column.e2e, frame)?;
-                v.column.put(
-                    Column {
-                        driver_torque: c.driver_torque,
-                        wheel_angle: c.wheel_angle,
-                    },
-                    now,
-                );
-                self.actuator.deliver(c.motor_torque);
-                self.column_bytes = frame.full_data();
-            }
-            Vehicle::ID => {
-                let speeds = Vehicle::decode(&mut v.speeds.e2e, frame)?.speeds;
-                let follows = |last: [Speed; 2]| {
-                    last.iter()
-                        .zip(&speeds)
-                        .all(|(last, new)| speed_step_is_possible(*last, *new))
-                };
-                if v.speeds.last().is_some_and(|last| !follows(last)) {
-                    return Err(Reject::Step);
-                }
-                v.speeds.put(speeds, now);
-            }
-            Demand::ID => {
-                let demand = Demand::decode(&mut v.request.e2e, frame)?;
-                self.demand_bytes = frame.full_data();
-                v.request.put(
-                    Request {
-                        engage: u32::from(demand.engage),
-                        authority: demand.authority,
-                        probe: u32::from(demand.probe),
-                    },
-                    now,
-                );
-            }
-            _ => {}
-        }
-        Ok(())
+        let arrived = &mut self.arrived;
+        // Even a rejected frame may have moved a counter. Damaged vitals are found and reported by the next step.
+        self.vitals
+            .change(|vitals| arrived.take_in(vitals, frame, now))
+            .unwrap_or(Ok(()))
     }
 
     /// One step of the 1 kHz loop.
     pub fn step(&mut self, now: Instant) -> Step {
-        let mut v = self.vitals.get().unwrap_or_else(|| self.begin_anew(now));
+        let mut v = match self.vitals.get() {
+            Some(vitals) => *vitals,
+            None => self.begin_anew(now),
+        };
         let steps = v.steps;
         let mut faults = FaultSet::from_bits(v.faults as u16);
-        faults.insert_if(!self.actuator.obeys(v.applied), Fault::Actuator);
+        faults.insert_if(!self.arrived.actuator.obeys(v.applied), Fault::Actuator);
         faults.insert_if(
             steps.is_multiple_of(SELF_TEST) && !self.monitor_refuses_nonsense(),
             Fault::SelfTest,
@@ -368,9 +386,9 @@ impl Ecu {
         let mut guidance = self.guidance(&command, steps);
 
         let evidence = Evidence {
-            lane: self.lane_bytes.as_ref(),
-            column: self.column_bytes.as_ref(),
-            demand: self.demand_bytes.as_ref(),
+            lane: self.arrived.lane.as_ref(),
+            column: self.arrived.column.as_ref(),
+            demand: self.arrived.demand.as_ref(),
             guidance: guidance.bytes(),
             elapsed_us: now.since(v.last_step).us(),
         };
@@ -387,7 +405,7 @@ impl Ecu {
             };
             guidance = self.guidance(&command, steps);
         }
-        (self.lane_bytes, self.column_bytes, self.demand_bytes) = (None, None, None);
+        self.arrived.forget();
         v.faults = u32::from(faults.bits());
         v.applied = command.torque;
         v.last_step = now;

@@ -25,6 +25,7 @@ pub mod actuator;
 mod advice;
 pub mod bus;
 pub mod controller;
+pub mod download;
 pub mod ecu;
 pub mod envelope;
 pub mod faults;

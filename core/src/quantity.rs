@@ -63,6 +63,10 @@ macro_rules! quantity {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
                 Self::from_bits(self.bits().map_words(change))
             }
+
+            fn is_inverse_of(&self, other: &Self) -> bool {
+                self.bits().is_inverse_of(&other.bits())
+            }
         }
     };
 }
@@ -145,6 +149,10 @@ impl Vital for Micros {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self(change(self.0))
     }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        self.0.is_inverse_of(&other.0)
+    }
 }
 
 /// An instant on the ECU's free-running microsecond clock, which wraps every 71.6 minutes.
@@ -189,6 +197,10 @@ impl Instant {
 impl Vital for Instant {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self(change(self.0))
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        self.0.is_inverse_of(&other.0)
     }
 }
 

@@ -74,26 +74,38 @@ impl Ramp {
 /// applied. A fixed array, so that a flip can do nothing else.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// Newest first.
-    outputs: [(Instant, Torque); 51],
+    /// A ring, of which the newest [`KEPT`] count.
+    outputs: [(Instant, Torque); RING],
+    /// Where the newest is. Every number names a place, modulo the ring.
+    newest: usize,
 }
 
 const HISTORY_STEP: Micros = Micros::from_ms(5);
+/// 250 ms and both ends.
+const KEPT: usize = 51;
+/// A power of two, so that the place is a mask.
+const RING: usize = 64;
 
 impl History {
     /// Nothing applied yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            outputs: [(Instant::from_us(0), Torque::ZERO); 51],
+            outputs: [(Instant::from_us(0), Torque::ZERO); RING],
+            newest: 0,
         }
+    }
+
+    /// The output that is `back` places older than the newest.
+    const fn output(&self, back: usize) -> (Instant, Torque) {
+        self.outputs[self.newest.wrapping_sub(back) % RING]
     }
 
     /// Remembers an output.
     pub fn push(&mut self, now: Instant, torque: Torque) {
-        if now.since(self.outputs[0].0) >= HISTORY_STEP {
-            self.outputs.rotate_right(1);
-            self.outputs[0] = (now, torque);
+        if now.since(self.output(0).0) >= HISTORY_STEP {
+            self.newest = self.newest.wrapping_add(1);
+            self.outputs[self.newest % RING] = (now, torque);
         }
     }
 
@@ -101,8 +113,9 @@ impl History {
     /// history, zero if there was none.
     #[must_use]
     pub fn trusted(&self, now: Instant, suspect: Micros) -> Torque {
-        let before = self.outputs.iter().find(|(at, _)| now.since(*at) > suspect);
-        before.unwrap_or(&self.outputs[50]).1
+        let mut outputs = (0..KEPT).map(|back| self.output(back));
+        let before = outputs.find(|(at, _)| now.since(*at) > suspect);
+        before.unwrap_or_else(|| self.output(KEPT - 1)).1
     }
 
     /// Where a handover starts: the smaller of the torque applied and the torque trusted, with the sign of

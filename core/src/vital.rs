@@ -11,6 +11,10 @@ pub trait Vital: Copy + PartialEq {
     #[must_use]
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self;
 
+    /// Whether every bit of `other` is the inverse of this value's. Looks at all words without a branch: a copy or a
+    /// comparison call for each is what a step would mostly do.
+    fn is_inverse_of(&self, other: &Self) -> bool;
+
     /// The value with every bit inverted.
     #[must_use]
     fn complement(self) -> Self {
@@ -22,17 +26,30 @@ impl Vital for u32 {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         change(self)
     }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        *self == !*other
+    }
 }
 
 impl Vital for i32 {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         change(self.cast_unsigned()).cast_signed()
     }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        *self == !*other
+    }
 }
 
 impl<T: Vital, const N: usize> Vital for [T; N] {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         self.map(|item| item.map_words(change))
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        let pairs = self.iter().zip(other);
+        pairs.fold(true, |all, (item, other)| all & item.is_inverse_of(other))
     }
 }
 
@@ -47,6 +64,11 @@ macro_rules! vital {
         impl $crate::vital::Vital for $name {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
                 Self { $($field: $crate::vital::Vital::map_words(self.$field, change),)* }
+            }
+
+            #[inline]
+            fn is_inverse_of(&self, other: &Self) -> bool {
+                true $(& $crate::vital::Vital::is_inverse_of(&self.$field, &other.$field))*
             }
         }
     };
@@ -73,11 +95,19 @@ impl<T: Vital> Guarded<T> {
 
     /// The value, if both copies still agree.
     #[must_use]
-    pub fn get(&self) -> Option<T> {
+    pub fn get(&self) -> Option<&T> {
         // Without the black box the compiler may prove, across the loop that owns this value, that the
-        // copies always agree, and drop the comparison.
-        let (value, inverted) = black_box((self.value, self.inverted));
-        (value == inverted.complement()).then_some(value)
+        // copies always agree, and drop the comparison. Around the reference, it costs no copy.
+        let Self { value, inverted } = black_box(self);
+        value.is_inverse_of(inverted).then_some(value)
+    }
+
+    /// Changes the value in place, if both copies still agree.
+    pub fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
+        self.get()?;
+        let result = change(&mut self.value);
+        self.inverted = self.value.complement();
+        Some(result)
     }
 
     /// Changes the words of both copies apart, as faults do.
@@ -89,6 +119,7 @@ impl<T: Vital> Guarded<T> {
 
     /// Replaces both copies.
     pub fn set(&mut self, value: T) {
-        *self = Self::new(value);
+        self.value = value;
+        self.inverted = value.complement();
     }
 }

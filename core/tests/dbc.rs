@@ -5,8 +5,8 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ResetCause, SimTime, Telemetry, Vehicle,
-    Warning,
+    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ParameterStatus, ParameterWrite, ResetCause,
+    SimTime, Telemetry, Vehicle, Warning, WriteOutcome,
 };
 use haptic_core::envelope::LimitReason;
 use haptic_core::faults::{Fault, FaultSet, Record};
@@ -162,14 +162,14 @@ fn guidance() {
             mode: Mode::from_code(code as u32).unwrap(),
             warning: raw % 2 == 0,
             faults: FaultSet::from_bits(bits),
-            reset: ResetCause::from_code(i64::from(code.min(5))).unwrap(),
+            reset: ResetCause::from_code(i64::from(code)).unwrap(),
         };
         let frame = sent.encode(0);
         assert_eq!(signal(&dbc, &frame, "Torque"), torque);
         assert_eq!(signal(&dbc, &frame, "Limit"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
-        assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code.min(5)));
+        assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code));
         for (i, fault) in Fault::ALL.iter().enumerate() {
             let name = format!("Fault_{fault:?}");
             assert_eq!(signal(&dbc, &frame, &name), f64::from(bits >> i & 1), "{name}");
@@ -235,6 +235,47 @@ fn telemetry() {
         for (name, value) in expected {
             assert_eq!(signal(&dbc, &frame, name), value, "{name} {raw}");
         }
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
+fn parameters() {
+    let dbc = dbc();
+    let is_float = dbc
+        .signal_extended_value_type_list
+        .iter()
+        .any(|v| v.signal_name == "ParameterWrite_Value");
+    assert!(is_float);
+    for (index, value) in [(0, 0.25_f32), (7, 5.0), (15, 0.001_753), (18, 0.0)] {
+        let sent = ParameterWrite { index, value };
+        let frame = sent.encode(index);
+        assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
+        // The bits of an IEEE 754 binary32, all positive.
+        let raw = signal(&dbc, &frame, "Value") as u32;
+        assert_eq!(f32::from_bits(raw), value);
+        assert_eq!(decode(sent), sent);
+    }
+    let beyond = ParameterWrite {
+        index: 19,
+        value: 1.0,
+    };
+    assert_eq!(ParameterWrite::unpack(beyond.pack()), None);
+    for code in 0..6 {
+        let sent = ParameterStatus {
+            stored: code % 2 == 0,
+            damaged: code % 3 == 0,
+            outcome: WriteOutcome::from_code(code).unwrap(),
+            sequence: 0xFEDC_BA90 + code as u32,
+        };
+        let frame = sent.encode(0);
+        let signals = ["Stored", "Damaged", "Outcome", "Sequence"].map(|name| signal(&dbc, &frame, name));
+        let flag = |set| f64::from(u8::from(set));
+        let sequence = f64::from(0xFEDC_BA90_u32) + code as f64;
+        assert_eq!(
+            signals,
+            [flag(code % 2 == 0), flag(code % 3 == 0), code as f64, sequence]
+        );
         assert_eq!(decode(sent), sent);
     }
 }
@@ -322,6 +363,7 @@ fn the_dbc_file_names_every_code() {
     assert_eq!(named("Guidance_Mode"), coded(|code| Mode::from_code(code as u32)));
     assert_eq!(named("Warning_Mode"), coded(|code| Mode::from_code(code as u32)));
     assert_eq!(named("Guidance_Reset"), coded(ResetCause::from_code));
+    assert_eq!(named("ParameterStatus_Outcome"), coded(WriteOutcome::from_code));
     assert_eq!(
         named("FaultRecord_Fault"),
         coded(|code| Fault::ALL.get(code as usize).copied())

@@ -100,7 +100,7 @@ fn starts() {
         frame(0x7EF, &[0; 7]),
         frame(0x7EE, &[0; 8]),
         frame(0x7EF, &[3, 0, 0, 0, 0, 0, 0, 0]),
-        frame(0x7EF, &[0, 6, 0, 0, 0, 0, 0, 0]),
+        frame(0x7EF, &[0, 7, 0, 0, 0, 0, 0, 0]),
     ] {
         assert_eq!(Start::decode(&none), None, "{none:?}");
     }

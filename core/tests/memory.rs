@@ -80,9 +80,9 @@ fn the_guard_holds_a_value_and_its_inverse() {
     for word in [0_u32, 1, 0xDEAD_BEEF, u32::MAX] {
         assert_eq!([word, 7].complement(), [!word, !7]);
         let mut guarded = Guarded::new(word);
-        assert_eq!(guarded.get(), Some(word));
+        assert_eq!(guarded.get(), Some(&word));
         guarded.set(!word);
-        assert_eq!(guarded.get(), Some(!word));
+        assert_eq!(guarded.get(), Some(&!word));
     }
     assert_eq!((-1_i32).complement(), 0);
     // 1 N.m is 2^24; its inverse is -2^24 - 1.

@@ -3,15 +3,21 @@
 //! What is broken does not steer: a panic or a fault brings the torque to zero and resets the processor with
 //! the cause on record; a loop that hangs, or that the monitor does not permit, loses the watchdog. The
 //! controller comes up in Standby, says why on the bus, and locks after three resets within 10 s.
+//!
+//! Its parameters are the newest good set of the flash. Without any it has those built into the image, unless both
+//! copies are damaged: then it locks. A set that comes over the bus is stored at the restart that it causes: the
+//! flash is never touched while the loop runs, since an erase takes longer than the watchdog waits.
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
-use haptic_core::bus::messages::{Message, ResetCause};
+use haptic_core::bus::messages::{Message, ParameterStatus, ResetCause};
+use haptic_core::download::Download;
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::modes::Mode;
 use haptic_core::params::Setup;
 
 use crate::boards::{Board, ThisBoard};
+use crate::storage::{self, Found};
 use crate::{reset, stack};
 
 /// Steps between two lines of the log: one second.
@@ -26,6 +32,24 @@ struct Counts {
     received: u32,
     rejected: u32,
     unsent: u32,
+    /// Cycles of the frames received since the last step, and the most that they and a step took.
+    receiving: u32,
+    worst_cycles: u32,
+}
+
+/// What has to do with parameters.
+struct Service {
+    download: Download,
+    /// The mode of the last step.
+    mode: Mode,
+    found: Found,
+}
+
+impl Service {
+    fn status(&self) -> ParameterStatus {
+        let is_damaged = self.found.damaged != [false, false];
+        self.download.status(self.found.stored.as_ref(), is_damaged)
+    }
 }
 
 /// Runs the product. `disturb` is called before each step with its number: the product has nothing to say there,
@@ -34,13 +58,20 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
     stack::paint();
     let mut board = ThisBoard::start();
     let boot = reset::boot(board.reset_source());
-    let ecu = ecu.insert(Ecu::new(Some(&Setup::PAPER), boot, ThisBoard::now()));
+    let found = parameters(&mut board);
+    let ecu = begin(ecu, &found, boot);
+    let mut service = Service {
+        download: Download::NEW,
+        mode: Mode::Boot,
+        found,
+    };
     let mut counts = Counts::default();
     defmt::info!(
-        "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}",
+        "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}, parameters {=u32}",
         ThisBoard::NAME,
         boot.reset as u8,
-        boot.recent_resets
+        boot.recent_resets,
+        found.stored.map_or(0, |stored| stored.sequence)
     );
     board.start_tick();
     board.start_watchdog();
@@ -48,18 +79,53 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
         board.sleep();
         while let Ok(frame) = board.can().receive() {
             counts.received = counts.received.wrapping_add(1);
+            let start = ThisBoard::cycles();
             if ecu.receive(&frame, ThisBoard::now()).is_err() {
                 counts.rejected = counts.rejected.wrapping_add(1);
+            }
+            let cycles = ThisBoard::cycles().wrapping_sub(start);
+            counts.receiving = counts.receiving.wrapping_add(cycles);
+            if let Some(params) = service.download.receive(&frame, service.mode) {
+                ThisBoard::zero_torque();
+                reset::restart_with(&params);
             }
         }
         if board.tick() {
             disturb(boot, counts.steps);
-            step(&mut board, ecu, &mut counts);
+            step(&mut board, ecu, &mut service, &mut counts);
         }
     }
 }
 
-fn step(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) {
+/// Stores the set that the last run left, if it did, and looks at what there is.
+#[inline(never)]
+fn parameters(board: &mut ThisBoard) -> Found {
+    let found = storage::load(board.flash());
+    let Some(params) = reset::take_parameters() else {
+        return found;
+    };
+    if storage::save(board.flash(), &params, found.stored.as_ref()).is_err() {
+        defmt::error!("the parameters could not be stored");
+    }
+    storage::load(board.flash())
+}
+
+/// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
+#[inline(never)]
+fn begin(ecu: &'static mut Option<Ecu>, found: &Found, boot: Boot) -> &'static mut Ecu {
+    ecu.insert(Ecu::new(setup(found).as_ref(), boot, ThisBoard::now()))
+}
+
+/// What the controller starts with; None locks it.
+fn setup(found: &Found) -> Option<Setup> {
+    match found.stored {
+        Some(stored) => Setup::new(&stored.params).ok(),
+        None if found.damaged == [true, true] => None,
+        None => Some(Setup::PAPER),
+    }
+}
+
+fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
     if let Some(column) = board.column() {
         // By the codec, as from the bus: what judges a sample there judges it here.
         let frame = column.encode(counts.steps as u8);
@@ -67,7 +133,13 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) {
             counts.rejected = counts.rejected.wrapping_add(1);
         }
     }
+    let start = ThisBoard::cycles();
     let step = ecu.step(ThisBoard::now());
+    let cycles = ThisBoard::cycles()
+        .wrapping_sub(start)
+        .wrapping_add(counts.receiving);
+    counts.receiving = 0;
+    counts.worst_cycles = counts.worst_cycles.max(cycles);
     board.set_torque(step.command.torque);
     if step.permitted {
         board.feed_watchdog();
@@ -79,11 +151,16 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) {
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
+    service.mode = step.command.mode;
     // The torque is on its way; what follows may take its time.
-    if let Some(frame) = ecu.advise()
-        && board.can().transmit(&frame).is_err()
-    {
-        counts.unsent = counts.unsent.wrapping_add(1);
+    let status = counts.steps.is_multiple_of(STEPS_PER_REPORT).then(|| {
+        let turn = counts.steps / STEPS_PER_REPORT;
+        service.status().encode(turn as u8)
+    });
+    for frame in ecu.advise().iter().chain(&status) {
+        if board.can().transmit(frame).is_err() {
+            counts.unsent = counts.unsent.wrapping_add(1);
+        }
     }
     let guiding = matches!(step.command.mode, Mode::Active | Mode::Fade | Mode::Handover);
     // A light that fails is no reason to stop.
@@ -94,11 +171,12 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) {
     }
     if counts.steps.is_multiple_of(STEPS_PER_REPORT) {
         defmt::info!(
-            "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, stack {=u32} of {=u32}",
+            "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, worst step {=u32} cycles, stack {=u32} of {=u32}",
             counts.steps,
             counts.received,
             counts.rejected,
             counts.unsent,
+            counts.worst_cycles,
             stack::used(),
             stack::budget()
         );

@@ -4,6 +4,8 @@
 //! and how many resets there were of late. With what the hardware knows it makes the [`Boot`] of the
 //! controller, which tells the bus and locks after too many.
 //!
+//! New parameters cross a reset here too: they are stored at a start, when nothing moves and no watchdog runs.
+//!
 //! "Of late" is within 10 s of running: [`settled`] forgets. So resets that are 10 s apart never lock.
 
 use haptic_core::bus::messages::ResetCause;
@@ -62,6 +64,8 @@ impl Record {
         };
         let recent_resets = match reset {
             ResetCause::PowerOn => 0,
+            // Somebody asked for it: it neither counts nor clears.
+            ResetCause::NewParameters => u8::try_from(self.recent).unwrap_or(u8::MAX),
             _ => u8::try_from(self.recent).unwrap_or(u8::MAX).saturating_add(1),
         };
         Boot { reset, recent_resets }
@@ -69,16 +73,23 @@ impl Record {
 }
 
 #[cfg(target_os = "none")]
-pub use on_target::{boot, restart, settled};
+pub use on_target::{boot, restart, restart_with, settled, take_parameters};
 
 #[cfg(target_os = "none")]
 mod on_target {
     use core::mem::MaybeUninit;
 
+    use haptic_core::params::Params;
+    use haptic_core::stored::{self, BYTES};
+
     use super::{Boot, Hardware, Record, ResetCause};
 
     #[unsafe(link_section = ".uninit.reset")]
     static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
+
+    /// A set of parameters for the next start to store, as one of its copies: its CRC tells it from noise.
+    #[unsafe(link_section = ".uninit.parameters")]
+    static mut PARAMETERS: MaybeUninit<[u8; BYTES]> = MaybeUninit::uninit();
 
     fn write(record: Record) {
         // SAFETY: one core, interrupts masked: only a handler that never returns comes between.
@@ -97,6 +108,24 @@ mod on_target {
     /// The image has run for 10 s: earlier resets no longer count.
     pub fn settled() {
         write(Record::new(0, 0));
+    }
+
+    /// Resets the processor and leaves the next start a set to store.
+    pub fn restart_with(params: &Params) -> ! {
+        let bytes = stored::save(params, 0);
+        // SAFETY: as for `write`.
+        unsafe { (&raw mut PARAMETERS).cast::<[u8; BYTES]>().write_volatile(bytes) };
+        restart(ResetCause::NewParameters)
+    }
+
+    /// The set that [`restart_with`] left, once.
+    pub fn take_parameters() -> Option<Params> {
+        let place = (&raw mut PARAMETERS).cast::<[u8; BYTES]>();
+        // SAFETY: as in `boot`.
+        let bytes = unsafe { place.read_volatile() };
+        // SAFETY: as for `write`. Whatever happens next must not find it again.
+        unsafe { place.write_volatile([0; BYTES]) };
+        stored::load([&bytes, &[]]).map(|stored| stored.params)
     }
 
     /// Resets the processor and has the next start say why.
@@ -150,6 +179,20 @@ mod tests {
         assert_eq!(
             boot(Record::new(0, 400), Hardware::Watchdog),
             (ResetCause::Watchdog, 255)
+        );
+    }
+
+    /// Asked for over the bus: no step towards locking, and none away from it.
+    #[test]
+    fn new_parameters_do_not_count_as_a_reset() {
+        let announced = Record::new(ResetCause::NewParameters as u32, 2);
+        assert_eq!(
+            boot(announced, Hardware::Operator),
+            (ResetCause::NewParameters, 2)
+        );
+        assert_eq!(
+            boot(announced, Hardware::Watchdog),
+            (ResetCause::NewParameters, 2)
         );
     }
 }

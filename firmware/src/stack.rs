@@ -3,14 +3,14 @@
 //! `stack.x` places the budget at the end of RAM and the guard below. The guard is a region of the memory
 //! protection unit that nothing may touch: a stack that outgrows its budget faults at once instead of
 //! overwriting data, and the fault's handler tells the cause by the address. A single frame larger than the
-//! guard could step over it; `cargo xtask stack` looks for such.
+//! guard could step over it: `cargo xtask boards` looks for such.
 //!
 //! Not here: what follows a fault (`reset`).
 
 use cortex_m::peripheral::{MPU, SCB};
 
-/// Length of the guard, a power of two, as in `stack.x`.
-const GUARD: u32 = 1024;
+/// Length of the guard, a power of two, as in `stack.x`. More than the largest frame, 2.6 KB.
+const GUARD: u32 = 4096;
 
 /// What untouched stack holds.
 const PAINT: u32 = 0x5AFE_57AC;

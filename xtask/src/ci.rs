@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, gate};
+use crate::{bench, boards, gate};
 
 pub(crate) fn run_all() -> Result<()> {
     ensure(&[
@@ -14,7 +14,7 @@ pub(crate) fn run_all() -> Result<()> {
         ("gcc", "gcc"),
     ])?;
     let target_features = format!("{BOARD},gate");
-    let checks: [(&str, &dyn Fn() -> Result<()>); 5] = [
+    let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
         ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
         ("clippy", &|| {
             run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
@@ -33,8 +33,9 @@ pub(crate) fn run_all() -> Result<()> {
             run(cargo().args(package).args(target))
         }),
         ("gate", &gate::run),
-        // Compares every frame of a whole run in QEMU on the way.
-        ("sizes and instructions", &|| bench::run(false)),
+        // Compares every frame of a whole run on each of QEMU's boards on the way.
+        ("boards", &|| boards::check(false)),
+        ("instructions on the host", &|| bench::run(false)),
     ];
     let mut failed = Vec::new();
     for (name, check) in checks {

@@ -3,8 +3,10 @@
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
 mod bench;
+mod boards;
 mod callgrind;
 mod ci;
+mod code;
 mod evidence;
 mod gate;
 mod golden;
@@ -33,13 +35,13 @@ enum Command {
     Ci,
     /// Proves on the linked image that the controller has no panic path and no float.
     Gate,
-    /// Flash and RAM of the images.
-    Size,
-    /// Instructions per control step in QEMU and on the host, flash and RAM, against xtask/golden.json.
+    /// Instructions of a control step: on the host, against xtask/golden.json; in QEMU; or cycles, on a board.
     #[command(args_conflicts_with_subcommands = true)]
     Bench {
-        /// Write the golden file anew.
-        #[arg(long)]
+        /// In QEMU, the board's instructions; on a real one, the log of the product with its cycles (needs probe-rs).
+        board: Option<boards::Board>,
+        /// Write the host's figures into the golden file.
+        #[arg(long, conflicts_with = "board")]
         bless: bool,
         #[command(subcommand)]
         what: Option<Bench>,
@@ -49,6 +51,19 @@ enum Command {
     /// A defect in every expression of envelope, modes, E2E, monitor and plausibility (needs cargo-mutants); prints
     /// those that no test notices.
     Mutants,
+    /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
+    /// instructions against xtask/golden.json.
+    Boards {
+        /// Write the figures into the golden file.
+        #[arg(long)]
+        bless: bool,
+    },
+    /// Writes an image to a board (needs probe-rs).
+    Flash(boards::Options),
+    /// Writes an image to a board, runs it and prints its log (needs probe-rs).
+    Run(boards::Options),
+    /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
+    Hil(boards::Hil),
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -71,14 +86,20 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
-        Command::Size => size::run(),
         Command::Coverage => evidence::coverage(),
         Command::Mutants => evidence::mutants(),
+        Command::Boards { bless } => boards::check(bless),
+        Command::Flash(options) => boards::flash(options.board, &options.image),
+        Command::Run(options) => boards::run_on(options.board, &options.image),
+        Command::Hil(options) => boards::hil(&options),
         Command::Bench {
             what: Some(Bench::Speed),
             ..
         } => speed::run(),
-        Command::Bench { bless, what: None } => bench::run(bless),
+        Command::Bench {
+            board: Some(board), ..
+        } => boards::bench(board),
+        Command::Bench { bless, .. } => bench::run(bless),
         Command::Qemu(options) => match qemu::run(&options) {
             Ok(code) => return code,
             Err(error) => Err(error),
@@ -89,7 +110,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+            ExitCode::from(if error.is::<tool::Usage>() { 2 } else { 1 })
         }
     }
 }

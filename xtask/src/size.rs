@@ -7,7 +7,6 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::image;
 use crate::tool;
 
 /// Bytes of an image.
@@ -15,15 +14,6 @@ use crate::tool;
 pub(crate) struct Size {
     pub(crate) flash: u64,
     pub(crate) ram: u64,
-}
-
-pub(crate) fn run() -> Result<()> {
-    println!("{:<14}{:>10}{:>10}", "image", "flash, B", "RAM, B");
-    for bin in ["steering-ecu", "lockstep"] {
-        let size = of(&image::build(bin)?)?;
-        println!("{bin:<14}{:>10}{:>10}", size.flash, size.ram);
-    }
-    Ok(())
 }
 
 /// The size of an ELF.

@@ -46,6 +46,18 @@ pub(crate) fn output(command: &mut Command) -> Result<String> {
     String::from_utf8(output.stdout).with_context(|| describe(command))
 }
 
+/// What the user has to put right: a wrong argument, or a tool or a device that is not there. Exit code 2.
+#[derive(Debug)]
+pub(crate) struct Usage(pub(crate) String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
 fn describe(command: &Command) -> String {
     let arguments = command.get_args().map(|a| a.to_string_lossy());
     [command.get_program().to_string_lossy()]

@@ -4,6 +4,7 @@
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
+use embedded_storage::nor_flash::NorFlash;
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::Column;
 use haptic_core::quantity::{Instant, Micros, Torque};
@@ -35,6 +36,8 @@ pub trait Board: Sized {
     type Can: Can<Frame = Frame>;
     /// A light that is on while guidance acts.
     type Status: OutputPin;
+    /// The flash whose last four pages hold the parameters ([`crate::storage`]).
+    type Flash: NorFlash;
 
     /// The feature that chooses the board.
     const NAME: &'static str;
@@ -48,6 +51,9 @@ pub trait Board: Sized {
 
     /// The status light.
     fn status(&mut self) -> &mut Self::Status;
+
+    /// The flash. Only touched before the tick starts: while it erases, some boards' processors stand still.
+    fn flash(&mut self) -> &mut Self::Flash;
 
     /// The free-running microsecond clock, which wraps after 2^32 us.
     fn now() -> Instant;

@@ -3,6 +3,7 @@
 //!
 //! - UART0: the CAN bus, as SLCAN. UART1: the log. Both transmit at 25 MHz / 16 = 1.5625 Mbaud.
 //! - SysTick: the 1 kHz tick. FPGAIO counter: microseconds. CMSDK timer 0: cycles. LED 0: status.
+//! - Memory that a reset leaves alone plays the flash, which this board does not have ([`crate::nor`]).
 //! - CMSDK watchdog: a non-maskable interrupt after half its time, the reset after all of it.
 //!
 //! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART, timer and watchdog. The actuator
@@ -10,6 +11,7 @@
 //! here is a silent bus.
 
 use core::convert::Infallible;
+use core::mem::MaybeUninit;
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -23,6 +25,7 @@ use haptic_core::quantity::Instant;
 use volatile_register::{RO, RW};
 
 use super::{Board, WATCHDOG};
+use crate::nor::{Nor, PAGE};
 use crate::slcan_can::SlcanCan;
 use crate::{reset, stack};
 
@@ -35,12 +38,14 @@ const BETWEEN_GLANCES: u32 = 64;
 pub struct Mps2 {
     can: SlcanCan<Uart>,
     led: Led,
+    flash: Nor<&'static mut Pages>,
     systick: SYST,
 }
 
 impl Board for Mps2 {
     type Can = SlcanCan<Uart>;
     type Status = Led;
+    type Flash = Nor<&'static mut Pages>;
 
     const NAME: &'static str = if cfg!(feature = "mps2-an500") {
         "mps2-an500"
@@ -63,6 +68,7 @@ impl Board for Mps2 {
         Self {
             can: SlcanCan::new(Uart(UART0)),
             led: Led,
+            flash: Nor::new(pages()),
             systick: cortex.SYST,
         }
     }
@@ -73,6 +79,10 @@ impl Board for Mps2 {
 
     fn status(&mut self) -> &mut Self::Status {
         &mut self.led
+    }
+
+    fn flash(&mut self) -> &mut Self::Flash {
+        &mut self.flash
     }
 
     fn now() -> Instant {
@@ -156,6 +166,30 @@ unsafe impl InterruptNumber for Irq {
     fn number(self) -> u16 {
         self as u16
     }
+}
+
+/// The flash's memory.
+type Pages = [u8; 4 * PAGE];
+
+/// The flash's memory and, once it is delivered, a mark.
+#[unsafe(link_section = ".uninit.flash")]
+static mut FLASH: MaybeUninit<(u32, Pages)> = MaybeUninit::uninit();
+
+/// The flash's memory as the last start left it; blank at power-up, as delivered. To be called once.
+fn pages() -> &'static mut Pages {
+    const DELIVERED: u32 = 0xF1A5_0001;
+    // SAFETY: the only access, once; every pattern of bits is a value, and the first read is volatile, so that the
+    // compiler does not reason about what it does not see being written.
+    let (mark, pages) = unsafe {
+        let flash = (&raw mut FLASH).cast::<(u32, Pages)>();
+        if (&raw const (*flash).0).read_volatile() != DELIVERED {
+            (&raw mut (*flash).1).write_bytes(0xFF, 1);
+        }
+        let (mark, pages) = &mut *flash;
+        (mark, pages)
+    };
+    *mark = DELIVERED;
+    pages
 }
 
 /// A block of registers at its address.

@@ -15,6 +15,10 @@
 //! The log goes to the debug probe (RTT). SysTick is the tick, TIM2 the microseconds, DWT the cycles, IWDG the
 //! watchdog. Compiled and linked in CI; it has never met the board.
 //!
+//! The flash is one of two banks, as the chip is delivered (option bit DBANK); the parameters are in the last four
+//! pages of the second. A word whose programming lost power reads as an error that no code of correction mends:
+//! the chip then raises the non-maskable interrupt, and what was read fails its CRC.
+//!
 //! Two mirrored torque signals that do not add up to the supply mean a broken or missing sensor: the board then
 //! has no column, and one on the bus may speak.
 
@@ -29,6 +33,7 @@ use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, SampleTime};
 use embassy_stm32::can::enums::BusError;
 use embassy_stm32::can::{self, CanConfigurator};
 use embassy_stm32::dac::{DacChannel, Value};
+use embassy_stm32::flash::{self, Bank2Region, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::peripherals::{ADC1, FDCAN1, IWDG, PB5};
@@ -41,7 +46,7 @@ use embedded_can::nb::Can;
 use embedded_can::{Error, ErrorKind};
 use embedded_hal_nb::nb;
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::Column;
+use haptic_core::bus::messages::{Column, ResetCause};
 use haptic_core::quantity::{Instant, Radians, Torque};
 use rtt_target::{ChannelMode, UpChannel, rtt_init};
 
@@ -71,6 +76,7 @@ bind_interrupts!(struct Interrupts {
 pub struct NucleoG474re {
     can: FdCan,
     led: Output<'static>,
+    flash: Bank2Region<'static, flash::Blocking>,
     motor: DacChannel<'static, Blocking>,
     motor_enable: Output<'static>,
     adc: Adc<'static, ADC1>,
@@ -105,6 +111,7 @@ fn clocks() -> embassy_stm32::Config {
 impl Board for NucleoG474re {
     type Can = FdCan;
     type Status = Output<'static>;
+    type Flash = Bank2Region<'static, flash::Blocking>;
 
     const NAME: &'static str = "nucleo-g474re";
 
@@ -129,6 +136,7 @@ impl Board for NucleoG474re {
         Self {
             can: FdCan(can.into_normal_mode()),
             led: Output::new(p.PA5, Level::Low, Speed::Low),
+            flash: Flash::new_blocking(p.FLASH).into_blocking_regions().bank2_region,
             motor,
             motor_enable,
             adc: Adc::new(p.ADC1, Default::default()),
@@ -149,6 +157,10 @@ impl Board for NucleoG474re {
 
     fn status(&mut self) -> &mut Self::Status {
         &mut self.led
+    }
+
+    fn flash(&mut self) -> &mut Self::Flash {
+        &mut self.flash
     }
 
     fn now() -> Instant {
@@ -238,6 +250,18 @@ impl Board for NucleoG474re {
             channel.write(bytes);
         }
     }
+}
+
+/// A word of the flash cannot be corrected: whoever read it has a CRC to tell by. Nothing else raises this interrupt
+/// here but a lost crystal, which no program can do without.
+#[exception]
+unsafe fn NonMaskableInt() {
+    if pac::FLASH.eccr().read().eccd() {
+        pac::FLASH.eccr().modify(|w| w.set_eccd(true));
+        return;
+    }
+    NucleoG474re::zero_torque();
+    reset::restart(ResetCause::HardFault)
 }
 
 /// The tick is looked for with [`Board::tick`]; its interrupt only wakes the core.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::input::InputError;
-use host_sim::pil::{Channel, PilError};
+use host_sim::pil::{Channel, Machine, PilError, Target};
 use host_sim::scenario::Scenario;
 use host_sim::studies::processor::{self, ProcessorError};
 
@@ -18,9 +18,16 @@ pub(super) struct Arguments {
     /// How frames reach the target: fifo (a pipe) or slcan (ASCII on the UART, much slower)
     #[arg(long, default_value = "fifo")]
     channel: Channel,
+    /// QEMU's board: mps2-an386 or mps2-an500
+    #[arg(long, default_value_t)]
+    machine: Machine,
     /// Let the target count its instructions per step
     #[arg(long)]
     count: bool,
+    /// A board that runs the lockstep image, in QEMU's place: a CAN interface (can0), the serial port of an SLCAN
+    /// adapter (/dev/ttyACM0), or tcp:HOST:PORT
+    #[arg(long, value_name = "IFACE", conflicts_with_all = ["channel", "machine", "count"])]
+    can: Option<String>,
     /// Print the results as one JSON object
     #[arg(long)]
     json: bool,
@@ -33,7 +40,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let steps = scenario.course.length_m() / scenario.speed_mps() * 1e3;
     let bar = progress::bar(steps as u64, "steps");
-    let result = processor::run(&scenario, arguments.channel, arguments.count, |step| {
+    let target = match &arguments.can {
+        Some(adapter) => Target::Board(adapter.clone()),
+        None => Target::Qemu {
+            machine: arguments.machine,
+            channel: arguments.channel,
+            count: arguments.count,
+        },
+    };
+    let result = processor::run(&scenario, &target, |step| {
         // A thousand updates a second would cost more than the steps.
         if step.is_multiple_of(1000) {
             bar.set_position(step.into());
@@ -61,17 +76,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&format!(
             "{} steps, {} frames compared, {} mismatches; {:.0} steps per second over {}",
-            report.steps,
-            report.frames_compared,
-            report.mismatches,
-            report.steps_per_second,
-            arguments.channel,
+            report.steps, report.frames_compared, report.mismatches, report.steps_per_second, report.channel,
         ))?;
-        if let Some(instructions) = &report.instructions {
-            print(&format!(
-                "{} instructions in the worst step (number {}), {:.0} in the mean",
-                instructions.worst, instructions.worst_step, instructions.mean
-            ))?;
+        let spent = [("instructions", &report.instructions), ("cycles", &report.cycles)];
+        for (what, spent) in spent {
+            if let Some(spent) = spent {
+                print(&format!(
+                    "{} {what} in the worst step (number {}), {:.0} in the mean",
+                    spent.worst, spent.worst_step, spent.mean
+                ))?;
+            }
         }
     }
     if let Some(mismatch) = &report.first_mismatch {

@@ -1,7 +1,6 @@
 //! What the target answers, frame by frame, and what its silence means.
 
 use std::io::Read;
-use std::process::ChildStdout;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -16,9 +15,10 @@ const SILENCE: Duration = Duration::from_secs(20);
 /// Longest wait for a target to quit after its run.
 const EXIT: Duration = Duration::from_secs(5);
 
-/// The answers of a machine, which ends with them.
+/// The answers of a machine, which ends with them, or of a board, which stays.
 pub(super) struct Answers {
-    qemu: Qemu,
+    /// None: a board.
+    qemu: Option<Qemu>,
     bytes: Receiver<Vec<u8>>,
     decoder: Decoder,
     pending: std::vec::IntoIter<u8>,
@@ -27,7 +27,7 @@ pub(super) struct Answers {
 }
 
 impl Answers {
-    pub(super) fn new(qemu: Qemu, output: ChildStdout, channel_kind: Channel) -> Self {
+    pub(super) fn new(qemu: Option<Qemu>, output: impl Read + Send + 'static, channel_kind: Channel) -> Self {
         Self {
             qemu,
             bytes: pump(output),
@@ -58,20 +58,29 @@ impl Answers {
     }
 
     pub(super) fn gone(&mut self, what: &str) -> PilError {
-        let status = self
-            .qemu
+        let Some(qemu) = &mut self.qemu else {
+            return PilError::Failed(format!(
+                "the board {what} after {} steps: does it run the lockstep image, is the bus terminated, and do \
+                 adapter and board both run at 500 kbit/s?",
+                self.steps
+            ));
+        };
+        let status = qemu
             .wait(Duration::from_millis(500))
             .map_or(String::new(), |status| format!(" ({status})"));
         PilError::Failed(format!(
             "the target {what} after {} steps{status}; its log: cargo xtask log {}",
             self.steps,
-            self.qemu.log().display()
+            qemu.log().display()
         ))
     }
 
     /// Waits for the machine to end by itself, as it does after its input.
     pub(super) fn end(&mut self) -> Result<(), PilError> {
-        match self.qemu.wait(EXIT) {
+        let Some(qemu) = &mut self.qemu else {
+            return Ok(());
+        };
+        match qemu.wait(EXIT) {
             Some(status) if status.success() => Ok(()),
             Some(_) => Err(self.gone("failed at the end of the run")),
             None => Err(self.gone("does not end")),
@@ -80,12 +89,14 @@ impl Answers {
 
     /// The run went well: nobody will ask for its log.
     pub(super) fn discard_log(&self) {
-        self.qemu.discard_log();
+        if let Some(qemu) = &self.qemu {
+            qemu.discard_log();
+        }
     }
 }
 
 /// Reads on a thread of its own, so that waiting for bytes can have a limit.
-fn pump(mut output: ChildStdout) -> Receiver<Vec<u8>> {
+fn pump(mut output: impl Read + Send + 'static) -> Receiver<Vec<u8>> {
     let (to, from) = channel();
     std::thread::spawn(move || {
         let mut buffer = [0; 65536];

@@ -1,18 +1,20 @@
 //! Builds the lock-step image and finds its ELF.
 
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::PilError;
+use super::qemu::Machine;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
-const BOARD: &str = "mps2-an386";
 
-/// Builds the image with cargo, from the sources that this program was built from, and returns its ELF.
+/// Builds the image with cargo, from the sources that this program was built from, and returns its ELF: a copy,
+/// which no build for another machine overwrites.
 ///
 /// # Errors
 /// The sources, cargo or the Rust target are missing, or the build fails.
-pub fn build() -> Result<PathBuf, PilError> {
+pub fn build(machine: Machine) -> Result<PathBuf, PilError> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     if !root.join("firmware/Cargo.toml").is_file() {
         return Err(PilError::Missing(format!(
@@ -20,12 +22,28 @@ pub fn build() -> Result<PathBuf, PilError> {
             root.display()
         )));
     }
+    let copies = root.join("target/pil");
+    let io = |error: std::io::Error| PilError::Failed(format!("{}: {error}", copies.display()));
+    fs::create_dir_all(&copies).map_err(io)?;
+    // Held until the copy is made, so that another program's build does not come between.
+    let lock = File::create(copies.join("lock")).map_err(io)?;
+    lock.lock().map_err(io)?;
+    let elf = build_locked(&root, machine)?;
+    let copy = copies.join(format!("lockstep-{machine}"));
+    // Renamed into place: a machine may be reading the last one.
+    let fresh = copies.join(format!("lockstep-{machine}.new"));
+    fs::copy(elf, &fresh).map_err(io)?;
+    fs::rename(fresh, &copy).map_err(io)?;
+    Ok(copy)
+}
+
+fn build_locked(root: &Path, machine: Machine) -> Result<PathBuf, PilError> {
     // The cargo that runs this program, so that both use one toolchain.
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(&cargo)
-        .current_dir(&root)
+        .current_dir(root)
         .args(["build", "--release", "-p", "haptic-firmware", "--bin", "lockstep"])
-        .args(["--target", TARGET, "--features", BOARD])
+        .args(["--target", TARGET, "--features", machine.name()])
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::piped())
         .output()

@@ -89,9 +89,10 @@ impl fmt::Display for Decoded {
     }
 }
 
-/// Instructions that the target spent on the ticks of a run: all frames received, and the step.
+/// What the target spent on the ticks of a run, all frames received and the step: instructions in QEMU, cycles of
+/// the core on a board.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Instructions {
+pub struct Spent {
     /// The most of any tick.
     pub worst: u32,
     /// Number of that tick, from 0.
@@ -104,17 +105,28 @@ pub struct Instructions {
     pub mean_advice: f64,
 }
 
+/// What the target's counter of cycles tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Counter {
+    /// Nothing: QEMU, and its clock is this computer's.
+    Nothing,
+    /// QEMU's instructions.
+    Instructions,
+    /// A board's cycles.
+    Cycles,
+}
+
 pub(super) struct Judge {
     answers: Answers,
-    count: bool,
+    counter: Counter,
     report: Report,
 }
 
 impl Judge {
-    pub(super) fn new(answers: Answers, channel: Channel, count: bool) -> Self {
+    pub(super) fn new(answers: Answers, channel: Channel, counter: Counter) -> Self {
         Self {
             answers,
-            count,
+            counter,
             report: Report {
                 channel,
                 steps: 0,
@@ -123,6 +135,7 @@ impl Judge {
                 steps_per_second: 0.0,
                 stack_bytes: 0,
                 instructions: None,
+                cycles: None,
                 first_mismatch: None,
             },
         }
@@ -141,9 +154,9 @@ impl Judge {
             self.answers.steps = self.report.steps;
             self.report.steps_per_second = self.report.steps as f64 / start.elapsed().as_secs_f64();
         }
-        if let Some(instructions) = &mut self.report.instructions {
-            [instructions.mean, instructions.mean_advice] =
-                total.map(|total| total as f64 / self.report.steps as f64);
+        let spent = self.report.instructions.as_mut().or(self.report.cycles.as_mut());
+        if let Some(spent) = spent {
+            [spent.mean, spent.mean_advice] = total.map(|total| total as f64 / self.report.steps as f64);
         }
         self.answers.end()?;
         if self.report.mismatches == 0 {
@@ -152,7 +165,7 @@ impl Judge {
         Ok(self.report)
     }
 
-    /// Compares one answer. Returns the instructions of the step and of the advice.
+    /// Compares one answer. Returns what the step and the advice cost.
     fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
@@ -186,18 +199,20 @@ impl Judge {
         }
     }
 
-    /// Instructions of a step and of the advice; without counting, cycles mean nothing.
+    /// What a step and its advice cost.
     fn account(&mut self, cost: StepCost) -> [u32; 2] {
-        if !self.count {
-            return [0; 2];
+        let cycles = [cost.cycles, cost.advice_cycles];
+        let (spent, most) = match self.counter {
+            Counter::Nothing => return [0; 2],
+            Counter::Instructions => (cycles.map(instructions), &mut self.report.instructions),
+            Counter::Cycles => (cycles, &mut self.report.cycles),
+        };
+        let most = most.get_or_insert_default();
+        if spent[0] > most.worst {
+            most.worst = spent[0];
+            most.worst_step = self.report.steps;
         }
-        let (spent, advice) = (instructions(cost.cycles), instructions(cost.advice_cycles));
-        let counted = self.report.instructions.get_or_insert_default();
-        if spent > counted.worst {
-            counted.worst = spent;
-            counted.worst_step = self.report.steps;
-        }
-        counted.worst_advice = counted.worst_advice.max(advice);
-        [spent, advice]
+        most.worst_advice = most.worst_advice.max(spent[1]);
+        spent
     }
 }

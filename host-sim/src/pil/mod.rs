@@ -6,12 +6,17 @@
 //! controllers must answer the same, the host need not wait: over the pipe (*fifo*) thousands of ticks are
 //! under way at once, over SLCAN one, as an outside client of the bus would do it.
 //!
-//! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`link`]: frames as bytes.
+//! A board takes the machine's place ([`Target::Board`]): its lock-step image on a real bus behind an adapter, the
+//! same frames, the same comparison.
+//!
+//! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`adapter`]: the way to a board.
+//! - [`link`]: frames as bytes.
 //! - [`judge`]: compares the answers, on its own thread. - [`stepped`]: a target for whoever judges by himself,
 //!   and may reach into its memory.
 //!
 //! Not here: the plant and the scenario.
 
+mod adapter;
 mod answers;
 mod gdb;
 pub mod image;
@@ -22,7 +27,6 @@ pub mod stepped;
 
 use std::fmt;
 use std::io::{BufWriter, Write};
-use std::process::ChildStdin;
 use std::str::FromStr;
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
@@ -35,8 +39,9 @@ use haptic_core::quantity::Instant;
 use serde::Serialize;
 
 use answers::Answers;
-use judge::{Expected, Judge};
-pub use judge::{Instructions, Mismatch};
+use judge::{Counter, Expected, Judge};
+pub use judge::{Mismatch, Spent};
+pub use qemu::Machine;
 use qemu::{Extras, Qemu};
 
 /// How frames reach the target.
@@ -47,16 +52,6 @@ pub enum Channel {
     Fifo,
     /// SLCAN lines on the board's bus port: what an outside client does.
     Slcan,
-}
-
-impl Channel {
-    /// Ticks under way at once. The pipe's are many more than one write buffer holds.
-    const fn window(self) -> usize {
-        match self {
-            Self::Fifo => 4096,
-            Self::Slcan => 0,
-        }
-    }
 }
 
 impl fmt::Display for Channel {
@@ -80,10 +75,30 @@ impl FromStr for Channel {
     }
 }
 
+/// What is compared with the host's controller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Target {
+    /// An image that is built and started in QEMU.
+    Qemu {
+        /// The board.
+        machine: Machine,
+        /// How frames reach it.
+        channel: Channel,
+        /// Whether its clock counts instructions.
+        count: bool,
+    },
+    /// A board that runs the image, on a bus behind a CAN adapter: a network interface (`can0`, SocketCAN), a serial
+    /// port (`/dev/ttyACM0`, SLCAN), or `tcp:HOST:PORT` (SLCAN). Frames go and come one tick at a time.
+    Board(String),
+}
+
+/// Ticks under way at once over pipes: many more than one write buffer holds.
+const WINDOW: usize = 4096;
+
 /// What went wrong, in one line, with what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PilError {
-    /// Something that has to be installed first.
+    /// Something that has to be installed or plugged in first.
     Missing(String),
     /// The image does not build, or the target does not start, answer or end as it should.
     Failed(String),
@@ -115,7 +130,10 @@ pub struct Report {
     pub stack_bytes: u32,
     /// What a step cost the target, if it was counted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub instructions: Option<Instructions>,
+    pub instructions: Option<Spent>,
+    /// What it cost a board, in cycles of its core.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cycles: Option<Spent>,
     /// The first difference.
     #[serde(skip)]
     pub first_mismatch: Option<Mismatch>,
@@ -124,25 +142,53 @@ pub struct Report {
 /// A run under way. Dropping it ends the target.
 pub struct Pil {
     /// None once the run is over: closing it tells the target so.
-    input: Option<BufWriter<ChildStdin>>,
+    input: Option<BufWriter<Box<dyn Write + Send>>>,
     expected: Option<SyncSender<Expected>>,
     judge: Option<JoinHandle<Result<Report, PilError>>>,
     channel: Channel,
 }
 
 impl Pil {
-    /// Builds the image, starts it in QEMU, and starts its controller as the host's ([`Start::ecu`]). With
-    /// `count`, the target counts its instructions.
+    /// Builds the image and starts it in QEMU, or opens the way to a board, and starts the target's controller as
+    /// the host's ([`Start::ecu`]).
     ///
     /// # Errors
     /// What is missing or fails on the way to a running image.
-    pub fn start(channel: Channel, params: &Params, start: Start, count: bool) -> Result<Self, PilError> {
-        // Before the build, which takes longer than to say what is missing.
-        Qemu::check()?;
-        let elf = image::build()?;
-        let (qemu, input, output) = Qemu::start(&elf, channel, Extras { count, gdb: None })?;
-        let (expected, expectations) = sync_channel(channel.window());
-        let judge = Judge::new(Answers::new(qemu, output, channel), channel, count);
+    pub fn on(target: &Target, params: &Params, start: Start) -> Result<Self, PilError> {
+        let (channel, input, judge, window) = match target {
+            &Target::Qemu {
+                machine,
+                channel,
+                count,
+            } => {
+                // Before the build, which takes longer than to say what is missing.
+                Qemu::check()?;
+                let elf = image::build(machine)?;
+                let (qemu, input, output) = Qemu::start(machine, &elf, channel, Extras { count, gdb: None })?;
+                let counter = if count {
+                    Counter::Instructions
+                } else {
+                    Counter::Nothing
+                };
+                let judge = Judge::new(Answers::new(Some(qemu), output, channel), channel, counter);
+                let window = match channel {
+                    Channel::Fifo => WINDOW,
+                    Channel::Slcan => 0,
+                };
+                let input: Box<dyn Write + Send> = Box::new(input);
+                (channel, input, judge, window)
+            }
+            Target::Board(adapter) => {
+                let adapter::Adapter {
+                    channel,
+                    input,
+                    output,
+                } = adapter::open(adapter)?;
+                let judge = Judge::new(Answers::new(None, output, channel), channel, Counter::Cycles);
+                (channel, input, judge, 0)
+            }
+        };
+        let (expected, expectations) = sync_channel(window);
         let mut pil = Self {
             input: Some(BufWriter::new(input)),
             expected: Some(expected),

@@ -4,8 +4,10 @@
 //! as the board's UART for SLCAN. So when this program dies in whatever way, the fifo's image reads the end of
 //! its input and quits; a terminal's interrupt reaches QEMU as well as this program.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use super::{Channel, PilError};
@@ -22,6 +24,42 @@ const NS_PER_CYCLE: u64 = 40;
 pub fn instructions(cycles: u32) -> u32 {
     let ns = u64::from(cycles) * NS_PER_CYCLE;
     u32::try_from((ns + NS_PER_INSTRUCTION / 2) / NS_PER_INSTRUCTION).unwrap_or(u32::MAX)
+}
+
+/// Boards that QEMU has. The names are QEMU's, and those of the firmware's features.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Machine {
+    /// The reference board, Cortex-M4F.
+    #[default]
+    An386,
+    /// The same with a Cortex-M7.
+    An500,
+}
+
+impl Machine {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::An386 => "mps2-an386",
+            Self::An500 => "mps2-an500",
+        }
+    }
+}
+
+impl fmt::Display for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Machine {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        [Self::An386, Self::An500]
+            .into_iter()
+            .find(|machine| machine.name() == text)
+            .ok_or_else(|| format!("machine '{text}' is neither mps2-an386 nor mps2-an500"))
+    }
 }
 
 /// What a machine does beside running.
@@ -54,13 +92,14 @@ impl Qemu {
     /// # Errors
     /// QEMU is not installed or does not start.
     pub fn start(
+        machine: Machine,
         elf: &Path,
         channel: Channel,
         extras: Extras,
     ) -> Result<(Self, ChildStdin, ChildStdout), PilError> {
-        let log = elf.with_file_name(format!("lockstep-{channel}-{}.log", std::process::id()));
+        let log = elf.with_file_name(format!("{machine}-{channel}-{}.log", std::process::id()));
         let mut command = Command::new(PROGRAM);
-        command.args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none"]);
+        command.args(["-machine", machine.name(), "-display", "none", "-monitor", "none"]);
         command.arg("-serial").arg(match channel {
             Channel::Fifo => "null",
             Channel::Slcan => "stdio",

@@ -14,7 +14,7 @@ use object::{Object, ObjectSymbol};
 
 use super::answers::Answers;
 use super::gdb::Gdb;
-use super::qemu::{Extras, Qemu};
+use super::qemu::{Extras, Machine, Qemu};
 use super::{Channel, PilError, image, link};
 
 /// Name of the static that holds the controller (`firmware/src/bin/lockstep`).
@@ -40,7 +40,7 @@ impl Stepped {
     /// What is missing or fails on the way to a running image.
     pub fn start(memory: bool) -> Result<Self, PilError> {
         Qemu::check()?;
-        let elf = image::build()?;
+        let elf = image::build(Machine::default())?;
         let controller = symbol(&elf)?;
         let channel = if memory { Channel::Slcan } else { Channel::Fifo };
         // The port is free now; QEMU takes it at once.
@@ -53,10 +53,10 @@ impl Stepped {
             count: false,
             gdb: port,
         };
-        let (qemu, input, output) = Qemu::start(&elf, channel, extras)?;
+        let (qemu, input, output) = Qemu::start(Machine::default(), &elf, channel, extras)?;
         let mut stepped = Self {
             input: BufWriter::new(input),
-            answers: Answers::new(qemu, output, channel),
+            answers: Answers::new(Some(qemu), output, channel),
             channel,
             port,
             controller,

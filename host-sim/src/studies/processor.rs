@@ -1,5 +1,5 @@
-//! Processor in the loop: a scenario on this host, every frame of it also to the ECU's image in QEMU, and every
-//! answer compared. The image has the controller's parameters of the scenario.
+//! Processor in the loop: a scenario on this host, every frame of it also to the ECU's image in QEMU or on a board,
+//! and every answer compared. The image has the controller's parameters of the scenario.
 
 use haptic_core::lockstep::{Start, StartState};
 use haptic_core::quantity::Instant;
@@ -7,7 +7,7 @@ use haptic_core::quantity::Instant;
 use crate::closed_loop::{Cycle, drive};
 use crate::guidance::OverBus;
 use crate::models::road::Centreline;
-use crate::pil::{Channel, Pil, PilError, Report};
+use crate::pil::{Pil, PilError, Report, Target};
 use crate::scenario::{Condition, Scenario, Sensors};
 
 /// Why there is no comparison.
@@ -19,16 +19,14 @@ pub enum ProcessorError {
     Target(PilError),
 }
 
-/// Runs a scenario over the bus. With `count`, the target counts its instructions. `progress` is told each
-/// step's number.
+/// Runs a scenario over the bus. `progress` is told each step's number.
 ///
 /// # Errors
 /// A manual scenario, which has no controller to compare, or one past the bus, the image's only way in; as
 /// [`Scenario::check`] and [`Scenario::check_times`]; what is missing or fails on the way to a running image.
 pub fn run(
     scenario: &Scenario,
-    channel: Channel,
-    count: bool,
+    target: &Target,
     mut progress: impl FnMut(u32),
 ) -> Result<Report, ProcessorError> {
     let checked = scenario.check().and_then(|()| scenario.check_times());
@@ -51,7 +49,7 @@ pub fn run(
         state: StartState::Engaged,
         at: Instant::from_us(0),
     };
-    let mut pil = Pil::start(channel, &params, start, count).map_err(ProcessorError::Target)?;
+    let mut pil = Pil::on(target, &params, start).map_err(ProcessorError::Target)?;
     let mut guidance = OverBus::new(&setup);
     guidance.set_probe(scenario.guidance.probe);
     let mut broken = None;

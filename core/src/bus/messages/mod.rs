@@ -7,9 +7,11 @@
 
 mod inputs;
 mod outputs;
+mod service;
 
 pub use inputs::{Column, Demand, LanePreview, Vehicle};
 pub use outputs::{FaultRecord, Guidance, ResetCause, Telemetry, Warning};
+pub use service::{ParameterStatus, ParameterWrite, WriteOutcome};
 
 use super::e2e::{Protection, ReceiverState, Reject};
 use super::frame::Frame;

@@ -25,6 +25,8 @@ pub enum ResetCause {
     StackOverflow = 4,
     /// Supply voltage fell too low.
     BrownOut = 5,
+    /// New parameters were written over the bus, and are in use from now on.
+    NewParameters = 6,
 }
 
 impl ResetCause {
@@ -38,6 +40,7 @@ impl ResetCause {
             3 => Self::Panic,
             4 => Self::StackOverflow,
             5 => Self::BrownOut,
+            6 => Self::NewParameters,
             _ => return None,
         })
     }

@@ -103,7 +103,7 @@ mod target {
             if let Some(SimTime(now)) = SimTime::decode(&frame) {
                 self.tick(now, ecu, can);
             } else if let Some(start) = Start::decode(&frame) {
-                *ecu = Some(start_ecu(start, &self.params));
+                begin(ecu, start, &self.params);
                 self.frames.clear();
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
@@ -115,7 +115,12 @@ mod target {
                 state: StartState::Boot(Boot::default()),
                 at: now,
             };
-            let ecu = ecu.get_or_insert_with(|| start_ecu(boot, &self.params));
+            if ecu.is_none() {
+                begin(ecu, boot, &self.params);
+            }
+            let Some(ecu) = ecu else {
+                return;
+            };
             let start = ThisBoard::cycles();
             for frame in &self.frames {
                 if ecu.receive(frame, now).is_err() {
@@ -158,9 +163,11 @@ mod target {
         }
     }
 
-    fn start_ecu(start: Start, params: &Params) -> Ecu {
+    /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
+    #[inline(never)]
+    fn begin(ecu: &mut Option<Ecu>, start: Start, params: &Params) {
         match start.ecu(params) {
-            Ok(ecu) => ecu,
+            Ok(new) => *ecu = Some(new),
             Err(error) => panic!("{error}"),
         }
     }

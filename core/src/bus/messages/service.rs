@@ -1,0 +1,101 @@
+//! What writes parameters, and says which are in use. Only in Standby, and never the torque path's.
+
+use super::{Message, put, unsigned};
+use crate::bus::e2e::Protection;
+use crate::stored::VALUES;
+
+/// One field of a new set of parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterWrite {
+    /// Which field, 0 to 18, in the order of [`crate::stored`].
+    pub index: u8,
+    /// Its value, SI. On the bus as an IEEE 754 binary32.
+    pub value: f32,
+}
+
+impl Message for ParameterWrite {
+    const ID: u16 = 0x140;
+    const PROTECTION: Protection = Protection::new(0x55);
+    const MAX_DELTA: u8 = 14;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.index), 12, 5) | put(i64::from(self.value.to_bits()), 32, 32)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let index = unsigned(word, 12, 5) as u8;
+        (usize::from(index) < VALUES).then(|| Self {
+            index,
+            value: f32::from_bits(unsigned(word, 32, 32) as u32),
+        })
+    }
+}
+
+/// What became of the last set that was sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum WriteOutcome {
+    /// None was sent since the start.
+    None = 0,
+    /// Its last field has not come.
+    Receiving = 1,
+    /// Refused: the ECU was not in Standby.
+    NotInStandby = 2,
+    /// Refused: a field came out of its order.
+    OutOfOrder = 3,
+    /// Refused: a parameter is outside its range.
+    OutOfRange = 4,
+    /// It is being stored, and the ECU starts anew with it.
+    Taken = 5,
+}
+
+impl WriteOutcome {
+    /// The outcome of a code on the bus.
+    #[must_use]
+    pub const fn from_code(code: i64) -> Option<Self> {
+        Some(match code {
+            0 => Self::None,
+            1 => Self::Receiving,
+            2 => Self::NotInStandby,
+            3 => Self::OutOfOrder,
+            4 => Self::OutOfRange,
+            5 => Self::Taken,
+            _ => return None,
+        })
+    }
+}
+
+/// The parameters in use, every second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ParameterStatus {
+    /// Whether they come from the memory; otherwise they are those built into the image.
+    pub stored: bool,
+    /// A copy in the memory cannot be read: its write was cut short, or the memory is damaged.
+    pub damaged: bool,
+    /// What became of the last set that was sent.
+    pub outcome: WriteOutcome,
+    /// The number of the stored set; each write counts one up.
+    pub sequence: u32,
+}
+
+impl Message for ParameterStatus {
+    const ID: u16 = 0x320;
+    const PROTECTION: Protection = Protection::new(0x99);
+    const MAX_DELTA: u8 = 2;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.stored), 12, 1)
+            | put(i64::from(self.damaged), 13, 1)
+            | put(i64::from(self.outcome as u8), 16, 3)
+            | put(i64::from(self.sequence), 32, 32)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        Some(Self {
+            stored: unsigned(word, 12, 1) != 0,
+            damaged: unsigned(word, 13, 1) != 0,
+            outcome: WriteOutcome::from_code(unsigned(word, 16, 3))?,
+            sequence: unsigned(word, 32, 32) as u32,
+        })
+    }
+}

@@ -1,0 +1,192 @@
+//! A set of parameters over the bus: taken only whole, in order, in Standby and within its ranges.
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::WriteOutcome;
+use haptic_core::download::{Download, frames};
+use haptic_core::modes::Mode;
+use haptic_core::params::Params;
+use haptic_core::stored::Stored;
+
+/// Every value is a binary32, so that the bus rounds nothing.
+const SET: Params = Params {
+    k_1: 0.5,
+    a_1: 1.5,
+    a_2: 0.25,
+    a_3: 20.0,
+    torque_limit_nm: 3.0,
+    probe_amplitude_nm: 0.125,
+    t_nms_s: 0.25,
+    vehicle: haptic_core::params::VehicleParams {
+        curvature_gain_1pm: 0.015625,
+        stability_factor_s2pm2: 0.001953125,
+        aligning_gain_nms2pm: 1.25,
+        column_damping_nms: 0.5,
+        far_time_s: 0.75,
+    },
+    ..Params::PAPER
+};
+
+/// What a fresh receiver makes of frames.
+fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
+    let mut download = Download::NEW;
+    let taken = frames
+        .iter()
+        .filter_map(|frame| download.receive(frame, mode))
+        .last();
+    (taken, download.status(None, false).outcome)
+}
+
+#[test]
+fn a_whole_set_in_standby_is_taken() {
+    assert_eq!(
+        receive(&frames(&SET), Mode::Standby),
+        (Some(SET), WriteOutcome::Taken)
+    );
+}
+
+/// By hand: identifier 0x140, field 4 (a_4 = 1.0 = 0x3F800000), counter 4, CRC over bytes 1..7 and data ID
+/// 0x75 ^ 0x55.
+#[test]
+fn a_field_lies_on_the_bus_as_documented() {
+    let frame = frames(&SET)[4];
+    assert_eq!(frame.id(), 0x140);
+    assert_eq!(frame.data()[1..], [0x44, 0, 0, 0, 0, 0x80, 0x3F]);
+    let crc = [0x44, 0, 0, 0, 0, 0x80, 0x3F, 0x75 ^ 0x55]
+        .iter()
+        .fold(0xFF_u8, |crc, byte| {
+            (0..8).fold(crc ^ byte, |crc, _| {
+                if crc & 0x80 == 0 {
+                    crc << 1
+                } else {
+                    (crc << 1) ^ 0x2F
+                }
+            })
+        });
+    assert_eq!(frame.data()[0], !crc);
+}
+
+#[test]
+fn no_other_mode_takes_anything() {
+    for mode in [
+        Mode::Boot,
+        Mode::Active,
+        Mode::Fade,
+        Mode::Handover,
+        Mode::Fault,
+        Mode::Locked,
+    ] {
+        assert_eq!(
+            receive(&frames(&SET), mode),
+            (None, WriteOutcome::NotInStandby),
+            "{mode:?}"
+        );
+        // Nor does one frame of a set that comes in another mode.
+        let mut download = Download::NEW;
+        for (i, frame) in frames(&SET).iter().enumerate() {
+            let now = if i == 9 { mode } else { Mode::Standby };
+            assert_eq!(download.receive(frame, now), None, "{mode:?}");
+        }
+    }
+}
+
+/// Each frame lost, sent twice, or swapped with its neighbour.
+#[test]
+fn a_set_with_a_gap_is_refused() {
+    let good = frames(&SET);
+    for i in 0..good.len() {
+        let mut lost = good.to_vec();
+        lost.remove(i);
+        let mut twice = good.to_vec();
+        twice.insert(i, good[i]);
+        let mut swapped = good.to_vec();
+        swapped.swap(i, (i + 1) % good.len());
+        assert_eq!(receive(&lost, Mode::Standby).0, None, "frame {i} lost");
+        // A first field sent again only begins anew, and before a last one came again the set was whole.
+        if i != 0 && i != 18 {
+            assert_eq!(receive(&twice, Mode::Standby).0, None, "frame {i} twice");
+        }
+        assert_eq!(receive(&swapped, Mode::Standby).0, None, "frame {i} swapped");
+    }
+    assert_eq!(
+        receive(&good[..18], Mode::Standby),
+        (None, WriteOutcome::Receiving)
+    );
+    assert_eq!(
+        receive(&good[1..], Mode::Standby),
+        (None, WriteOutcome::OutOfOrder)
+    );
+}
+
+/// Every bit of every frame flipped: never taken, whole or as another set.
+#[test]
+fn a_damaged_frame_spoils_the_set() {
+    let good = frames(&SET);
+    for i in 0..good.len() {
+        for bit in 0..64 {
+            let mut data = good[i].data().to_vec();
+            data[bit / 8] ^= 1 << (bit % 8);
+            let mut spoilt = good;
+            spoilt[i] = Frame::new(good[i].id(), &data).unwrap();
+            assert_eq!(receive(&spoilt, Mode::Standby).0, None, "bit {bit} of frame {i}");
+        }
+    }
+}
+
+#[test]
+fn a_value_out_of_its_range_spoils_the_set() {
+    for bad in [
+        Params {
+            torque_limit_nm: 5.25,
+            ..SET
+        },
+        Params { k_1: -0.25, ..SET },
+        Params {
+            k_nms: f64::NAN,
+            ..SET
+        },
+        Params {
+            a_3: f64::INFINITY,
+            ..SET
+        },
+        // Each in its range, their product beyond.
+        Params {
+            k_1: 4.0,
+            a_3: 100.0,
+            ..SET
+        },
+    ] {
+        assert_eq!(
+            receive(&frames(&bad), Mode::Standby),
+            (None, WriteOutcome::OutOfRange)
+        );
+    }
+}
+
+#[test]
+fn a_refused_set_can_be_sent_again() {
+    let mut download = Download::NEW;
+    for frame in &frames(&SET)[1..] {
+        assert_eq!(download.receive(frame, Mode::Standby), None);
+    }
+    let taken = frames(&SET)
+        .iter()
+        .filter_map(|frame| download.receive(frame, Mode::Standby))
+        .last();
+    assert_eq!(taken, Some(SET));
+}
+
+#[test]
+fn the_status_names_the_set_in_use() {
+    let stored = Stored {
+        params: SET,
+        sequence: 7,
+        copy: 1,
+    };
+    let status = Download::NEW.status(Some(&stored), true);
+    assert_eq!((status.stored, status.damaged, status.sequence), (true, true, 7));
+    let status = Download::NEW.status(None, false);
+    assert_eq!(
+        (status.stored, status.damaged, status.sequence),
+        (false, false, 0)
+    );
+}

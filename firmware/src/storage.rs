@@ -1,0 +1,132 @@
+//! Parameters in flash: two copies of the set, each in pages of its own, so that a write touches one copy only while
+//! the other one is good.
+//!
+//! A copy is a region of two pages, in which `sequential-storage` appends and turns the pages over (layout, wear);
+//! a set is the block of `haptic_core::stored`, with version, number and CRC-32. [`save`] writes the copy that was
+//! not loaded, reads it back, and only then the other one. So power may go at any moment: the last good set, or
+//! the new one, is there.
+//!
+//! The copies lie in the last four pages of the flash they are given; the board's memory map leaves these out.
+//!
+//! Why a region each and the read-back: the crate's own map recovers from a cut write too, but a store that it
+//! acknowledges after repeated cuts can be lost at the next start (its issue 136). Here that costs a second try,
+//! never a set. Not here: when to write (`product`: at a start, before anything moves).
+
+use core::future::Future;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+
+use embassy_embedded_hal::adapter::BlockingAsync;
+use embedded_storage::nor_flash::NorFlash;
+use haptic_core::params::Params;
+use haptic_core::stored::{self, BYTES, Stored};
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{MapConfig, MapStorage};
+
+/// Pages of a copy: fewer would leave none to turn over to.
+const PAGES: u32 = 2;
+/// The block's key in its region.
+const KEY: u8 = 0;
+/// Key and block, rounded up to the words of any flash.
+const BUFFER: usize = (1 + BYTES).next_multiple_of(32);
+
+/// What lies in the memory.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Found {
+    /// The newest good set.
+    pub stored: Option<Stored>,
+    /// Whether each copy is there but cannot be read.
+    pub damaged: [bool; 2],
+}
+
+/// A set could not be written, or not read back. Copies that were good before are still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WriteFailed;
+
+/// Looks at both copies.
+pub fn load<F: NorFlash>(flash: &mut F) -> Found {
+    let copies = [0, 1].map(|copy| read(flash, copy));
+    // A copy alone shows whether it is good.
+    let is_good = |copy: &Option<[u8; BYTES]>| {
+        copy.as_ref()
+            .is_some_and(|bytes| stored::load([bytes, &[]]).is_some())
+    };
+    let damaged = [0, 1].map(|copy| !is_good(&copies[copy]) && !is_blank(flash, copy));
+    let [a, b] = copies
+        .each_ref()
+        .map(|copy| copy.as_ref().map_or(&[][..], |bytes| bytes));
+    Found {
+        stored: stored::load([a, b]),
+        damaged,
+    }
+}
+
+/// Writes a set into both copies, one after the other.
+///
+/// # Errors
+/// The first copy does not read back; the second one was not touched.
+pub fn save<F: NorFlash>(flash: &mut F, params: &Params, last: Option<&Stored>) -> Result<(), WriteFailed> {
+    let (copy, sequence) = last.map_or((0, 1), |last| (1 - last.copy, last.sequence.wrapping_add(1)));
+    let bytes = stored::save(params, sequence);
+    for copy in [copy, 1 - copy] {
+        write(flash, copy, &bytes)?;
+    }
+    Ok(())
+}
+
+/// First and last byte of a copy's region.
+fn region<F: NorFlash>(flash: &F, copy: usize) -> core::ops::Range<u32> {
+    let length = PAGES * F::ERASE_SIZE as u32;
+    let end = flash.capacity() as u32 - if copy == 0 { length } else { 0 };
+    end - length..end
+}
+
+type NoCache = Cache<Uncached, Uncached, Uncached, u8>;
+
+fn map<F: NorFlash>(flash: &mut F, copy: usize) -> MapStorage<u8, BlockingAsync<&mut F>, NoCache> {
+    let region = region(flash, copy);
+    MapStorage::new(
+        BlockingAsync::new(flash),
+        MapConfig::new(region),
+        NoCache::new_uncached(),
+    )
+}
+
+fn read<F: NorFlash>(flash: &mut F, copy: usize) -> Option<[u8; BYTES]> {
+    let mut buffer = [0; BUFFER];
+    let found = now(map(flash, copy).fetch_item::<&[u8]>(&mut buffer, &KEY));
+    found.ok().flatten().and_then(|bytes| bytes.try_into().ok())
+}
+
+fn write<F: NorFlash>(flash: &mut F, copy: usize, bytes: &[u8; BYTES]) -> Result<(), WriteFailed> {
+    for is_second_try in [false, true] {
+        if is_second_try {
+            // What cuts left behind stands in the way.
+            let region = region(flash, copy);
+            flash.erase(region.start, region.end).map_err(|_| WriteFailed)?;
+        }
+        let mut buffer = [0; BUFFER];
+        let stored = now(map(flash, copy).store_item(&mut buffer, &KEY, &bytes.as_slice()));
+        if stored.is_ok() && read(flash, copy).as_ref() == Some(bytes) {
+            return Ok(());
+        }
+    }
+    Err(WriteFailed)
+}
+
+fn is_blank<F: NorFlash>(flash: &mut F, copy: usize) -> bool {
+    let mut chunk = [0; 64];
+    region(flash, copy)
+        .step_by(chunk.len())
+        .all(|at| flash.read(at, &mut chunk).is_ok() && chunk == [0xFF; 64])
+}
+
+/// The result of work that never waits: the flash below is a blocking one.
+fn now<T>(work: impl Future<Output = T>) -> T {
+    let mut work = pin!(work);
+    loop {
+        if let Poll::Ready(result) = work.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            return result;
+        }
+    }
+}

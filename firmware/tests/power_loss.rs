@@ -1,0 +1,166 @@
+//! Power lost at every step of a parameter write, on a model of the flash: the last good set is never lost.
+//!
+//! A write is cut after every number of its operations, the one under way left half done; then the device starts
+//! again, and must find the set before the write or the new one, whole. The same is then tried on top of what a
+//! cut left behind, and while pages turn over.
+
+use haptic_core::params::Params;
+use haptic_firmware::nor::{Nor, PAGE};
+use haptic_firmware::storage::{Found, WriteFailed, load, save};
+
+type Memory = [u8; 4 * PAGE];
+
+const BLANK: Memory = [0xFF; 4 * PAGE];
+
+/// A set that its number tells apart.
+fn set(number: u32) -> Params {
+    Params {
+        k_1: 0.25 + f64::from(number) / 1024.0,
+        ..Params::PAPER
+    }
+}
+
+fn found(memory: &Memory) -> Found {
+    load(&mut Nor::new(*memory))
+}
+
+/// Writes set `number`, with the supply cut after `operations`, and returns the memory afterwards and whether the
+/// write was cut.
+fn write(memory: &Memory, number: u32, operations: Option<u32>) -> (Memory, bool) {
+    let last = found(memory).stored;
+    let mut flash = Nor::new(*memory);
+    if let Some(operations) = operations {
+        flash.cut_after(operations);
+    }
+    let result = save(&mut flash, &set(number), last.as_ref());
+    let is_cut = flash.is_cut();
+    assert!(is_cut || result == Ok(()), "{result:?}");
+    (flash.into_memory(), is_cut)
+}
+
+/// After a cut the device has the set `before` or the set `new`, with its own sequence number.
+fn assert_one_of(memory: &Memory, before: u32, new: u32, what: &str) {
+    let stored = found(memory)
+        .stored
+        .unwrap_or_else(|| panic!("{what}: no set is left"));
+    let number = stored.sequence;
+    assert!(number == before || number == new, "{what}: set {number}");
+    assert_eq!(stored.params, set(number), "{what}");
+}
+
+/// Cuts one write everywhere, and returns how many points that were.
+fn cut_everywhere(memory: &Memory, before: u32) -> u32 {
+    // The number of a set is its sequence number.
+    for operations in 1.. {
+        let (after, is_cut) = write(memory, before + 1, Some(operations));
+        if !is_cut {
+            return operations - 1;
+        }
+        let what = format!("cut after {operations} operations of write {}", before + 1);
+        assert_one_of(&after, before, before + 1, &what);
+    }
+    unreachable!("a write ends")
+}
+
+#[test]
+fn a_write_cut_at_any_step_leaves_the_last_good_set() {
+    let mut memory = BLANK;
+    let (mut points, mut fewest, mut most) = (0, u32::MAX, 0);
+    for number in 1..=60 {
+        if number > 1 {
+            let here = cut_everywhere(&memory, number - 1);
+            points += here;
+            (fewest, most) = (fewest.min(here), most.max(here));
+        }
+        memory = write(&memory, number, None).0;
+        assert_eq!(found(&memory).stored.unwrap().params, set(number));
+    }
+    // A block is 165 bytes, 21 words, and is written twice.
+    assert!(fewest >= 2 * 21, "a write of {fewest} operations");
+    // 60 writes of 180 bytes and more fill pages of 2 KiB many times over: some of them had to turn a page.
+    assert!(most > fewest, "no write turned a page");
+    assert!(points > 2000, "{points} points");
+}
+
+/// Cuts on top of cuts: the supply fails again and again before a write succeeds.
+#[test]
+fn repeated_cuts_leave_the_last_good_set() {
+    let mut memory = write(&BLANK, 1, None).0;
+    let mut before = 1;
+    let mut points = 0;
+    // Steps that visit every remainder, so that no two rows of cuts are alike.
+    for round in 0..400 {
+        let operations = 1 + (round * 29) % 67;
+        let (after, is_cut) = write(&memory, before + 1, Some(operations));
+        memory = after;
+        points += u32::from(is_cut);
+        assert_one_of(&memory, before, before + 1, &format!("round {round}"));
+        before = found(&memory).stored.unwrap().sequence;
+    }
+    assert!(points > 200, "{points} cuts");
+    assert!(before > 50, "only {before} writes went through");
+}
+
+#[test]
+fn the_first_write_of_all_may_be_cut_and_tried_again() {
+    for operations in 1..60 {
+        let (memory, _) = write(&BLANK, 1, Some(operations));
+        let after = found(&memory);
+        // Never both: so the device starts with its built-in set, and a next write is taken.
+        assert!(
+            after.stored.is_some() || !after.damaged[1],
+            "{operations}: {after:?}"
+        );
+        let (memory, _) = write(&memory, 1 + after.stored.map_or(0, |s| s.sequence), None);
+        assert!(found(&memory).stored.is_some());
+    }
+}
+
+#[test]
+fn a_blank_flash_has_no_set_and_no_damage() {
+    assert_eq!(found(&BLANK), Found::default());
+}
+
+/// One bit of a copy rots: the other one, the same set, is used, and the damage is told.
+#[test]
+fn a_rotten_copy_is_told_and_the_other_one_used() {
+    let memory = write(&BLANK, 1, None).0;
+    let (mut told, mut bits) = (0, 0);
+    for at in (0..memory.len()).filter(|at| memory[*at] != 0xFF) {
+        let mut rotten = memory;
+        rotten[at] ^= 0x10;
+        let after = found(&rotten);
+        assert_eq!(after.stored.map(|s| s.params), Some(set(1)), "byte {at}");
+        assert!(after.damaged != [true, true], "byte {at}");
+        told += u32::from(after.damaged != [false, false]);
+        bits += 1;
+    }
+    // 2 x 164 bytes of which few are 0xFF; marks of pages are not part of a block.
+    assert!(bits > 200 && told * 10 > bits * 8, "{told} of {bits}");
+}
+
+#[test]
+fn a_set_in_both_copies_rotten_is_no_set() {
+    let mut memory = write(&BLANK, 1, None).0;
+    // k_1 of the set, 0.2509765625 = 0x3FD0_1000_0000_0000, in each copy.
+    let k_1 = set(1).k_1.to_le_bytes();
+    let places: Vec<usize> = (0..memory.len() - 8)
+        .filter(|at| memory[*at..*at + 8] == k_1)
+        .collect();
+    assert_eq!(places.len(), 2);
+    for at in places {
+        memory[at + 6] ^= 1;
+    }
+    let after = found(&memory);
+    assert_eq!((after.stored, after.damaged), (None, [true, true]));
+}
+
+/// A flash that takes nothing: the error is told, nothing is lost.
+#[test]
+fn a_flash_without_supply_fails_and_says_so() {
+    let memory = write(&BLANK, 1, None).0;
+    let mut flash = Nor::new(memory);
+    flash.cut_after(0);
+    assert_eq!(save(&mut flash, &set(2), None), Err(WriteFailed));
+    assert_eq!(flash.into_memory(), memory);
+}

@@ -1,0 +1,138 @@
+//! Parameters in flash, on the image in QEMU: a set that is sent over the bus in Standby is stored and in use after
+//! the restart that it causes; one that is wrong changes nothing; and power lost at every step of a write, hundreds
+//! of times, never loses the last good set.
+//!
+//! The status frames are taken apart by hand, from `core/haptic.dbc`.
+
+mod machine;
+
+use std::process::Command;
+
+use haptic_core::bus::slcan;
+use haptic_core::download;
+use haptic_core::params::Params;
+use machine::{Machine, image};
+
+const BOARD: &str = "mps2-an386";
+const STANDBY: u64 = 1;
+/// Values of `Guidance_Reset`.
+const POWER_ON: u64 = 0;
+const NEW_PARAMETERS: u64 = 6;
+/// Values of `ParameterStatus_Outcome`.
+const NONE: u64 = 0;
+const OUT_OF_ORDER: u64 = 3;
+const OUT_OF_RANGE: u64 = 4;
+
+/// `ParameterStatus`: stored, damaged, outcome, sequence.
+#[derive(Debug, PartialEq)]
+struct Status {
+    stored: bool,
+    damaged: bool,
+    outcome: u64,
+    sequence: u64,
+}
+
+/// The next status of the parameters, and the reset cause and the mode of the last torque frame before it.
+fn status(machine: &mut Machine) -> (Status, u64, u64) {
+    let (mut cause, mut mode) = (u64::MAX, u64::MAX);
+    loop {
+        match machine.frame() {
+            (0x0C0, word) => (cause, mode) = ((word >> 52) & 0x7, (word >> 32) & 0xF),
+            (0x320, word) if mode != u64::MAX => {
+                let status = Status {
+                    stored: (word >> 12) & 1 != 0,
+                    damaged: (word >> 13) & 1 != 0,
+                    outcome: (word >> 16) & 0x7,
+                    sequence: word >> 32,
+                };
+                return (status, cause, mode);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Sends a set, without the field `without`.
+fn send(machine: &Machine, params: &Params, without: Option<usize>) {
+    for (index, frame) in download::frames(params).iter().enumerate() {
+        if without != Some(index) {
+            machine.send(&slcan::format(frame));
+        }
+    }
+}
+
+const IN_USE: fn(u64, u64) -> Status = |sequence, outcome| Status {
+    stored: sequence > 0,
+    damaged: false,
+    outcome,
+    sequence,
+};
+
+#[test]
+fn a_set_sent_in_standby_is_in_use_after_a_restart() {
+    let mut machine = Machine::start(BOARD, "steering-ecu", "none");
+    assert_eq!(status(&mut machine), (IN_USE(0, NONE), POWER_ON, STANDBY));
+    for sequence in 1..=3 {
+        let params = Params {
+            torque_limit_nm: 3.0 + sequence as f64 / 8.0,
+            ..Params::PAPER
+        };
+        send(&machine, &params, None);
+        loop {
+            let (now, cause, mode) = status(&mut machine);
+            // What was under way when the set was sent still says the last one.
+            if now.sequence == sequence {
+                assert_eq!(
+                    (now, cause, mode),
+                    (IN_USE(sequence, NONE), NEW_PARAMETERS, STANDBY)
+                );
+                break;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_set_that_is_wrong_changes_nothing_and_is_told() {
+    let mut machine = Machine::start(BOARD, "steering-ecu", "none");
+    let (first, ..) = status(&mut machine);
+    assert_eq!(first, IN_USE(0, NONE));
+    let too_much = Params {
+        torque_limit_nm: 5.5,
+        ..Params::PAPER
+    };
+    for (params, without, outcome) in [
+        (too_much, None, OUT_OF_RANGE),
+        (Params::PAPER, Some(7), OUT_OF_ORDER),
+    ] {
+        send(&machine, &params, without);
+        let told = (0..5).any(|_| status(&mut machine) == (IN_USE(0, outcome), POWER_ON, STANDBY));
+        assert!(told, "outcome {outcome} within 5 s");
+    }
+}
+
+/// The image cuts the supply of its flash at every number of operations, resets, and looks (`power_loss.rs`).
+#[test]
+fn power_lost_at_every_step_of_a_write_never_loses_the_last_good_set() {
+    let output = Command::new("qemu-system-arm")
+        .args(["-machine", BOARD, "-display", "none", "-monitor", "none"])
+        .args(["-serial", "null", "-serial", "null"])
+        .args(["-icount", "shift=5,sleep=off"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .arg("-kernel")
+        .arg(image(BOARD, "power-loss"))
+        .output()
+        .expect("qemu-system-arm is missing: apt-get install qemu-system-arm");
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said);
+    assert!(output.status.success(), "{said}");
+    // "250 cuts, 61 writes"
+    let numbers: Vec<u32> = said
+        .split(|c: char| !c.is_ascii_digit())
+        .filter_map(|n| n.parse().ok())
+        .collect();
+    let [cuts, writes] = numbers[..] else {
+        panic!("the image says: {said}")
+    };
+    assert!(cuts >= 200 && writes >= 50, "{said}");
+}

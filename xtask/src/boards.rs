@@ -1,0 +1,278 @@
+//! The boards: what each is to the tools, that every one builds and keeps its torque path clean, what its image
+//! costs, and how it gets onto a real one.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, ValueEnum};
+use serde_json::Value;
+
+use crate::code::Code;
+use crate::golden::{self, Figure};
+use crate::image::{self, M4F};
+use crate::size;
+use crate::tool::{self, Usage, cargo, run};
+
+/// Length of the guard below the stack (`firmware/src/stack.rs`): a larger frame could step over it.
+const GUARD: u64 = 4096;
+/// The stack's budget (`firmware/src/stack.x`).
+const STACK: u64 = 8192;
+
+/// The clock of an STM32G4, and what an instruction takes there at most in the mean (docs/porting.md).
+const CLOCK_MHZ: u64 = 170;
+const CYCLES_PER_INSTRUCTION: u64 = 2;
+
+/// A board, by the feature that chooses it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Board {
+    /// QEMU, Cortex-M4F.
+    Mps2An386,
+    /// QEMU, Cortex-M7.
+    Mps2An500,
+    /// ST NUCLEO-G474RE.
+    NucleoG474re,
+}
+
+impl Board {
+    const fn feature(self) -> &'static str {
+        match self {
+            Self::Mps2An386 => "mps2-an386",
+            Self::Mps2An500 => "mps2-an500",
+            Self::NucleoG474re => "nucleo-g474re",
+        }
+    }
+
+    /// probe-rs's name of the chip; None where QEMU is the board.
+    const fn chip(self) -> Option<&'static str> {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => None,
+            Self::NucleoG474re => Some("STM32G474RETx"),
+        }
+    }
+
+    fn build(self, bin: &str) -> Result<PathBuf> {
+        image::elf_of(&mut image::build_command(bin, M4F, self.feature()))
+    }
+}
+
+/// What goes onto which board.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// The board.
+    pub(crate) board: Board,
+    /// The image: steering-ecu or lockstep.
+    #[arg(long, default_value = "steering-ecu")]
+    pub(crate) image: String,
+}
+
+/// Which board is compared, and how it is reached.
+#[derive(Args)]
+pub(crate) struct Hil {
+    /// The board.
+    board: Board,
+    /// The way to a real board's bus: a CAN interface (can0), the serial port of an SLCAN adapter
+    /// (/dev/ttyACM0), or tcp:HOST:PORT.
+    #[arg(long, value_name = "IFACE")]
+    can: Option<String>,
+    /// The lockstep image is on the board already.
+    #[arg(long)]
+    no_flash: bool,
+}
+
+/// Every board without a warning, its torque path without panic and float, and its figures as the golden file has
+/// them.
+pub(crate) fn check(bless: bool) -> Result<()> {
+    tool::ensure(&[("qemu-system-arm", "qemu-system-arm")])?;
+    let mut figures = Vec::new();
+    for board in Board::value_variants() {
+        let name = board.feature();
+        let package = ["clippy", "--release", "-p", "haptic-firmware", "--bins", "--lib"];
+        run(cargo()
+            .args(package)
+            .args(["--target", M4F, "--features", name])
+            .args(["--", "-D", "warnings"]))
+        .with_context(|| name.to_owned())?;
+        for bin in ["lockstep", "steering-ecu"] {
+            let built = of_image(&board.build(bin)?).with_context(|| format!("{name}, {bin}"))?;
+            if bin == "steering-ecu" {
+                figures.extend(built.into_iter().map(|figure| figure.of(name)));
+            }
+        }
+        if board.chip().is_none() {
+            figures.extend(in_qemu(*board)?.into_iter().map(|figure| figure.of(name)));
+        }
+    }
+    for figure in figures.iter().filter(|figure| figure.name.ends_with(" step")) {
+        println!(
+            "{}: {} instructions, {:.1} % of a tick at {} MHz and {CYCLES_PER_INSTRUCTION} cycles each",
+            figure.name,
+            figure.value,
+            100.0 * (figure.value * CYCLES_PER_INSTRUCTION) as f64 / (CLOCK_MHZ * 1000) as f64,
+            CLOCK_MHZ,
+        );
+    }
+    golden::check(&figures, bless)
+}
+
+impl Figure {
+    fn of(mut self, board: &str) -> Self {
+        self.name = format!("{board} {}", self.name);
+        self
+    }
+}
+
+fn figure(name: &str, unit: &'static str, value: u64, tolerance_percent: u64) -> Figure {
+    Figure {
+        name: name.to_owned(),
+        unit,
+        value,
+        tolerance_percent,
+    }
+}
+
+/// What an image takes, and that its torque path is clean.
+fn of_image(elf: &Path) -> Result<Vec<Figure>> {
+    let size = size::of(elf)?;
+    let code = Code::of(elf)?;
+    let frame = code.largest_frame();
+    ensure!(
+        frame <= GUARD,
+        "a frame of {frame} B could step over the guard of {GUARD} B below the stack"
+    );
+    let path = code.torque_path()?;
+    println!(
+        "{}: no panic and no float in the {} functions of the torque path",
+        elf.display(),
+        path.functions
+    );
+    // Paths of the machine's crate cache are in panic messages, so sizes differ a little.
+    Ok(vec![
+        figure("flash", "B", size.flash, 1),
+        figure("RAM without stack", "B", size.ram, 1),
+        figure("largest frame", "B", frame, 1),
+        figure("stack of the step, bound", "B", path.stack, 1),
+        figure("stack of the image, calls", "B", code.stack_of("main")?, 1),
+    ])
+}
+
+/// What a whole run over paper-course takes in QEMU, every frame of it compared: the stack that the lockstep image
+/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick and `Ecu::step`.
+fn in_qemu(board: Board) -> Result<Vec<Figure>> {
+    let text = tool::output(
+        tool::cargo()
+            .args(["run", "--release", "-p", "host-sim", "--", "pil"])
+            .args(["--machine", board.feature(), "--count", "--json"]),
+    )?;
+    let report: Value = serde_json::from_str(&text).context("host-sim pil --json")?;
+    let steps = report["steps"].as_u64().unwrap_or(0);
+    println!(
+        "{}: {steps} steps in lock step, {} mismatches",
+        board.feature(),
+        report["mismatches"]
+    );
+    ensure!(steps > 10_000, "host-sim pil stepped only {steps} times");
+    let number = |value: &Value, what| {
+        let value = value
+            .as_f64()
+            .with_context(|| format!("host-sim pil measured no {what}"))?;
+        Ok::<_, anyhow::Error>(value.round() as u64)
+    };
+    let stack = number(&report["stack_bytes"], "stack")?;
+    ensure!(stack <= STACK, "{stack} B of stack, of {STACK} B");
+    let spent = &report["instructions"];
+    Ok(vec![
+        figure("stack used", "B", stack, 5),
+        figure(
+            "worst step",
+            "instructions",
+            number(&spent["worst"], "worst step")?,
+            1,
+        ),
+        figure(
+            "mean step",
+            "instructions",
+            number(&spent["mean"], "mean step")?,
+            1,
+        ),
+        figure(
+            "worst advice",
+            "instructions",
+            number(&spent["worst_advice"], "advice")?,
+            1,
+        ),
+    ])
+}
+
+/// What a step costs a board.
+pub(crate) fn bench(board: Board) -> Result<()> {
+    if board.chip().is_some() {
+        return run_on(board, "steering-ecu");
+    }
+    for figure in in_qemu(board)? {
+        println!("{:<30}{:>10} {}", figure.name, figure.value, figure.unit);
+    }
+    Ok(())
+}
+
+/// The comparison of `host-sim pil`, with the board in QEMU's place.
+pub(crate) fn hil(options: &Hil) -> Result<()> {
+    let mut pil = cargo();
+    pil.args(["run", "--release", "-q", "-p", "host-sim", "--", "pil"]);
+    match (&options.can, options.board.chip()) {
+        (None, None) => pil.args(["--machine", options.board.feature()]),
+        (None, Some(_)) => {
+            let board = options.board.feature();
+            let message = format!(
+                "{board} needs a way to its bus: --can can0, --can /dev/ttyACM0 or --can tcp:HOST:PORT"
+            );
+            return Err(Usage(message).into());
+        }
+        (Some(adapter), chip) => {
+            if chip.is_some() && !options.no_flash {
+                flash(options.board, "lockstep")?;
+            }
+            pil.args(["--can", adapter])
+        }
+    };
+    let status = pil.status().context("cargo does not start")?;
+    match status.code() {
+        Some(0) => Ok(()),
+        // What was wrong is on the terminal.
+        Some(2) => Err(Usage("no comparison".to_owned()).into()),
+        _ => anyhow::bail!("the comparison failed"),
+    }
+}
+
+/// Writes an image to a board and starts it.
+pub(crate) fn flash(board: Board, bin: &str) -> Result<()> {
+    let chip = chip(board)?;
+    let elf = board.build(bin)?;
+    run(tool::command("probe-rs")
+        .args(["download", "--verify", "--chip", chip])
+        .arg(elf))?;
+    run(tool::command("probe-rs").args(["reset", "--chip", chip]))
+}
+
+/// Writes an image to a board, starts it and prints its log until interrupted.
+pub(crate) fn run_on(board: Board, bin: &str) -> Result<()> {
+    let chip = chip(board)?;
+    let elf = board.build(bin)?;
+    run(tool::command("probe-rs").args(["run", "--chip", chip]).arg(elf))
+}
+
+/// The chip to flash, if all that flashing needs is there.
+fn chip(board: Board) -> Result<&'static str> {
+    let Some(chip) = board.chip() else {
+        let message = format!(
+            "{} is a machine of QEMU, with nothing to flash: cargo xtask qemu",
+            board.feature()
+        );
+        return Err(Usage(message).into());
+    };
+    if !tool::exists("probe-rs") {
+        let message =
+            "probe-rs is missing: cargo install probe-rs-tools, or https://probe.rs/docs/getting-started";
+        return Err(Usage(message.to_owned()).into());
+    }
+    Ok(chip)
+}
