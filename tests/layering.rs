@@ -18,6 +18,7 @@ const CORE: Arrows = &[
     ("advice", &["bus", "quantity", "reliance"]),
     ("bus", &["envelope", "faults", "modes", "quantity", "reliance", "vital"]),
     ("controller", &["envelope", "faults", "law", "modes", "params", "plausibility", "probe", "quantity", "ramp", "vital"]),
+    ("download", &["bus", "modes", "params", "stored"]),
     ("ecu", &["actuator", "advice", "bus", "controller", "envelope", "faults", "law", "modes", "monitor", "params", "plausibility", "quantity", "reliance", "vital"]),
     ("envelope", &["quantity", "vital"]),
     ("faults", &["quantity"]),

@@ -15,6 +15,8 @@ use crate::modes::Mode;
 use crate::params::{Config, Params};
 use crate::stored::{Stored, VALUES, from_values, values};
 
+const _: () = assert!(ParameterWrite::FIELDS == VALUES, "the bus carries every field");
+
 /// The frames that carry a set. Values are rounded to f32.
 #[must_use]
 pub fn frames(params: &Params) -> [Frame; VALUES] {

@@ -2,15 +2,19 @@
 
 use super::{Message, put, unsigned};
 use crate::bus::e2e::Protection;
-use crate::stored::VALUES;
 
 /// One field of a new set of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterWrite {
-    /// Which field, 0 to 18, in the order of [`crate::stored`].
+    /// Which field, 0 to 18, in the order of `stored`.
     pub index: u8,
     /// Its value, SI. On the bus as an IEEE 754 binary32.
     pub value: f32,
+}
+
+impl ParameterWrite {
+    /// Fields of a set.
+    pub const FIELDS: usize = 19;
 }
 
 impl Message for ParameterWrite {
@@ -24,7 +28,7 @@ impl Message for ParameterWrite {
 
     fn unpack(word: u64) -> Option<Self> {
         let index = unsigned(word, 12, 5) as u8;
-        (usize::from(index) < VALUES).then(|| Self {
+        (usize::from(index) < Self::FIELDS).then(|| Self {
             index,
             value: f32::from_bits(unsigned(word, 32, 32) as u32),
         })
