@@ -139,7 +139,7 @@ impl Monitor {
 
     /// `abs(T) <= L + 3*(0.8 - opposing)`.
     fn leaves_the_driver_in_charge(&self, torque: i32, driver: i32) -> bool {
-        let opposing = if torque < 0 {
+        let opposing = if torque.is_negative() {
             driver
         } else {
             driver.saturating_neg()
@@ -196,16 +196,18 @@ impl MonitorState {
         self.lane.age_us = self.lane.age_us.saturating_add(elapsed_us);
         self.before.age_us = self.before.age_us.saturating_add(elapsed_us);
         if let Some(bytes) = evidence.lane {
-            if self.before.age_us.saturating_sub(self.lane.age_us) > RATE_SPAN_US
-                || self.before.age_us > 200_000
-            {
-                self.before = self.lane;
-            }
-            self.lane = Lane {
+            let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
                 age_us: (field(bytes, 46, 10) & 0x1FF).saturating_mul(100),
             };
+            // After a gap there is no rate.
+            if self.lane.age_us > OLDEST_LANE_US {
+                self.before = new;
+            } else if self.before.age_us.saturating_sub(self.lane.age_us) > RATE_SPAN_US {
+                self.before = self.lane;
+            }
+            self.lane = new;
         }
         if let Some(bytes) = evidence.column {
             self.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;

@@ -251,21 +251,40 @@ fn rates_widen_the_band_on_their_side() {
     }
 }
 
+/// A lateral error that steps by 0.6 m between samples 10 ms apart, the seventh the last at zero. The older sample of
+/// the rate is the first, then the first that is more than 50 ms after it, so it is of before the step until 50 ms
+/// after the step. 0.66 N.m is beyond the 0.3 + 0.3 N.m of the position, within the 0.12 N.m more of the least rate.
 #[test]
-fn rates_are_forgotten_with_an_old_sample() {
-    // One sample, then 300 ms of nothing, then two at a distance: no rate of the first two is left.
-    let torque = counts(350).0;
+fn a_rate_is_taken_over_more_than_50_ms() {
+    let torque = counts(660).0;
+    let mut bench = Bench::at(5.0, torque);
+    let mut permitted = 0;
+    for ms in 0..200 {
+        let sample = (ms % 10 == 0).then(|| lane(if ms < 80 { 0 } else { 4915 }, 0, 0));
+        let mode = if ms < 80 { FADE } else { ACTIVE };
+        if !bench.show(sample, None, guidance(torque, mode), 1000) {
+            break;
+        }
+        permitted += u32::from(mode == ACTIVE);
+    }
+    assert_eq!(permitted, 50 + 20);
+}
+
+#[test]
+fn rates_are_forgotten_in_a_gap() {
+    // Two samples 1 m apart. Within 40 ms that is 25 m/s, worth 0.31 N.m more than the 0.3 of the band.
+    let torque = counts(450).0;
     let steps = |gap_ms: u32| {
         let mut bench = Bench::at(5.0, torque);
         assert!(bench.show(Some(lane(-8192, 0, 0)), None, guidance(torque, FADE), 1000));
-        for _ in 0..gap_ms {
+        for _ in 1..gap_ms {
             assert!(bench.torque(torque, FADE));
         }
-        for _ in 0..2 {
-            assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 8000));
-        }
+        assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 1000));
         (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
     };
+    assert_eq!(steps(40), 30);
+    assert_eq!(steps(41), 20);
     assert_eq!(steps(300), 20);
 }
 
