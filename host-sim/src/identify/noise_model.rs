@@ -127,7 +127,7 @@ impl<'a> Problem<'a> {
             let (m1, d1) = delay.read(&s.visual[0], k);
             let (m2, d2) = delay.read(&s.visual[1], k);
             let (m3, d3) = delay.read(&s.visual[2], k);
-            let h = -s.guidance.lagged[k];
+            let h = -s.guidance[k];
             let model = p[0] * m1 + p[1] * m2 + p[2] * m3 + p[K_HG] * h + p[OFFSET];
             let slope = p[0] * d1 + p[1] * d2 + p[2] * d3;
             visit(s.target[k] - model, [m1, m2, m3, h, 1.0, slope]);
