@@ -81,6 +81,12 @@ impl fmt::Display for LogError {
 
 impl std::error::Error for LogError {}
 
+impl LogError {
+    pub(crate) fn new(message: String) -> Self {
+        Self(message)
+    }
+}
+
 fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
     Err(LogError(message.into()))
 }
@@ -99,6 +105,31 @@ impl DriveLog {
     /// Time of row `k`, s.
     pub fn time_s(&self, k: usize) -> f64 {
         self.start_s + k as f64 * self.dt_s
+    }
+
+    /// A log of signals that are on an even grid already: e_y, e_theta, wheel angle, T_h and T_d, of equal lengths.
+    pub(crate) fn from_signals(start_s: f64, dt_s: f64, signals: [Vec<f64>; 5]) -> Result<Self, LogError> {
+        let [
+            e_y_m,
+            e_theta_rad,
+            wheel_angle_rad,
+            guidance_torque_nm,
+            driver_torque_nm,
+        ] = signals;
+        let span_s = dt_s * driver_torque_nm.len() as f64;
+        if span_s < SHORTEST_S {
+            return refuse(too_short(span_s));
+        }
+        check_sensor(&driver_torque_nm)?;
+        Ok(Self {
+            start_s,
+            dt_s,
+            e_y_m,
+            e_theta_rad,
+            wheel_angle_rad,
+            guidance_torque_nm,
+            driver_torque_nm,
+        })
     }
 
     /// Reads and checks the file at `path`. A `manual` drive may lack the guidance column: it is then zero.
@@ -151,6 +182,7 @@ impl DriveLog {
         ] = columns;
         let dt_s = check_time(&time, &lines)?;
         check_wheel_resolution(&wheel_angle_rad)?;
+        check_sensor(&driver_torque_nm)?;
         Ok(Self {
             start_s: time[0],
             dt_s,
@@ -161,6 +193,17 @@ impl DriveLog {
             driver_torque_nm,
         })
     }
+}
+
+/// A sensor that says the same from beginning to end is dead, or not connected: there is nothing to explain.
+fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
+    let first = driver_torque_nm[0];
+    if driver_torque_nm.iter().all(|&t| t == first) {
+        return refuse(format!(
+            "driver_torque_nm is {first} throughout: the sensor measures nothing"
+        ));
+    }
+    Ok(())
 }
 
 /// Where each of [`COLUMNS`] stands; all that are missing are named at once.
@@ -286,9 +329,13 @@ fn check_time(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
         ));
     }
     if span < SHORTEST_S {
-        return refuse(format!("the log covers {span:.3} s, less than {SHORTEST_S} s"));
+        return refuse(too_short(span));
     }
     Ok(dt)
+}
+
+fn too_short(span_s: f64) -> String {
+    format!("the log covers {span_s:.3} s, less than {SHORTEST_S} s")
 }
 
 fn check_wheel_resolution(wheel_angle: &[f64]) -> Result<(), LogError> {
@@ -328,7 +375,7 @@ mod tests {
                 format!("{}", 0.002 * t),
                 format!("{}", 0.01 * t),
                 "0.1".to_owned(),
-                "-0.2".to_owned(),
+                if k == 0 { "-0.1" } else { "-0.2" }.to_owned(),
             ];
             edit(k, &mut row);
             out.push('\n');
@@ -352,10 +399,14 @@ mod tests {
             "\u{feff}driver_torque_nm, note ,time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm"
                 .to_owned();
         for k in 0..1200 {
-            shuffled.push_str(&format!("\n-0.3,word,{},0.5,0.05,0.1,0.2", f64::from(k) / 100.0));
+            shuffled.push_str(&format!(
+                "\n{},word,{},0.5,0.05,0.1,0.2",
+                -0.01 * f64::from(k),
+                f64::from(k) / 100.0
+            ));
         }
         let log = DriveLog::read(shuffled.as_bytes(), false).unwrap();
-        assert_eq!((log.e_y_m[3], log.driver_torque_nm[3]), (0.5, -0.3));
+        assert_eq!((log.e_y_m[3], log.driver_torque_nm[20]), (0.5, -0.2));
     }
 
     #[test]
@@ -447,6 +498,15 @@ mod tests {
         assert!(e.starts_with("line 53: e_theta_rad is 0.51"), "{e}");
         assert!(error(&text(|_, r| r[5] = "-200".to_owned())).contains("line 2: driver_torque_nm is -200"));
         assert!(error(&text(|_, r| r[1] = "120".to_owned())).contains("is it in mm?"));
+    }
+
+    #[test]
+    fn a_torque_that_never_changes_is_refused() {
+        let error = error(&text(|_, r| r[5] = "0.5".to_owned()));
+        assert_eq!(
+            error,
+            "driver_torque_nm is 0.5 throughout: the sensor measures nothing"
+        );
     }
 
     #[test]
