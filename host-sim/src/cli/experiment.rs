@@ -28,6 +28,9 @@ pub(super) struct Arguments {
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/experiment")]
     out: PathBuf,
+    /// Write the recorded drives too, a CSV file each, into this directory
+    #[arg(long, value_name = "DIR", conflicts_with = "repetitions")]
+    logs: Option<PathBuf>,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
@@ -55,6 +58,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let result = experiment(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
     result.write(&arguments.out)?;
+    if let Some(directory) = &arguments.logs {
+        result.write_logs(directory)?;
+    }
     if arguments.json {
         print_json(&result)?;
     } else {

@@ -28,6 +28,15 @@ pub(super) fn write(experiment: &Experiment, directory: &Path) -> Result<(), Out
     Ok(())
 }
 
+pub(super) fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
+    for drive in &experiment.drives {
+        let kind = if drive.guided { "guided" } else { "manual" };
+        let name = format!("participant-{:02}-{kind}.csv", drive.participant);
+        write_file(&directory.join(name), |f| drive.log.write(f))?;
+    }
+    Ok(())
+}
+
 /// The guided drive whose fit is the middle one, as the paper shows "a typical participant".
 fn typical(experiment: &Experiment) -> Option<&Drive> {
     let mut guided: Vec<&Drive> = experiment.drives.iter().filter(|d| d.guided).collect();

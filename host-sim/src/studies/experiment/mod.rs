@@ -88,6 +88,9 @@ pub struct Drive {
     /// Path of the drive: arc length and lateral error, m.
     #[serde(skip)]
     pub path: Vec<(f64, f64)>,
+    /// What was recorded.
+    #[serde(skip)]
+    pub log: DriveLog,
 }
 
 /// A driver as identified, and how it drives.
@@ -138,6 +141,14 @@ impl Experiment {
     /// What could not be written or drawn.
     pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
         experiment_files::write(self, directory)
+    }
+
+    /// Writes what was recorded of each drive, a CSV file each, as `identify` reads them.
+    ///
+    /// # Errors
+    /// What could not be written.
+    pub fn write_logs(&self, directory: &Path) -> Result<(), OutputError> {
+        experiment_files::write_logs(self, directory)
     }
 }
 
@@ -219,6 +230,7 @@ fn one_drive(
         noise_model,
         paper,
         path,
+        log,
     })
 }
 
