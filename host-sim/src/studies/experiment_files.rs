@@ -215,7 +215,7 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
                 },
             ]
         };
-        let mut row = start("truth (fit: the paper's)", t.fitness);
+        let mut row = start("truth", t.fitness);
         for (value, (_, _, decimals)) in truths.into_iter().zip(&columns[..shown]) {
             row.push(Cell::Number {
                 value: Some(value),
@@ -245,8 +245,8 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     }
     Table {
         caption:
-            "Parameters with their standard errors. The published method's come as it would print them, on a \
-                  bound or not."
+            "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
+                  come as it would print them, on a bound or not."
                 .into(),
         columns: headings,
         rows,
