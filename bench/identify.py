@@ -38,8 +38,7 @@ class Problem:
         self.visual = [e_y, integral, lines(column["e_theta_rad"])]
         guidance = column["guidance_torque_nm"]
         self.manual = not guidance.any()
-        switched = np.abs(np.diff(guidance)) > 8 * self.dt
-        self.guidance = self.lag(guidance, switched)
+        self.guidance = self.lagged_guidance(guidance, t[0] + self.dt * np.arange(len(t)))
         phi = self.lag(lines(column["wheel_angle_rad"]))
         self.target = column["driver_torque_nm"] + K_NMS * phi
         self.lagged = [self.lag(u) for u in self.visual]
@@ -57,6 +56,17 @@ class Problem:
             end[held] = u[:-1][held]
         drive = w0 * u[:-1] + w1 * end
         return np.concatenate([[u[0]], lfilter([1], [1, -decay], drive, zi=[decay * u[0]])[0]])
+
+    def lagged_guidance(self, torque, t):
+        """A probe's steps are held up to the sample; the rest belongs to the middle of the ECU's millisecond."""
+        rise = np.diff(torque)
+        switched = np.abs(rise) > 8 * self.dt
+        steps = np.concatenate([[0], np.cumsum(np.where(switched, rise, 0))])
+        rest = torque - steps
+        slope = np.concatenate([[rest[1] - rest[0]], (rest[2:] - rest[:-2]) / 2, [rest[-1] - rest[-2]]]) / self.dt
+        ticks = t / 1e-3
+        age = ticks - np.floor(ticks + 0.1)
+        return self.lag(lines(rest + slope * (age - 0.5) * 1e-3)) + self.lag(steps, switched)
 
     def residual(self, p):
         # A manual drive has no K_hg.

@@ -43,6 +43,8 @@ const HOST_SIM: Arrows = &[
     ("ecu_events", &["closed_loop", "models", "report"]),
     ("faults", &["closed_loop", "ecu_events", "guidance", "models", "pil", "report", "scenario"]),
     ("guidance", &["models"]),
+    // The vehicle, for what the bus does not carry.
+    ("identify", &["models"]),
     ("metrics", &["trace"]),
     ("models", &["input"]),
     ("plot", &["trace"]),

@@ -255,3 +255,18 @@ fn counted_instructions_repeat() {
     let first = count().expect("counted");
     assert_eq!(Some(first), count());
 }
+
+/// The probe is asked for after 3 s; its blocks of 2 s end once a second from then on.
+#[test]
+fn reading_the_reliance_costs_less_than_400_instructions_a_step() {
+    let target = Target::Qemu {
+        machine: Machine::An386,
+        channel: Channel::Fifo,
+        count: true,
+    };
+    let (report, _) = run(&target, 7_900, &Params::PAPER, &Params::PAPER);
+    assert_eq!(report.mismatches, 0);
+    let worst = report.instructions.expect("counted").worst_advice;
+    // 151 are those of a telemetry frame alone: more shows that there was a probe to read.
+    assert!((200..400).contains(&worst), "{worst}");
+}

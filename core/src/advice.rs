@@ -9,8 +9,10 @@ use crate::bus::messages::{Message, Telemetry};
 use crate::quantity::Torque;
 use crate::reliance::{Reliance, RelianceState, Sample};
 
-/// Telemetry comes every so many steps, or one later.
+/// Telemetry comes every so many steps, or up to [`PATIENCE`] later.
 const TURN: u32 = 20;
+/// See [`TURN`].
+const PATIENCE: u32 = 3;
 
 /// What the last step left to think about, and what came of it so far.
 #[derive(Debug, Clone)]
@@ -21,8 +23,8 @@ pub(crate) struct Advice {
     sample: Option<Sample>,
     probe: Option<Torque>,
     steps: u32,
-    /// The telemetry stood back for a sample.
-    postponed: bool,
+    /// The telemetry's turn has come.
+    due: bool,
 }
 
 impl Advice {
@@ -34,7 +36,7 @@ impl Advice {
             sample: None,
             probe: None,
             steps: 0,
-            postponed: false,
+            due: false,
         }
     }
 
@@ -46,19 +48,23 @@ impl Advice {
     /// The work for one step, and the telemetry when it is its turn.
     pub(crate) fn step(&mut self) -> Option<Frame> {
         let sample = self.sample.take();
-        if self.probe.is_some() {
-            let state = self.reliance.get_or_insert_with(|| self.estimator.start());
-            self.estimator.step(state, sample.as_ref());
-        } else {
+        let mut is_free = sample.is_none();
+        match (&mut self.reliance, self.probe) {
+            (Some(state), Some(_)) => self.estimator.step(state, sample.as_ref()),
+            // To begin is work enough for a step.
+            (none, Some(_)) => {
+                *none = Some(self.estimator.start());
+                is_free = false;
+            }
             // What a driver did before is no evidence of what he does now.
-            self.reliance = None;
+            (state, None) => *state = None,
         }
         let steps = self.steps;
         self.steps = steps.wrapping_add(1);
-        // A sample is the most work there is; its step is spared the telemetry.
-        let due = steps.is_multiple_of(TURN);
-        let now = if due { sample.is_none() } else { self.postponed };
-        self.postponed = due && !now;
+        // A sample is the most work there is; its step is spared the telemetry, if there is another soon.
+        self.due |= steps.is_multiple_of(TURN);
+        let now = self.due && (is_free || steps % TURN == PATIENCE);
+        self.due &= !now;
         now.then(|| {
             let telemetry = Telemetry {
                 probe: self.probe,

@@ -10,6 +10,7 @@ mod code;
 mod evidence;
 mod gate;
 mod golden;
+mod identify;
 mod image;
 mod qemu;
 mod size;
@@ -80,6 +81,8 @@ enum Command {
 enum Bench {
     /// Simulated seconds per wall second on one core: our closed loop, the same in C and in NumPy.
     Speed,
+    /// The identification of a recorded drive: ours and SciPy's, to the same loss.
+    Identify,
 }
 
 fn main() -> ExitCode {
@@ -96,6 +99,10 @@ fn main() -> ExitCode {
             what: Some(Bench::Speed),
             ..
         } => speed::run(),
+        Command::Bench {
+            what: Some(Bench::Identify),
+            ..
+        } => identify::run(),
         Command::Bench {
             board: Some(board), ..
         } => boards::bench(board),

@@ -40,7 +40,7 @@ fn build_c() -> Result<String> {
 }
 
 /// A virtual environment with NumPy and SciPy, made once.
-fn build_venv() -> Result<String> {
+pub(crate) fn build_venv() -> Result<String> {
     let venv = tool::root().join("target/venv");
     let python = venv.join("bin/python");
     let is_ready = |python: &std::path::Path| {

@@ -4,54 +4,36 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::identify::Muscle;
-use host_sim::studies::experiment::{Drive, Experiment, Plan, experiment};
+use host_sim::studies::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
 
+use super::participants::Participants;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Participants: numbers and ranges such as 1,3..5
-    #[arg(long, value_name = "LIST", default_value = "1..14", value_parser = numbers)]
-    participants: Numbers,
+    #[arg(long, value_name = "LIST", default_value = "1..14")]
+    participants: Participants,
     /// Amplitude of the probe in the guided drives, N.m (0: none)
     #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.0)]
     probe: f64,
     /// Seed of the remnants
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Instead: repeat each guided drive N times with seeds from --seed on, and hold the 95 % intervals of the
+    /// default method against the truth
+    #[arg(long, value_name = "N", conflicts_with = "out", value_parser = clap::value_parser!(u32).range(1..))]
+    repetitions: Option<u32>,
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/experiment")]
     out: PathBuf,
+    /// Write the recorded drives too, a CSV file each, into this directory
+    #[arg(long, value_name = "DIR", conflicts_with = "repetitions")]
+    logs: Option<PathBuf>,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Debug, Clone)]
-struct Numbers(Vec<u32>);
-
-/// Reads `1,3..5` as 1, 3, 4, 5.
-fn numbers(text: &str) -> Result<Numbers, String> {
-    let number = |s: &str| {
-        s.trim()
-            .parse::<u32>()
-            .map_err(|_| format!("{s:?} is not a participant's number"))
-    };
-    let mut all = Vec::new();
-    for part in text.split(',') {
-        match part.split_once("..") {
-            Some((from, to)) => {
-                let (from, to) = (number(from)?, number(to.trim_start_matches('='))?);
-                if from > to || to > 1000 {
-                    return Err(format!("{part:?} is no range of participants"));
-                }
-                all.extend(from..=to);
-            }
-            None => all.push(number(part)?),
-        }
-    }
-    Ok(Numbers(all))
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -60,10 +42,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         probe_nm: arguments.probe,
         seed: arguments.seed,
     };
+    if let Some(repetitions) = arguments.repetitions {
+        let drives = plan.participants.len() as u64 * u64::from(repetitions);
+        let bar = progress::bar(drives, "drives");
+        let result = repeat(&plan, repetitions, || bar.inc(1))?;
+        bar.finish_and_clear();
+        if arguments.json {
+            print_json(&result)?;
+        } else {
+            print(&repeated(&result))?;
+        }
+        return Ok(Outcome::Good);
+    }
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
     result.write(&arguments.out)?;
+    if let Some(directory) = &arguments.logs {
+        result.write_logs(directory)?;
+    }
     if arguments.json {
         print_json(&result)?;
     } else {
@@ -165,16 +162,37 @@ fn truth(drive: &Drive) -> Vec<String> {
     ]
 }
 
-#[cfg(test)]
-mod tests {
-    use super::numbers;
-
-    #[test]
-    fn lists_and_ranges_of_participants() {
-        assert_eq!(numbers("1,3..5").unwrap().0, [1, 3, 4, 5]);
-        assert_eq!(numbers("2..=3").unwrap().0, [2, 3]);
-        for bad in ["", "a", "5..3", "1..99999999"] {
-            assert!(numbers(bad).is_err(), "{bad}");
-        }
+fn repeated(result: &Repetitions) -> String {
+    let headings = [
+        "participant",
+        "parameter",
+        "drives",
+        "identified",
+        "coverage of 95 %",
+        "bias",
+        "rms error",
+        "largest error",
+        "mean std error",
+    ];
+    let mut lines = vec![headings.map(String::from).to_vec()];
+    for line in result.participants.iter().chain(&result.pooled) {
+        lines.push(vec![
+            line.participant.map_or("all".into(), |n| n.to_string()),
+            line.parameter.into(),
+            line.drives.to_string(),
+            number(Some(line.identified), 3),
+            number(Some(line.coverage), 3),
+            number(line.bias, 4),
+            number(line.rms, 4),
+            number(line.largest, 4),
+            number(line.standard_error, 4),
+        ]);
     }
+    format!(
+        "{} repetitions of each guided drive, probe {} N.m, seeds from {}; errors where identified\n\n{}",
+        result.repetitions,
+        result.probe_nm,
+        result.seed,
+        table::text(&lines)
+    )
 }

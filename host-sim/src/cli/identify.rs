@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use host_sim::identify::{DriveLog, Identification, Options};
+use host_sim::identify::{Identification, Options, open_recording};
 use host_sim::models::road::Course;
 use host_sim::scenario::DEFAULT_SPEED_KMH;
 use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
@@ -14,10 +14,13 @@ use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recorded drive (CSV): time_s, e_y_m, e_theta_rad (the driver's points), wheel_angle_rad,
-    /// guidance_torque_nm, driver_torque_nm
+    /// Recorded drive: a CSV file with time_s, e_y_m, e_theta_rad (the driver's points), wheel_angle_rad,
+    /// guidance_torque_nm, driver_torque_nm, or the bus as recorded by candump -L
     #[arg(value_name = "LOG.csv")]
     log: PathBuf,
+    /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
+    #[arg(long, value_name = "FILE")]
+    dbc: Option<PathBuf>,
     /// A drive without guidance: there is no K_hg, and guidance_torque_nm may be missing
     #[arg(long)]
     manual: bool,
@@ -61,9 +64,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
     let output = Output::begin(&arguments.out)?;
-    let log = DriveLog::open(&arguments.log, arguments.manual)?;
+    let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
     let name = arguments.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
+    let notes = &mut drive.results.identification.notes;
+    notes.splice(0..0, note.map(String::from));
     if let Some(path) = &arguments.course {
         drive.drive_again(Course::open(path)?, arguments.speed, &options)?;
     }
@@ -106,7 +111,7 @@ fn readable(drive: &IdentifiedDrive) -> String {
     text.push_str(&format!("\n{}", residuals(found)));
     let losses: Vec<String> = found.loss_history.iter().map(|l| format!("{l:.6e}")).collect();
     text.push_str(&format!(
-        "\nLoss {}; ended by {:?}\n",
+        "\nLoss {}\nEnded: {}\n",
         losses.join(", "),
         found.termination
     ));

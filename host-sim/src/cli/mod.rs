@@ -13,6 +13,7 @@ mod faults;
 mod handover;
 mod identify;
 mod output;
+mod participants;
 mod pil;
 mod progress;
 mod reliance;

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::studies::reliance::{NEAR, Plan, Results, SETTLING_S, study};
 
+use super::participants::Participants;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Participants of table 6: a number, a list (1,5,9) or a range (1..14)
+    /// Participants of table 6: numbers and ranges such as 1,3..5
     #[arg(long, value_name = "LIST", default_value = "1..14")]
-    participants: String,
+    participants: Participants,
     /// Drives of each participant, each with its own remnant
     #[arg(long, value_name = "N", default_value_t = 20)]
     seeds: u32,
@@ -32,7 +33,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let plan = Plan {
-        participants: numbers(&arguments.participants)?,
+        participants: arguments.participants.0.clone(),
         seeds: arguments.seeds,
         amplitude_nm: arguments.amplitude,
         frequency_hz: arguments.frequency,
@@ -51,16 +52,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         print(&readable(&results))?;
     }
     Ok(Outcome::Good)
-}
-
-/// `3`, `1,5,9` or `1..14`, the end included.
-fn numbers(text: &str) -> Result<Vec<u32>, String> {
-    let number = |part: &str| part.trim().parse::<u32>();
-    let list = match text.split_once("..") {
-        Some((from, to)) => number(from).and_then(|from| Ok((from..=number(to)?).collect())),
-        None => text.split(',').map(number).collect(),
-    };
-    list.map_err(|e| format!("participants '{text}': {e}; a number, a list (1,5,9) or a range (1..14)"))
 }
 
 fn readable(results: &Results) -> String {
@@ -116,17 +107,4 @@ fn readable(results: &Results) -> String {
         settling.rms,
         results.diverged,
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn participants_as_a_number_a_list_or_a_range() {
-        assert_eq!(numbers("3"), Ok(vec![3]));
-        assert_eq!(numbers("1, 5,9"), Ok(vec![1, 5, 9]));
-        assert_eq!(numbers("2..4"), Ok(vec![2, 3, 4]));
-        assert!(numbers("2..x").unwrap_err().starts_with("participants '2..x': "));
-    }
 }

@@ -3,12 +3,13 @@
 //!
 //! Two estimators share one log, one muscle and one form of result: [`noise_model`] (the default) and
 //! [`paper`] (the published way, kept as the baseline it is compared with); [`tracking`] follows a driver who
-//! changes. Terms: *a_1, a_2, a_3, t_p, K_d,
-//! K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
+//! changes. A log is a CSV file ([`log`]) or a recording of the bus ([`bus_trace`]). Terms: *a_1, a_2, a_3, t_p,
+//! K_d, K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
 //! and a_i; the *remnant* is the part of the driver's torque that no linear model of the inputs explains.
 //!
 //! What is not here: driving (the models do that), sets of drives (the studies), and the command line.
 
+mod bus_trace;
 mod diagnostics;
 mod log;
 mod noise_model;
@@ -19,6 +20,7 @@ mod search;
 mod signals;
 mod tracking;
 
+pub use bus_trace::open_recording;
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use log::{COLUMNS, DriveLog, LogError};
 pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};

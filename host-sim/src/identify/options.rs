@@ -93,6 +93,32 @@ impl Options {
         }
         Ok(())
     }
+
+    /// Whether what is given can all be true for the noise model, in which gain_i = (K_d + K_nms)*a_i: K_d and one
+    /// a_i with its gain say each other, and so do two a_i without K_d.
+    ///
+    /// # Errors
+    /// What contradicts what, or could.
+    pub fn check(&self) -> Result<(), FixError> {
+        let given: Vec<usize> = (0..3).filter(|&i| self.a[i].is_some()).collect();
+        if let Some(i) = (0..3).find(|&i| self.a[i].is_some() && self.gain[i].is_some() && self.k_d.is_some())
+        {
+            return Err(FixError(format!(
+                "--fix: a_{n}, gain_{n} and k_d are too many, for gain_{n} = (k_d + k_nms)*a_{n}",
+                n = i + 1
+            )));
+        }
+        if self.k_d.is_none()
+            && let [first, second, ..] = given[..]
+        {
+            return Err(FixError(format!(
+                "--fix: a_{} and a_{} need k_d beside them: each alone gives k_d",
+                first + 1,
+                second + 1
+            )));
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -118,6 +144,30 @@ mod tests {
         ] {
             let e = o.fix(fix).unwrap_err().to_string();
             assert!(e.contains(says), "{e}");
+        }
+    }
+
+    #[test]
+    fn what_says_the_same_thing_twice_is_refused() {
+        for (fixes, says) in [
+            (
+                &["a_2=0.1", "k_d=3", "gain_2=0.4"][..],
+                Some("a_2, gain_2 and k_d are too many"),
+            ),
+            (&["a_1=0.1", "a_3=3.7"], Some("a_1 and a_3 need k_d")),
+            (&["a_1=0.1", "a_3=3.7", "k_d=3"], None),
+            (&["a_1=0.1", "gain_1=0.4"], None),
+            (&["a_1=0.1", "gain_2=0.4", "k_d=3"], None),
+        ] {
+            let mut o = Options::default();
+            for fix in fixes {
+                o.fix(fix).unwrap();
+            }
+            match (o.check(), says) {
+                (Ok(()), None) => {}
+                (Err(e), Some(says)) => assert!(e.to_string().contains(says), "{e}"),
+                (got, _) => panic!("{fixes:?}: {got:?}"),
+            }
         }
     }
 }

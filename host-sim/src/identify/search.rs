@@ -7,6 +7,8 @@
 //! Terms: the *expected improvement* is what the undamped Gauss-Newton step would take off the loss if the
 //! quadratic model were exact; the search ends when that is a small share of the loss.
 
+use std::fmt;
+
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -58,6 +60,17 @@ pub enum Termination {
     NoFurtherDecrease,
     /// The limit on iterations was reached; the result is not an optimum.
     IterationLimit,
+}
+
+impl fmt::Display for Termination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ExpectedImprovement => "the next step promises less than the tolerated share of the loss",
+            Self::SmallDecrease => "a step lowers the loss by less than the tolerated share",
+            Self::NoFurtherDecrease => "no step lowers the loss",
+            Self::IterationLimit => "limit on iterations: this is no optimum",
+        })
+    }
 }
 
 /// Where a search ended.

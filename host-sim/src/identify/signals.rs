@@ -7,9 +7,11 @@
 //!
 //! Hold: e_y, e_theta and the wheel angle are continuous, so they are taken as straight lines between samples,
 //! lowered by a twelfth of the second difference so that the area under a bend is right, and the lag's response
-//! to those lines is exact. T_h is taken as plain lines, except where it jumps faster than the torque envelope
-//! can move: there a probe switched (or the guidance failed) on the sample instant, and the old value is held up
-//! to it. The delay is exact for the same lines, at any fraction of a sample, and so is its derivative:
+//! to those lines is exact. T_h is what the ECU decided in its last millisecond and holds for the rest of it:
+//! its value belongs to the middle of that millisecond, from where it is moved to the sample instant along its
+//! slope, and then taken as the others. Where T_h jumps faster than the torque envelope can move, a probe
+//! switched (or the guidance failed) on the sample instant, and the old value is held up to it. Half a
+//! millisecond matters: with a 2.5 Hz sine as probe it is 10 ms of t_p. The delay is exact for the same lines, at any fraction of a sample, and so is its derivative:
 //! `d/dt_p L[u](t - t_p) = -(u - L[u])(t - t_p) / t_nms`.
 
 use super::log::DriveLog;
@@ -34,6 +36,12 @@ impl Default for Muscle {
 
 /// A torque that changes faster than this, N.m/s, has switched: it is the fastest that the envelope allows.
 const SWITCH_RATE_NM_S: f64 = 8.0;
+
+/// The ECU decides a torque every so many seconds, counted from time zero of the log.
+const ECU_PERIOD_S: f64 = 1e-3;
+
+/// Share of that period by which a time stamp may be rounded: one at the ECU's instant must not fall before it.
+const TIME_STAMP_ROUNDING: f64 = 0.1;
 
 /// Weights of `L[u](t_j + tau) = decay * m_j + w0 * u_j + w1 * u_{j+1}` for u straight from j to j+1.
 #[derive(Debug, Clone, Copy)]
@@ -63,18 +71,53 @@ pub(crate) struct Lagged {
 }
 
 impl Lagged {
-    fn new(raw: Vec<f64>, dt_s: f64, t_nms_s: f64, held: impl Fn(f64, f64) -> bool) -> Self {
-        let w = LagWeights::after(dt_s, dt_s, t_nms_s);
-        let mut m = raw[0];
-        let mut lagged = Vec::with_capacity(raw.len());
-        lagged.push(m);
-        for pair in raw.windows(2) {
-            let end = if held(pair[0], pair[1]) { pair[0] } else { pair[1] };
-            m = w.decay * m + w.w0 * pair[0] + w.w1 * end;
-            lagged.push(m);
-        }
+    fn straight(raw: Vec<f64>, dt_s: f64, t_nms_s: f64) -> Self {
+        let lagged = lag(&raw, dt_s, t_nms_s, |_, to| to);
         Self { raw, lagged }
     }
+}
+
+/// Response of the lag, from the steady state of the first sample, to straight lines from each sample to
+/// `end(this, next)`.
+fn lag(u: &[f64], dt_s: f64, t_nms_s: f64, end: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    let w = LagWeights::after(dt_s, dt_s, t_nms_s);
+    let mut m = u[0];
+    std::iter::once(m)
+        .chain(u.windows(2).map(|pair| {
+            m = w.decay * m + w.w0 * pair[0] + w.w1 * end(pair[0], pair[1]);
+            m
+        }))
+        .collect()
+}
+
+/// Response of the lag to the torque that the ECU held, of which the log has samples.
+fn lagged_guidance(log: &DriveLog, t_nms_s: f64) -> Vec<f64> {
+    let (torque, dt_s) = (&log.guidance_torque_nm, log.dt_s);
+    // Steps that a probe made, and the continuous rest.
+    let mut steps = vec![0.0];
+    for w in torque.windows(2) {
+        let rise = w[1] - w[0];
+        let step = if rise.abs() > SWITCH_RATE_NM_S * dt_s {
+            rise
+        } else {
+            0.0
+        };
+        steps.push(steps[steps.len() - 1] + step);
+    }
+    let rest: Vec<f64> = torque.iter().zip(&steps).map(|(t, s)| t - s).collect();
+    let last = rest.len() - 1;
+    let moved: Vec<f64> = (0..=last)
+        .map(|k| {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(last));
+            let slope = (rest[after] - rest[before]) / ((after - before) as f64 * dt_s);
+            let ticks = log.time_s(k) / ECU_PERIOD_S;
+            let age = ticks - (ticks + TIME_STAMP_ROUNDING).floor();
+            rest[k] + slope * (age - 0.5) * ECU_PERIOD_S
+        })
+        .collect();
+    let continuous = lag(&lines(&moved), dt_s, t_nms_s, |_, to| to);
+    let stepped = lag(&steps, dt_s, t_nms_s, |from, _| from);
+    continuous.iter().zip(&stepped).map(|(c, s)| c + s).collect()
 }
 
 /// Everything about a log that does not depend on the parameters sought.
@@ -84,8 +127,8 @@ pub(crate) struct Signals {
     pub t_nms_s: f64,
     /// e_y, Int e_y and e_theta.
     pub visual: [Lagged; 3],
-    /// T_h.
-    pub guidance: Lagged,
+    /// The muscle's response to T_h.
+    pub guidance: Vec<f64>,
     /// T_d + K_nms * L[phi]: what the visual and the haptic part have to explain.
     pub target: Vec<f64>,
     /// Whether T_h is other than zero anywhere.
@@ -97,14 +140,11 @@ impl Signals {
     /// torque, which the estimators take as one more unknown.
     pub(crate) fn new(log: &DriveLog, muscle: Muscle) -> Self {
         let (dt_s, t_nms_s) = (log.dt_s, muscle.t_nms_s);
-        let smooth = |_: f64, _: f64| false;
-        let switched = |a: f64, b: f64| (b - a).abs() > SWITCH_RATE_NM_S * dt_s;
         let e_y = lines(&log.e_y_m);
         let int_e_y = integral(&e_y, dt_s);
-        let visual =
-            [e_y, int_e_y, lines(&log.e_theta_rad)].map(|raw| Lagged::new(raw, dt_s, t_nms_s, smooth));
-        let phi = Lagged::new(lines(&log.wheel_angle_rad), dt_s, t_nms_s, smooth);
-        let guidance = Lagged::new(log.guidance_torque_nm.clone(), dt_s, t_nms_s, switched);
+        let visual = [e_y, int_e_y, lines(&log.e_theta_rad)].map(|raw| Lagged::straight(raw, dt_s, t_nms_s));
+        let phi = Lagged::straight(lines(&log.wheel_angle_rad), dt_s, t_nms_s);
+        let guidance = lagged_guidance(log, t_nms_s);
         let target = log
             .driver_torque_nm
             .iter()
@@ -236,6 +276,28 @@ mod tests {
         }
     }
 
+    /// The ECU holds each millisecond what a sine was at its beginning, so the arm sees the sine half a millisecond
+    /// late; a log that samples the held values at 120 Hz, whose instants lie 0, 1/3 and 2/3 ms after the ECU's, is
+    /// read as just that.
+    #[test]
+    fn a_torque_held_by_the_ecu_is_read_at_the_middle_of_its_millisecond() {
+        let mut log = log();
+        let w = 15.0;
+        log.guidance_torque_nm = (0..4800)
+            .map(|k| 0.2 * (w * (f64::from(k) * 1000.0 / 120.0 + 1e-9).floor() * 1e-3).sin())
+            .collect();
+        let s = Signals::new(&log, Muscle::default());
+        for k in 480..4700 {
+            let t = log.time_s(k) - 0.5e-3;
+            let want = 0.2 * (w * t - (w * 0.1).atan()).sin() / (1.0 + (w * 0.1).powi(2)).sqrt();
+            assert!(
+                (s.guidance[k] - want).abs() < 1e-5,
+                "{k}: {} {want}",
+                s.guidance[k]
+            );
+        }
+    }
+
     /// A square wave that switches on a sample instant is held up to it: just at the switch, the lag's answer
     /// is still that of the old value. Steady state of a +-A square wave of half period P:
     /// A (1 - 2 e^{-t/T}/(1 + e^{-P/T})) after a rise.
@@ -245,7 +307,7 @@ mod tests {
         let rise = |t: f64| 0.2 * (1.0 - 2.0 * (-t / 0.1_f64).exp() / (1.0 + (-10.0_f64).exp()));
         for k in 0..120 {
             let t = k as f64 / 120.0;
-            assert!((s.guidance.lagged[20 * 120 + k] - rise(t)).abs() < 1e-9);
+            assert!((s.guidance[20 * 120 + k] - rise(t)).abs() < 1e-9);
         }
     }
 }

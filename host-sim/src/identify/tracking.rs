@@ -133,7 +133,7 @@ fn predict(s: &Signals, lag: LagWeights, rho: f64, k: usize, x: &mut State, cova
         by_delay += x[GAIN + i] * (lag.w0 * d0 + lag.w1 * d1);
     }
     // The guidance's part of the arm torque, in the hold that the lagged signal was made with.
-    f[(ARM, K_HG)] = -(s.guidance.lagged[k] - lag.decay * s.guidance.lagged[k - 1]);
+    f[(ARM, K_HG)] = -(s.guidance[k] - lag.decay * s.guidance[k - 1]);
     let mut arm = f[(ARM, ARM)] * x[ARM] + f[(ARM, OFFSET)] * x[OFFSET];
     for i in 0..4 {
         arm += f[(ARM, GAIN + i)] * x[GAIN + i];

@@ -336,8 +336,8 @@ mod tests {
     #[test]
     fn a_held_wheel_turns_the_vehicle_as_the_textbook_says() {
         // Abe, Vehicle Handling Dynamics, steady state: r = v*delta / (L*(1 + A*v^2)),
-        // A = -m/(2*L^2) * (l_f*K_f - l_r*K_r)/(K_f*K_r); table 9 at 60 km/h: A = 0.0017555, so that
-        // r/delta = 16.667/(2.635*1.48764) = 4.2518 1/s.
+        // A = -m/(2*L^2) * (l_f*K_f - l_r*K_r)/(K_f*K_r); table 9 at 60 km/h: A = 0.0017529, so that
+        // r/delta = 16.667/(2.635*1.48691) = 4.2539 1/s.
         let gains = ArmGains { k_d: 4.0, k_hg: 0.0 };
         let transition = Transition::new(
             V,

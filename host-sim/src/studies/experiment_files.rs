@@ -28,6 +28,15 @@ pub(super) fn write(experiment: &Experiment, directory: &Path) -> Result<(), Out
     Ok(())
 }
 
+pub(super) fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
+    for drive in &experiment.drives {
+        let kind = if drive.guided { "guided" } else { "manual" };
+        let name = format!("participant-{:02}-{kind}.csv", drive.participant);
+        write_file(&directory.join(name), |f| drive.log.write(f))?;
+    }
+    Ok(())
+}
+
 /// The guided drive whose fit is the middle one, as the paper shows "a typical participant".
 fn typical(experiment: &Experiment) -> Option<&Drive> {
     let mut guided: Vec<&Drive> = experiment.drives.iter().filter(|d| d.guided).collect();
@@ -206,7 +215,7 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
                 },
             ]
         };
-        let mut row = start("truth (fit: the paper's)", t.fitness);
+        let mut row = start("truth", t.fitness);
         for (value, (_, _, decimals)) in truths.into_iter().zip(&columns[..shown]) {
             row.push(Cell::Number {
                 value: Some(value),
@@ -236,8 +245,8 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     }
     Table {
         caption:
-            "Parameters with their standard errors. The published method's come as it would print them, on a \
-                  bound or not."
+            "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
+                  come as it would print them, on a bound or not."
                 .into(),
         columns: headings,
         rows,

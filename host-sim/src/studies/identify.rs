@@ -58,7 +58,10 @@ pub fn identify(
     method: Method,
 ) -> Result<IdentifiedDrive, FixError> {
     let identification = match method {
-        Method::NoiseModel => identify_with_noise_model(log, options),
+        Method::NoiseModel => {
+            options.check()?;
+            identify_with_noise_model(log, options)
+        }
         Method::Paper => identify_as_published(log, options)?,
     };
     Ok(IdentifiedDrive {

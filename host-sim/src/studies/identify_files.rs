@@ -337,7 +337,7 @@ fn facts(found: &Identification) -> Vec<(String, String)> {
     }
     let losses: Vec<String> = found.loss_history.iter().map(|l| format!("{l:.6e}")).collect();
     add("Loss", losses.join(", "));
-    add("Ended by", format!("{:?}", found.termination));
+    add("Ended", found.termination.to_string());
     facts
 }
 

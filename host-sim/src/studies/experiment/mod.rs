@@ -14,6 +14,7 @@
 
 mod participants;
 mod recorder;
+mod repetitions;
 
 use std::path::Path;
 
@@ -22,11 +23,12 @@ use serde::Serialize;
 
 pub use participants::{Participant, PublishedDriver, participants};
 pub use recorder::Recorder;
+pub use repetitions::{Repeated, Repetitions, repeat};
 
 use super::{OutputError, experiment_files};
 use crate::closed_loop::{self, Cycle};
 use crate::identify::{
-    Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
+    DriveLog, Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
 };
 use crate::models::STEP_S;
 use crate::models::driver::{ArmGains, DriverParameters};
@@ -86,6 +88,9 @@ pub struct Drive {
     /// Path of the drive: arc length and lateral error, m.
     #[serde(skip)]
     pub path: Vec<(f64, f64)>,
+    /// What was recorded.
+    #[serde(skip)]
+    pub log: DriveLog,
 }
 
 /// A driver as identified, and how it drives.
@@ -106,15 +111,10 @@ pub struct Finding {
 /// # Errors
 /// An unknown participant; a probe that the controller refuses.
 pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, String> {
-    let all = participants();
-    let mut drives = Vec::new();
-    for &number in &plan.participants {
-        let Some(participant) = all.iter().find(|p| p.number == number) else {
-            return Err(format!("participant {number} is outside 1 to {}", all.len()));
-        };
-        drives.push((number, participant.manual));
-        drives.push((number, participant.guided));
-    }
+    let drives: Vec<_> = chosen(&plan.participants)?
+        .into_iter()
+        .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])
+        .collect();
     let course = Course::paper();
     let centreline = Centreline::new(&course);
     let drives = drives
@@ -142,6 +142,58 @@ impl Experiment {
     pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
         experiment_files::write(self, directory)
     }
+
+    /// Writes what was recorded of each drive, a CSV file each, as `identify` reads them.
+    ///
+    /// # Errors
+    /// What could not be written.
+    pub fn write_logs(&self, directory: &Path) -> Result<(), OutputError> {
+        experiment_files::write_logs(self, directory)
+    }
+}
+
+/// The participants of these numbers.
+fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, String> {
+    let all = participants();
+    let find = |&number: &u32| {
+        let found = all.iter().find(|p| p.number == number).copied();
+        found.ok_or_else(|| format!("participant {number} is outside 1 to {}", all.len()))
+    };
+    numbers.iter().map(find).collect()
+}
+
+/// A drive with what is needed to judge it.
+struct Driven {
+    scenario: Scenario,
+    log: DriveLog,
+    path: Vec<(f64, f64)>,
+}
+
+/// Lets a published driver drive, with his remnant and the paper's sensors.
+fn driven(
+    plan: &Plan,
+    number: u32,
+    truth: &PublishedDriver,
+    centreline: &Centreline,
+) -> Result<Driven, String> {
+    let guided = truth.k_hg.is_some();
+    let seed = plan
+        .seed
+        .wrapping_mul(1000)
+        .wrapping_add(u64::from(2 * number) + u64::from(guided));
+    let mut scenario = scenario_of(plan, truth, seed)?;
+    scenario.driver.remnant_sd_nm = if guided {
+        REMNANT_GUIDED_NM
+    } else {
+        REMNANT_MANUAL_NM
+    };
+    let mut recorder = Recorder::new(true);
+    let run = closed_loop::observe(&scenario, centreline, &mut |cycle: &Cycle| recorder.cycle(cycle))?;
+    Ok(Driven {
+        scenario,
+        log: recorder.into_log(),
+        path: path_of(&run.trace),
+    })
 }
 
 fn one_drive(
@@ -150,22 +202,8 @@ fn one_drive(
     truth: PublishedDriver,
     centreline: &Centreline,
 ) -> Result<Drive, String> {
+    let Driven { scenario, log, path } = driven(plan, number, &truth, centreline)?;
     let guided = truth.k_hg.is_some();
-    let remnant_sd_nm = if guided {
-        REMNANT_GUIDED_NM
-    } else {
-        REMNANT_MANUAL_NM
-    };
-    let seed = plan
-        .seed
-        .wrapping_mul(1000)
-        .wrapping_add(u64::from(2 * number) + u64::from(guided));
-    let mut scenario = scenario_of(plan, &truth, seed)?;
-    scenario.driver.remnant_sd_nm = remnant_sd_nm;
-    let mut recorder = Recorder::new(true);
-    let run = closed_loop::observe(&scenario, centreline, &mut |cycle: &Cycle| recorder.cycle(cycle))?;
-    let log = recorder.into_log();
-    let path = path_of(&run.trace);
     let options = Options {
         manual: !guided,
         ..Options::default()
@@ -188,10 +226,11 @@ fn one_drive(
         participant: number,
         guided,
         truth,
-        remnant_sd_nm,
+        remnant_sd_nm: scenario.driver.remnant_sd_nm,
         noise_model,
         paper,
         path,
+        log,
     })
 }
 

@@ -1,14 +1,15 @@
 //! The host computer's log: 120 rows a second of a run, through the paper's sensors.
 //!
 //! The loop runs in steps of 1 ms, the log at instants n/120 s between them. The continuous signals are taken
-//! on the line between the two steps, then rounded as their sensors do; T_h is what the actuator holds.
+//! on the line between the two steps, then rounded as their sensors do; T_h is what the actuator holds, at an
+//! instant at which it was decided anew the new value.
 
 use crate::closed_loop::Cycle;
 use crate::identify::DriveLog;
-use crate::models::{STEP_S, sensors};
+use crate::models::{STEPS_PER_SECOND, sensors};
 
 /// Rows a second.
-const RATE_HZ: f64 = 120.0;
+const RATE_HZ: u32 = 120;
 
 /// Collects the log while a run goes on.
 #[derive(Debug, Clone)]
@@ -20,7 +21,7 @@ pub struct Recorder {
 
 #[derive(Debug, Clone, Copy)]
 struct Row {
-    time_s: f64,
+    step: u32,
     e_y_m: f64,
     e_theta_rad: f64,
     wheel_angle_rad: f64,
@@ -33,7 +34,7 @@ impl Recorder {
     pub fn new(rounded: bool) -> Self {
         let log = DriveLog {
             start_s: 0.0,
-            dt_s: 1.0 / RATE_HZ,
+            dt_s: 1.0 / f64::from(RATE_HZ),
             e_y_m: Vec::new(),
             e_theta_rad: Vec::new(),
             wheel_angle_rad: Vec::new(),
@@ -50,7 +51,7 @@ impl Recorder {
     /// Takes in one step.
     pub fn cycle(&mut self, cycle: &Cycle) {
         let now = Row {
-            time_s: f64::from(cycle.view.step) * STEP_S,
+            step: cycle.view.step,
             e_y_m: cycle.seen.e_y_m,
             e_theta_rad: cycle.seen.e_theta_rad,
             wheel_angle_rad: cycle.view.wheel_angle_rad,
@@ -60,9 +61,11 @@ impl Recorder {
         let Some(last) = self.last.replace(now) else {
             return;
         };
-        let due_s = self.log.len() as f64 / RATE_HZ;
-        if due_s < now.time_s {
-            let share = (due_s - last.time_s) / (now.time_s - last.time_s);
+        // In whole numbers: by rounding, a row at the instant of a step would now and then miss it.
+        let due = self.log.len() as u64 * u64::from(STEPS_PER_SECOND);
+        let [since, until] = [last.step, now.step].map(|step| u64::from(step) * u64::from(RATE_HZ));
+        if due < until {
+            let share = due.saturating_sub(since) as f64 / (until - since) as f64;
             let between = |a: f64, b: f64| a + share * (b - a);
             let torque = between(last.driver_torque_nm, now.driver_torque_nm);
             let angle = between(last.wheel_angle_rad, now.wheel_angle_rad);

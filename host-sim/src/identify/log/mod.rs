@@ -7,6 +7,10 @@
 //! Columns: `time_s`, `e_y_m` and `e_theta_rad` (at the driver's near and far point), `wheel_angle_rad`,
 //! `guidance_torque_nm` (the torque really applied, probe included), `driver_torque_nm`. Others are ignored.
 
+#[cfg(test)]
+mod tests;
+mod write;
+
 use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -81,6 +85,12 @@ impl fmt::Display for LogError {
 
 impl std::error::Error for LogError {}
 
+impl LogError {
+    pub(crate) fn new(message: String) -> Self {
+        Self(message)
+    }
+}
+
 fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
     Err(LogError(message.into()))
 }
@@ -99,6 +109,31 @@ impl DriveLog {
     /// Time of row `k`, s.
     pub fn time_s(&self, k: usize) -> f64 {
         self.start_s + k as f64 * self.dt_s
+    }
+
+    /// A log of signals that are on an even grid already: e_y, e_theta, wheel angle, T_h and T_d, of equal lengths.
+    pub(crate) fn from_signals(start_s: f64, dt_s: f64, signals: [Vec<f64>; 5]) -> Result<Self, LogError> {
+        let [
+            e_y_m,
+            e_theta_rad,
+            wheel_angle_rad,
+            guidance_torque_nm,
+            driver_torque_nm,
+        ] = signals;
+        let span_s = dt_s * driver_torque_nm.len() as f64;
+        if span_s < SHORTEST_S {
+            return refuse(too_short(span_s));
+        }
+        check_sensor(&driver_torque_nm)?;
+        Ok(Self {
+            start_s,
+            dt_s,
+            e_y_m,
+            e_theta_rad,
+            wheel_angle_rad,
+            guidance_torque_nm,
+            driver_torque_nm,
+        })
     }
 
     /// Reads and checks the file at `path`. A `manual` drive may lack the guidance column: it is then zero.
@@ -151,6 +186,7 @@ impl DriveLog {
         ] = columns;
         let dt_s = check_time(&time, &lines)?;
         check_wheel_resolution(&wheel_angle_rad)?;
+        check_sensor(&driver_torque_nm)?;
         Ok(Self {
             start_s: time[0],
             dt_s,
@@ -161,6 +197,17 @@ impl DriveLog {
             driver_torque_nm,
         })
     }
+}
+
+/// A sensor that says the same from beginning to end is dead, or not connected: there is nothing to explain.
+fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
+    let first = driver_torque_nm[0];
+    if driver_torque_nm.iter().all(|&t| t == first) {
+        return refuse(format!(
+            "driver_torque_nm is {first} throughout: the sensor measures nothing"
+        ));
+    }
+    Ok(())
 }
 
 /// Where each of [`COLUMNS`] stands; all that are missing are named at once.
@@ -286,9 +333,13 @@ fn check_time(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
         ));
     }
     if span < SHORTEST_S {
-        return refuse(format!("the log covers {span:.3} s, less than {SHORTEST_S} s"));
+        return refuse(too_short(span));
     }
     Ok(dt)
+}
+
+fn too_short(span_s: f64) -> String {
+    format!("the log covers {span_s:.3} s, less than {SHORTEST_S} s")
 }
 
 fn check_wheel_resolution(wheel_angle: &[f64]) -> Result<(), LogError> {
@@ -309,154 +360,4 @@ fn check_wheel_resolution(wheel_angle: &[f64]) -> Result<(), LogError> {
         ));
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const HEADER: &str = "time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm,driver_torque_nm";
-
-    /// 12 s at 100 Hz; `edit` may change the fields of data row `k` (line `k + 2`).
-    fn text(edit: impl Fn(usize, &mut [String; 6])) -> String {
-        let mut out = HEADER.to_owned();
-        for k in 0..1200 {
-            let t = k as f64 / 100.0;
-            let mut row = [
-                format!("{t:.4}"),
-                format!("{}", 0.01 * t),
-                format!("{}", 0.002 * t),
-                format!("{}", 0.01 * t),
-                "0.1".to_owned(),
-                "-0.2".to_owned(),
-            ];
-            edit(k, &mut row);
-            out.push('\n');
-            out.push_str(&row.join(","));
-        }
-        out
-    }
-
-    fn error(text: &str) -> String {
-        DriveLog::read(text.as_bytes(), false).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn a_good_log_is_read_whatever_the_order_of_its_columns() {
-        let log = DriveLog::read(text(|_, _| {}).as_bytes(), false).unwrap();
-        assert_eq!(log.len(), 1200);
-        assert!((log.dt_s - 0.01).abs() < 1e-12);
-        assert_eq!((log.guidance_torque_nm[7], log.driver_torque_nm[7]), (0.1, -0.2));
-        assert!((log.time_s(1199) - 11.99).abs() < 1e-9);
-        let mut shuffled =
-            "\u{feff}driver_torque_nm, note ,time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm"
-                .to_owned();
-        for k in 0..1200 {
-            shuffled.push_str(&format!("\n-0.3,word,{},0.5,0.05,0.1,0.2", f64::from(k) / 100.0));
-        }
-        let log = DriveLog::read(shuffled.as_bytes(), false).unwrap();
-        assert_eq!((log.e_y_m[3], log.driver_torque_nm[3]), (0.5, -0.3));
-    }
-
-    #[test]
-    fn every_missing_column_is_named_with_its_likely_stand_in() {
-        let e = error("time_s,e_y_m,wheel_angle_deg,driver_torque_nm\n0,0,0,0");
-        assert!(
-            e.contains("e_theta_rad, wheel_angle_rad (there is wheel_angle_deg"),
-            "{e}"
-        );
-        assert!(e.contains("guidance_torque_nm") && !e.contains("e_y_m"), "{e}");
-        assert!(error("time_s,time_s,e_y_m").contains("time_s is there twice"));
-    }
-
-    #[test]
-    fn a_manual_log_may_lack_the_guidance_column() {
-        let without: String = text(|_, _| {})
-            .lines()
-            .map(|l| {
-                let mut f: Vec<&str> = l.split(',').collect();
-                f.remove(4);
-                f.join(",") + "\n"
-            })
-            .collect();
-        let log = DriveLog::read(without.as_bytes(), true).unwrap();
-        assert!(log.guidance_torque_nm.iter().all(|&t| t == 0.0));
-        assert!(error(&without).contains("missing column(s): guidance_torque_nm"));
-    }
-
-    #[test]
-    fn what_is_no_finite_number_is_named_with_line_and_column() {
-        let e = error(&text(|k, r| {
-            if k == 40 {
-                r[2] = "nan".to_owned();
-            }
-        }));
-        assert!(e.starts_with("line 42: e_theta_rad is nan"), "{e}");
-        let e = error(&text(|k, r| {
-            if k == 0 {
-                r[5] = "3;1".to_owned();
-            }
-        }));
-        assert!(e.starts_with("line 2: driver_torque_nm is \"3;1\""), "{e}");
-        let e = error(&text(|k, r| {
-            if k == 9 {
-                r[5] = "1,2".to_owned();
-            }
-        }));
-        assert_eq!(e, "line 11: 7 fields where the header has 6");
-    }
-
-    #[test]
-    fn time_that_stops_jumps_or_limps_is_named_with_its_line() {
-        let e = error(&text(|k, r| {
-            if k == 5 {
-                r[0] = "0.04".to_owned();
-            }
-        }));
-        assert!(e.starts_with("line 7: time_s goes from 0.04 to 0.04"), "{e}");
-        let e = error(&text(|k, r| {
-            r[0] = format!("{}", k as f64 / 100.0 + if k > 600 { 0.1 } else { 0.0 })
-        }));
-        assert!(
-            e.starts_with("line 603: gap of 0.110000 s before it, 10.0 samples"),
-            "{e}"
-        );
-        let e = error(&text(|k, r| {
-            r[0] = format!("{}", k as f64 / 100.0 + if k == 300 { 0.002 } else { 0.0 })
-        }));
-        assert!(e.starts_with("line 302: uneven time stamps"), "{e}");
-        // 100 Hz for the first half, 95 Hz for the second: each step passes alone, the sum does not.
-        let e = error(&text(|k, r| {
-            r[0] = format!("{}", k as f64 / 100.0 + k.saturating_sub(600) as f64 / 1900.0)
-        }));
-        assert!(e.contains("uneven time stamps"), "{e}");
-        assert!(error(&text(|k, r| r[0] = format!("{}", 10 * k))).contains("is it in ms?"));
-        // Stamps rounded to a millisecond at 120 Hz are even enough.
-        let rounded = text(|k, r| r[0] = format!("{:.3}", k as f64 / 120.0 * 1.2));
-        assert!(DriveLog::read(rounded.as_bytes(), false).is_ok());
-    }
-
-    #[test]
-    fn degrees_and_millinewtons_are_seen() {
-        let e = error(&text(|k, r| r[3] = format!("{}", 0.01 * k as f64)));
-        assert!(e.starts_with("line 317: wheel_angle_rad is 3.15"), "{e}");
-        assert!(e.ends_with("is it in degrees?"), "{e}");
-        let e = error(&text(|k, r| r[3] = format!("{:.1}", 0.002 * k as f64)));
-        assert!(e.contains("wheel_angle_rad moves by 0.100 at least"), "{e}");
-        let e = error(&text(|k, r| r[2] = format!("{}", 0.01 * k as f64)));
-        assert!(e.starts_with("line 53: e_theta_rad is 0.51"), "{e}");
-        assert!(error(&text(|_, r| r[5] = "-200".to_owned())).contains("line 2: driver_torque_nm is -200"));
-        assert!(error(&text(|_, r| r[1] = "120".to_owned())).contains("is it in mm?"));
-    }
-
-    #[test]
-    fn a_short_log_is_refused() {
-        let short: String = text(|_, _| {})
-            .lines()
-            .take(500)
-            .map(|l| l.to_owned() + "\n")
-            .collect();
-        assert!(error(&short).contains("covers 4.980 s"));
-        assert!(error(HEADER).contains("0 rows"));
-    }
 }

@@ -1,0 +1,170 @@
+use super::*;
+
+const HEADER: &str = "time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm,driver_torque_nm";
+
+/// 12 s at 100 Hz; `edit` may change the fields of data row `k` (line `k + 2`).
+fn text(edit: impl Fn(usize, &mut [String; 6])) -> String {
+    let mut out = HEADER.to_owned();
+    for k in 0..1200 {
+        let t = k as f64 / 100.0;
+        let mut row = [
+            format!("{t:.4}"),
+            format!("{}", 0.01 * t),
+            format!("{}", 0.002 * t),
+            format!("{}", 0.01 * t),
+            "0.1".to_owned(),
+            if k == 0 { "-0.1" } else { "-0.2" }.to_owned(),
+        ];
+        edit(k, &mut row);
+        out.push('\n');
+        out.push_str(&row.join(","));
+    }
+    out
+}
+
+fn error(text: &str) -> String {
+    DriveLog::read(text.as_bytes(), false).unwrap_err().to_string()
+}
+
+#[test]
+fn a_good_log_is_read_whatever_the_order_of_its_columns() {
+    let log = DriveLog::read(text(|_, _| {}).as_bytes(), false).unwrap();
+    assert_eq!(log.len(), 1200);
+    assert!((log.dt_s - 0.01).abs() < 1e-12);
+    assert_eq!((log.guidance_torque_nm[7], log.driver_torque_nm[7]), (0.1, -0.2));
+    assert!((log.time_s(1199) - 11.99).abs() < 1e-9);
+    let mut shuffled =
+        "\u{feff}driver_torque_nm, note ,time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm"
+            .to_owned();
+    for k in 0..1200 {
+        shuffled.push_str(&format!(
+            "\n{},word,{},0.5,0.05,0.1,0.2",
+            -0.01 * f64::from(k),
+            f64::from(k) / 100.0
+        ));
+    }
+    let log = DriveLog::read(shuffled.as_bytes(), false).unwrap();
+    assert_eq!((log.e_y_m[3], log.driver_torque_nm[20]), (0.5, -0.2));
+}
+
+#[test]
+fn every_missing_column_is_named_with_its_likely_stand_in() {
+    let e = error("time_s,e_y_m,wheel_angle_deg,driver_torque_nm\n0,0,0,0");
+    assert!(
+        e.contains("e_theta_rad, wheel_angle_rad (there is wheel_angle_deg"),
+        "{e}"
+    );
+    assert!(e.contains("guidance_torque_nm") && !e.contains("e_y_m"), "{e}");
+    assert!(error("time_s,time_s,e_y_m").contains("time_s is there twice"));
+}
+
+#[test]
+fn a_manual_log_may_lack_the_guidance_column() {
+    let without: String = text(|_, _| {})
+        .lines()
+        .map(|l| {
+            let mut f: Vec<&str> = l.split(',').collect();
+            f.remove(4);
+            f.join(",") + "\n"
+        })
+        .collect();
+    let log = DriveLog::read(without.as_bytes(), true).unwrap();
+    assert!(log.guidance_torque_nm.iter().all(|&t| t == 0.0));
+    assert!(error(&without).contains("missing column(s): guidance_torque_nm"));
+}
+
+#[test]
+fn what_is_no_finite_number_is_named_with_line_and_column() {
+    let e = error(&text(|k, r| {
+        if k == 40 {
+            r[2] = "nan".to_owned();
+        }
+    }));
+    assert!(e.starts_with("line 42: e_theta_rad is nan"), "{e}");
+    let e = error(&text(|k, r| {
+        if k == 0 {
+            r[5] = "3;1".to_owned();
+        }
+    }));
+    assert!(e.starts_with("line 2: driver_torque_nm is \"3;1\""), "{e}");
+    let e = error(&text(|k, r| {
+        if k == 9 {
+            r[5] = "1,2".to_owned();
+        }
+    }));
+    assert_eq!(e, "line 11: 7 fields where the header has 6");
+}
+
+#[test]
+fn time_that_stops_jumps_or_limps_is_named_with_its_line() {
+    let e = error(&text(|k, r| {
+        if k == 5 {
+            r[0] = "0.04".to_owned();
+        }
+    }));
+    assert!(e.starts_with("line 7: time_s goes from 0.04 to 0.04"), "{e}");
+    let e = error(&text(|k, r| {
+        r[0] = format!("{}", k as f64 / 100.0 + if k > 600 { 0.1 } else { 0.0 })
+    }));
+    assert!(
+        e.starts_with("line 603: gap of 0.110000 s before it, 10.0 samples"),
+        "{e}"
+    );
+    let e = error(&text(|k, r| {
+        r[0] = format!("{}", k as f64 / 100.0 + if k == 300 { 0.002 } else { 0.0 })
+    }));
+    assert!(e.starts_with("line 302: uneven time stamps"), "{e}");
+    // 100 Hz for the first half, 95 Hz for the second: each step passes alone, the sum does not.
+    let e = error(&text(|k, r| {
+        r[0] = format!("{}", k as f64 / 100.0 + k.saturating_sub(600) as f64 / 1900.0)
+    }));
+    assert!(e.contains("uneven time stamps"), "{e}");
+    assert!(error(&text(|k, r| r[0] = format!("{}", 10 * k))).contains("is it in ms?"));
+    // Stamps rounded to a millisecond at 120 Hz are even enough.
+    let rounded = text(|k, r| r[0] = format!("{:.3}", k as f64 / 120.0 * 1.2));
+    assert!(DriveLog::read(rounded.as_bytes(), false).is_ok());
+}
+
+#[test]
+fn degrees_and_millinewtons_are_seen() {
+    let e = error(&text(|k, r| r[3] = format!("{}", 0.01 * k as f64)));
+    assert!(e.starts_with("line 317: wheel_angle_rad is 3.15"), "{e}");
+    assert!(e.ends_with("is it in degrees?"), "{e}");
+    let e = error(&text(|k, r| r[3] = format!("{:.1}", 0.002 * k as f64)));
+    assert!(e.contains("wheel_angle_rad moves by 0.100 at least"), "{e}");
+    let e = error(&text(|k, r| r[2] = format!("{}", 0.01 * k as f64)));
+    assert!(e.starts_with("line 53: e_theta_rad is 0.51"), "{e}");
+    assert!(error(&text(|_, r| r[5] = "-200".to_owned())).contains("line 2: driver_torque_nm is -200"));
+    assert!(error(&text(|_, r| r[1] = "120".to_owned())).contains("is it in mm?"));
+}
+
+#[test]
+fn a_torque_that_never_changes_is_refused() {
+    let error = error(&text(|_, r| r[5] = "0.5".to_owned()));
+    assert_eq!(
+        error,
+        "driver_torque_nm is 0.5 throughout: the sensor measures nothing"
+    );
+}
+
+#[test]
+fn a_short_log_is_refused() {
+    let short: String = text(|_, _| {})
+        .lines()
+        .take(500)
+        .map(|l| l.to_owned() + "\n")
+        .collect();
+    assert!(error(&short).contains("covers 4.980 s"));
+    assert!(error(HEADER).contains("0 rows"));
+}
+
+#[test]
+fn a_log_that_was_written_is_read_again() {
+    let log = DriveLog::read(text(|_, _| ()).as_bytes(), false).unwrap();
+    let mut bytes = Vec::new();
+    log.write(&mut bytes).unwrap();
+    let again = DriveLog::read(&bytes[..], false).unwrap();
+    assert_eq!((again.len(), again.e_y_m[7]), (1200, 0.0007));
+    assert_eq!(again.driver_torque_nm, log.driver_torque_nm);
+    assert!((again.dt_s - 0.01).abs() < 1e-9);
+}

@@ -1,0 +1,137 @@
+//! A drive recorded on the bus, as the text of candump: what is computed from it, and what is refused.
+//!
+//! The truth is the driver model that drove, and the lane errors that it saw.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use host_sim::closed_loop::{self, Cycle};
+use host_sim::identify::{Options, identify_with_noise_model, open_recording};
+use host_sim::models::driver::{ArmGains, DriverParameters};
+use host_sim::models::road::Centreline;
+use host_sim::scenario::{Condition, Scenario};
+
+/// What candump would have written, and the driver's e_theta at each millisecond.
+static DRIVE: LazyLock<(String, Vec<f64>)> = LazyLock::new(|| {
+    let mut scenario = Scenario {
+        driver: DriverParameters {
+            t_p: 0.15,
+            remnant_sd_nm: 0.07,
+            ..DriverParameters::default()
+        },
+        gains: ArmGains { k_d: 3.0, k_hg: 0.4 },
+        condition: Condition::Custom,
+        seed: 5,
+        ..Scenario::default()
+    };
+    scenario.guidance.probe = true;
+    scenario.guidance.controller.probe_amplitude_nm = 0.2;
+    let (mut text, mut seen) = (String::new(), Vec::new());
+    let road = Centreline::new(&scenario.course);
+    let watch = &mut |cycle: &Cycle| {
+        seen.push(cycle.seen.e_theta_rad);
+        let time_s = 1_700_000_000.0 + f64::from(cycle.view.step) * 1e-3;
+        for frame in cycle.frames_in.iter().chain(cycle.frames_out) {
+            write!(text, "({time_s:.6}) can0 {:03X}#", frame.id()).unwrap();
+            for byte in frame.data() {
+                write!(text, "{byte:02X}").unwrap();
+            }
+            text.push('\n');
+        }
+    };
+    closed_loop::observe(&scenario, &road, watch).unwrap();
+    (text, seen)
+});
+
+fn open(
+    text: &str,
+    dbc: Option<&str>,
+) -> Result<(host_sim::identify::DriveLog, Option<&'static str>), String> {
+    let directory = tempfile::tempdir().unwrap();
+    let [trace, dbc_file] = ["trace.log", "mine.dbc"].map(|name| directory.path().join(name));
+    std::fs::write(&trace, text).unwrap();
+    if let Some(dbc) = dbc {
+        std::fs::write(&dbc_file, dbc).unwrap();
+    }
+    let dbc = dbc.map(|_| dbc_file.as_path());
+    open_recording(&trace, dbc, false).map_err(|e| e.to_string())
+}
+
+#[test]
+fn the_driver_is_found_from_the_bus() {
+    let (text, seen) = &*DRIVE;
+    let (log, note) = open(text, None).unwrap();
+    assert!(note.unwrap().contains("far point"));
+    // Past the first seconds, in which the vehicle model forgets how it began: within 0.5 mrad of what the driver
+    // saw, where the guidance's own error would be off by tens.
+    let mut largest: f64 = 0.0;
+    for k in 600..log.len() {
+        let ms = k as f64 / 120.0 * 1000.0;
+        let (whole, share) = (ms.floor() as usize, ms.fract());
+        let truth = seen[whole] + share * (seen[whole + 1] - seen[whole]);
+        largest = largest.max((log.e_theta_rad[k] - truth).abs());
+    }
+    assert!(largest < 5e-4, "{largest}");
+
+    let p = identify_with_noise_model(&log, &Options::default()).parameters;
+    assert!(p.k_hg.identified && (p.k_hg.estimate.unwrap() - 0.4).abs() < 0.05);
+    // (K_d + K_nms)*a_i of the scenario: 4*0.1, 4*0.05, 4*3.7.
+    for (parameter, truth) in [(p.gain_1, 0.4), (p.gain_2, 0.2), (p.gain_3, 14.8), (p.t_p, 0.15)] {
+        let (centre, error) = (parameter.optimum.unwrap(), parameter.standard_error.unwrap());
+        assert!(
+            (centre - truth).abs() < 4.0 * error,
+            "{parameter:?} against {truth}"
+        );
+    }
+}
+
+#[test]
+fn a_trace_that_lacks_something_is_refused_with_the_reason() {
+    // 20 s, every line of which has an equal length per message.
+    let text: String = DRIVE
+        .0
+        .lines()
+        .take_while(|line| *line < "(1700000020")
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    let without = |id: &str| -> String {
+        text.lines()
+            .filter(|line| !line.contains(id))
+            .flat_map(|line| [line, "\n"])
+            .collect()
+    };
+    for (id, says) in [
+        (
+            " 100#",
+            "no frame 100 (LanePreview), so no LanePreview_LateralError",
+        ),
+        (" 110#", "no frame 110 (Column), so no Column_DriverTorque"),
+        (" 0C0#", "no frame 0C0 (Guidance), so no Guidance_Torque"),
+        (" 120#", "no frame 120 (Vehicle), so no Vehicle_Speed1"),
+    ] {
+        let error = open(&without(id), None).unwrap_err();
+        assert!(error.ends_with(says), "{error}");
+    }
+    // A hundred milliseconds of bus are missing.
+    let with_gap: String = text
+        .lines()
+        .filter(|line| !line.starts_with("(1700000007.3"))
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    let error = open(&with_gap, None).unwrap_err();
+    assert!(error.contains("line ") && error.contains("comes 0.1"), "{error}");
+    let short: String = text.lines().take(3000).flat_map(|line| [line, "\n"]).collect();
+    assert!(open(&short, None).unwrap_err().contains("less than 10 s"));
+    let error = open(&text.replace(" 120#", " 120#0"), None).unwrap_err();
+    assert!(error.contains("the data are no bytes in hexadecimal"), "{error}");
+
+    let dbc = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("core/haptic.dbc")).unwrap();
+    let error = open(&text, Some(&dbc.replace("Column_WheelAngle", "Angle"))).unwrap_err();
+    assert!(
+        error.ends_with("the DBC file has no signal Column_WheelAngle"),
+        "{error}"
+    );
+    let (a, b) = (open(&text, Some(&dbc)).unwrap(), open(&text, None).unwrap());
+    assert_eq!(a, b);
+}

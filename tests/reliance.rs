@@ -1,0 +1,56 @@
+//! The driver's reliance, read live by the ECU from its probe, against the truth of the driver model. (Whether the
+//! envelope clips the probe is `unclipped`'s question.)
+
+use host_sim::closed_loop::{self, Cycle};
+use host_sim::models::driver::ArmGains;
+use host_sim::models::road::Centreline;
+use host_sim::scenario::Scenario;
+use host_sim::studies::reliance::{Plan, study};
+
+/// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`host-sim reliance` has 20 seeds.)
+#[test]
+fn all_participants_are_read_live() {
+    let plan = Plan {
+        participants: (1..=14).collect(),
+        seeds: 2,
+        amplitude_nm: 0.2,
+        frequency_hz: 2.5,
+    };
+    let found = study(&plan, || {}).unwrap();
+    assert_eq!(found.diverged, 0);
+    for (after_s, largest_rms) in [(10.0, 0.085), (30.0, 0.05)] {
+        let pooled = found.pooled.iter().find(|a| a.after_s == after_s).unwrap();
+        assert_eq!(pooled.count, 14 * 2 * 4);
+        assert!(
+            pooled.bias.abs() <= 0.02 && pooled.rms <= largest_rms,
+            "{pooled:?}"
+        );
+        assert!((0.90..=0.99).contains(&pooled.coverage), "{pooled:?}");
+    }
+    // After the driver has become another.
+    assert!(
+        found.settling.count == 28 && found.settling.near >= 0.95,
+        "{:?}",
+        found.settling
+    );
+}
+
+/// Off unless it is asked for: the default scenario's torque is that of the law alone, whatever the amplitude.
+#[test]
+fn the_probe_is_off_by_default() {
+    let torque = |amplitude_nm: f64| {
+        let mut scenario = Scenario {
+            gains: ArmGains { k_d: 3.0, k_hg: 0.5 },
+            ..Scenario::default()
+        };
+        scenario.guidance.controller.probe_amplitude_nm = amplitude_nm;
+        let road = Centreline::new(&scenario.course);
+        let mut torque = Vec::new();
+        closed_loop::observe(&scenario, &road, &mut |cycle: &Cycle| {
+            torque.push(cycle.applied_torque_nm)
+        })
+        .unwrap();
+        torque
+    };
+    assert_eq!(torque(0.0), torque(0.2));
+}
