@@ -166,6 +166,42 @@ fn a_run_prints_its_record_and_writes_files_when_asked() {
     );
 }
 
+/// The bus of a drive of 100 m at 20 m/s, less the look-ahead of 1 s: 4 s, a torque frame each millisecond.
+#[test]
+fn a_run_records_its_bus_when_asked() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("c.toml", "[[segment]]\nlength = 100\n");
+    write("s.toml", "course = 'c.toml'\nspeed = 72\n");
+    let output = host_sim(directory.path(), &["run", "s.toml", "--out", "here", "--bus-log"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let log = std::fs::read_to_string(directory.path().join("here/bus.log")).unwrap();
+    let torque: Vec<&str> = log.lines().filter(|line| line.contains(" 0C0#")).collect();
+    assert!(
+        (3990..=4010).contains(&torque.len()),
+        "{} torque frames",
+        torque.len()
+    );
+    assert!(torque[7].starts_with("(0.007000) can0 0C0#"), "{}", torque[7]);
+    assert_eq!(torque[7].len(), "(0.007000) can0 0C0#0011223344556677".len());
+    assert_eq!(
+        log.lines().filter(|line| line.contains(" 110#")).count(),
+        torque.len() / 2
+    );
+
+    write("exact.toml", "sensors = 'exact'\n");
+    let refused = host_sim(
+        directory.path(),
+        &["run", "exact.toml", "--out", "there", "--bus-log"],
+    );
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        stderr(&refused).contains("there is no bus to record"),
+        "{}",
+        stderr(&refused)
+    );
+}
+
 #[test]
 fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     let directory = tempfile::tempdir().unwrap();

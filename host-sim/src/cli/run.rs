@@ -20,6 +20,10 @@ pub(super) struct Arguments {
     /// Directory for a figure, the time series, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Also every frame of the bus, as `candump -L` writes it (bus.log, some 20 MB for paper-course); read it with
+    /// `cantools decode core/haptic.dbc < bus.log`
+    #[arg(long, requires = "out")]
+    bus_log: bool,
     /// Print the results as one JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -28,7 +32,8 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let scenario = Scenario::load(&arguments.scenario)?;
     let output = arguments.out.as_deref().map(Output::begin).transpose()?;
-    let single = simulate(scenario).map_err(|e| InputError::new(arguments.scenario.display(), e))?;
+    let single = simulate(scenario, arguments.bus_log)
+        .map_err(|e| InputError::new(arguments.scenario.display(), e))?;
     if let (Some(output), Some(directory)) = (output, &arguments.out) {
         output.finish(|place| single.write(place))?;
         eprintln!("Report: {}", directory.join("report.html").display());

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use haptic_core::bus::Frame;
 use serde::Serialize;
 
 use super::record::{default_window, failure_notes, nominal_peak_m};
@@ -11,7 +12,7 @@ use crate::closed_loop::{Cycle, Observer, Run, observe, simulate};
 use crate::ecu_events::EcuEvents;
 use crate::models::road::Centreline;
 use crate::report::Event;
-use crate::scenario::{Failure, FailureKind, Scenario, Sensors};
+use crate::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 
 /// A scenario with its run.
 #[derive(Debug, Clone)]
@@ -24,6 +25,8 @@ pub struct SingleRun {
     pub reported: Vec<Event>,
     /// What the ECU said of the driver's reliance; nothing past the bus.
     pub readings: Readings,
+    /// The bus, if it was recorded: milliseconds since the start, and what was sent then, in order.
+    pub bus: Vec<(u32, Frame)>,
     /// What is handed on.
     pub results: SingleResults,
 }
@@ -54,19 +57,29 @@ pub struct SingleResults {
     pub notes: Vec<String>,
 }
 
-/// Simulates a scenario; one with a failure also without it, to tell when the driver has recovered.
+/// Simulates a scenario; one with a failure also without it, to tell when the driver has recovered. With
+/// `record_bus` every frame is kept.
 ///
 /// # Errors
-/// As [`Scenario::check`] and [`Scenario::check_times`].
-pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
+/// As [`Scenario::check`] and [`Scenario::check_times`]; a bus to record where there is none.
+pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
     scenario.check()?;
     scenario.check_times()?;
+    if record_bus && (scenario.sensors == Sensors::Exact || scenario.condition == Condition::Manual) {
+        return Err(
+            "there is no bus to record: it takes sensors = \"paper\" and a condition with guidance".into(),
+        );
+    }
     let centreline = Centreline::new(&scenario.course);
     let window = default_window(&scenario.course);
-    let (mut ecu, mut readings) = (EcuEvents::new(), Readings::default());
+    let (mut ecu, mut readings, mut bus) = (EcuEvents::new(), Readings::default(), Vec::new());
     let run = observe(&scenario, &centreline, &mut |cycle: &Cycle| {
         ecu.cycle(cycle);
         readings.cycle(cycle);
+        if record_bus {
+            let frames = cycle.frames_in.iter().chain(cycle.frames_out);
+            bus.extend(frames.map(|frame| (cycle.view.step, *frame)));
+        }
     })?;
     let nominal_peak_m = if let Some(failure_time_s) = scenario.failure.at_s() {
         let failure = Failure {
@@ -99,12 +112,14 @@ pub fn run(scenario: Scenario) -> Result<SingleRun, String> {
         run,
         reported: ecu.into_events(),
         readings,
+        bus,
         results,
     })
 }
 
 impl SingleRun {
-    /// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON) and a report (HTML).
+    /// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON), a report (HTML), and the bus if it was
+    /// recorded (as `candump -L` does).
     ///
     /// # Errors
     /// What could not be written or drawn.

@@ -23,6 +23,18 @@ pub(super) fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputEr
     write_json(&directory.join("results.json"), &single.results)?;
     let html = report(single, figure).to_html()?;
     write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
+    if !single.bus.is_empty() {
+        write_file(&directory.join("bus.log"), |f| {
+            for (ms, frame) in &single.bus {
+                write!(f, "({:.6}) can0 {:03X}#", f64::from(*ms) * 1e-3, frame.id())?;
+                for byte in frame.data() {
+                    write!(f, "{byte:02X}")?;
+                }
+                writeln!(f)?;
+            }
+            Ok(())
+        })?;
+    }
     Ok(())
 }
 
