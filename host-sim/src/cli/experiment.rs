@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::identify::Muscle;
+use host_sim::report::FileSet;
 use host_sim::studies::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
 
+use super::output::Output;
 use super::participants::Participants;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
@@ -16,7 +18,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "LIST", default_value = "1..14")]
     participants: Participants,
     /// Amplitude of the probe in the guided drives, N.m (0: none)
-    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.0)]
+    #[arg(
+        long,
+        value_name = "AMPLITUDE",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     probe: f64,
     /// Seed of the remnants
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -54,12 +61,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         return Ok(Outcome::Good);
     }
+    let output = Output::begin(&arguments.out)?;
+    let logs = arguments.logs.as_deref().map(FileSet::begin).transpose()?;
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
-    result.write(&arguments.out)?;
-    if let Some(directory) = &arguments.logs {
-        result.write_logs(directory)?;
+    output.finish(|place| result.write(place))?;
+    if let Some(logs) = logs {
+        result.write_logs(logs.staging())?;
+        logs.finish()?;
     }
     if arguments.json {
         print_json(&result)?;

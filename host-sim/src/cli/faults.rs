@@ -8,6 +8,7 @@ use host_sim::faults::table::{self as rows, Place, Row};
 use host_sim::faults::{World, document, target};
 use host_sim::report::{write_file, write_json};
 
+use super::output::Output;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
@@ -46,6 +47,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(seed) => seed..seed + 1,
         None => 1..arguments.seeds + 1,
     };
+    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let bar = progress::bar(chosen.len() as u64 * (seeds.end - seeds.start), "runs");
     let world = World::new();
     let campaign = if arguments.target {
@@ -54,10 +56,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         campaign::run(&world, &chosen, seeds, || bar.inc(1))
     };
     bar.finish_and_clear();
-    if let Some(directory) = &arguments.out {
-        write_json(&directory.join("faults.json"), &campaign)?;
-        let text = document::table_of_faults();
-        write_file(&directory.join("faults.md"), |f| f.write_all(text.as_bytes()))?;
+    if let Some(output) = output {
+        output.finish(|place| {
+            write_json(&place.join("faults.json"), &campaign)?;
+            let text = document::table_of_faults();
+            Ok(write_file(&place.join("faults.md"), |f| {
+                f.write_all(text.as_bytes())
+            })?)
+        })?;
     }
     if arguments.json {
         print_json(&campaign)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::studies::reliance::{NEAR, Plan, Results, SETTLING_S, study};
 
+use super::output::Output;
 use super::participants::Participants;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
@@ -18,10 +19,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 20)]
     seeds: u32,
     /// Frequency of the probe, Hz
-    #[arg(long, value_name = "HZ", default_value_t = 2.5)]
+    #[arg(long, value_name = "HZ", default_value_t = 2.5, allow_negative_numbers = true)]
     frequency: f64,
     /// Amplitude of the probe, N.m
-    #[arg(long, value_name = "NM", default_value_t = 0.2)]
+    #[arg(long, value_name = "NM", default_value_t = 0.2, allow_negative_numbers = true)]
     amplitude: f64,
     /// Directory for a figure, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
@@ -38,18 +39,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         amplitude_nm: arguments.amplitude,
         frequency_hz: arguments.frequency,
     };
+    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let drives = plan.participants.len() as u64 * u64::from(plan.seeds);
     let bar = progress::bar(drives, "drives");
     let results = study(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
-    if let Some(directory) = &arguments.out {
-        results.write(directory)?;
-        eprintln!("Report: {}", directory.join("report.html").display());
+    if let Some(output) = output {
+        output.finish(|place| results.write(place))?;
     }
     if arguments.json {
         print_json(&results)?;
     } else {
         print(&readable(&results))?;
+    }
+    if let Some(directory) = &arguments.out {
+        eprintln!("Report: {}", directory.join("report.html").display());
     }
     Ok(Outcome::Good)
 }

@@ -18,6 +18,7 @@
 
 mod bytes;
 pub mod campaign;
+mod come_up;
 pub mod document;
 pub mod drivers;
 mod guard;

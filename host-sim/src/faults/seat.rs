@@ -4,16 +4,16 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::lockstep::{self, StartState};
+use haptic_core::lockstep;
 use haptic_core::params::{Params, Setup};
 use haptic_core::quantity::{Instant, Torque};
-use haptic_core::stored::{BYTES, load, save};
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::bytes::Status;
+use super::come_up::{come_up, is_engaged};
 use super::guard::{ACTIVE, Broken, FAULT, Guard};
-use super::injection::{Clock, Hand, Injection, Inside, Motor, Start};
+use super::injection::{Clock, Hand, Injection, Inside, Motor};
 use super::residual::{Residual, Seen};
 use super::senders::{Readings, Senders};
 use super::table::Row;
@@ -112,40 +112,6 @@ pub(super) struct Tick {
     pub(super) answer: Vec<Frame>,
 }
 
-/// Every parameter of the law and the envelope at the end of its range that does most, and the monitor with them.
-fn absurd() -> Params {
-    Params {
-        k_1: 4.0,
-        a_1: 8.0,
-        a_2: 8.0,
-        a_3: 8.0,
-        a_4: 8.0,
-        rate_corner_hz: 60.0,
-        least_speed_mps: 0.5,
-        ..Params::PAPER
-    }
-}
-
-/// Whether a boot finds the set in use before in the memory of the parameters.
-fn finds_previous(start: Start, dice: &mut Xoshiro256PlusPlus) -> bool {
-    let previous = Params::PAPER;
-    let other = Params {
-        torque_limit_nm: 3.0,
-        ..Params::PAPER
-    };
-    let [mut older, mut newer] = [save(&other, 1), save(&previous, 2)];
-    if start == Start::HalfWritten {
-        // The older copy makes way for the third set.
-        let written = dice.random_range(0..BYTES);
-        older[..written].copy_from_slice(&save(&other, 3)[..written]);
-    } else {
-        for copy in [&mut older, &mut newer] {
-            copy[dice.random_range(0..BYTES)] ^= 1 << dice.random_range(0..8);
-        }
-    }
-    load([&older, &newer]).is_some_and(|found| found.params == previous)
-}
-
 impl<'a> Seat<'a> {
     pub(super) fn new(
         row: &'a Row,
@@ -161,24 +127,7 @@ impl<'a> Seat<'a> {
             0
         };
         let now = Instant::from_us(clock_base_us);
-        let params = match row.start {
-            Start::Absurd => absurd(),
-            _ => scenario.controller_params(),
-        };
-        let boot = |recent_resets| Boot {
-            recent_resets,
-            ..Boot::default()
-        };
-        let state = match row.start {
-            Start::Engaged | Start::Absurd | Start::HeadingWraps => StartState::Engaged,
-            Start::Boot => StartState::Boot(boot(0)),
-            Start::NoParameters | Start::HalfWritten if finds_previous(row.start, &mut dice) => {
-                StartState::Boot(boot(0))
-            }
-            Start::NoParameters | Start::HalfWritten => StartState::WithoutParameters(boot(0)),
-            Start::ThirdReset => StartState::Boot(boot(3)),
-        };
-        let start = lockstep::Start { state, at: now };
+        let (params, start) = come_up(row.start, scenario, now, &mut dice);
         let ecu = start.ecu(&params).expect("a checked scenario");
         Self {
             row,
@@ -422,10 +371,6 @@ impl<'a> Seat<'a> {
             Some(Motor::Stuck) => self.stuck_nm,
         }
     }
-}
-
-fn is_engaged(start: Start) -> bool {
-    matches!(start, Start::Engaged | Start::Absurd | Start::HeadingWraps)
 }
 
 impl Guidance for Seat<'_> {
