@@ -12,7 +12,11 @@ use crate::{callgrind, tool};
 const REPEAT: &str = "30";
 
 pub(crate) fn run() -> Result<()> {
-    tool::ensure(&[("gcc", "gcc"), ("python3", "python3-venv")])?;
+    tool::ensure(&[
+        ("gcc", "gcc"),
+        ("valgrind", "valgrind"),
+        ("python3", "python3-venv"),
+    ])?;
     let ours = callgrind::build_closed_loop()?;
     let c = build_c()?;
     let python = build_venv()?;
@@ -30,6 +34,13 @@ pub(crate) fn run() -> Result<()> {
     ] {
         println!("{name:<28}{speed:>16.0}{:>11.2}x", ours / speed);
     }
+    let counts = callgrind::count()?;
+    println!(
+        "where our time goes: {} of {} instructions a simulated millisecond are the ECU's (C's ECU is the law and the \
+         bus's protection alone)",
+        counts.per_step,
+        counts.per_simulated_second / 1000
+    );
     Ok(())
 }
 
