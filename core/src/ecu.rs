@@ -17,7 +17,7 @@ use crate::faults::{Fault, FaultSet, History};
 use crate::modes::Mode;
 use crate::monitor::{Evidence, Monitor, MonitorState};
 use crate::params::{Config, Setup};
-use crate::quantity::{Instant, Micros, Torque};
+use crate::quantity::{Instant, Torque};
 use crate::reliance::Sample;
 use crate::vital::{Guarded, vital};
 use receivers::Receivers;
@@ -89,11 +89,10 @@ pub struct Ecu {
     injected: injection::Injected,
 }
 
-/// Spans beyond half a wrap of the clock are negative.
-const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 /// Warnings and lines of the fault history come every so many steps.
 const TURN: u32 = 100;
-/// The monitor is tested every so many steps: twice a second, and on odd steps, which are no turn of other frames.
+/// The monitor is tested every so many steps: twice a second. On odd steps, so that neither the fault history's turn
+/// nor its second, which are even and half a turn apart, ever adds to it.
 const SELF_TEST: u32 = 512;
 
 impl Ecu {
@@ -281,7 +280,7 @@ impl Ecu {
         } else {
             self.warned_at = None;
         }
-        if due(0) {
+        if due(TURN / 2) {
             let total = self.history.records().count();
             let turn = steps / TURN;
             let line = |index| {

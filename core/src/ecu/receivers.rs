@@ -3,7 +3,6 @@
 //! Every receiver is guarded apart, so that a frame costs the check of its own and not of all. Not here: what the
 //! values lead to.
 
-use super::HALF_WRAP;
 use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{Column as ColumnMessage, Demand, LanePreview, Message, TIMEOUT, Vehicle};
@@ -12,8 +11,11 @@ use crate::controller::{Column, Input, Inputs, Request};
 use crate::faults::{Fault, FaultSet};
 use crate::law::LaneSample;
 use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
-use crate::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
+use crate::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
 use crate::vital::{Guarded, Vital};
+
+/// Spans beyond half a wrap of the clock are negative.
+const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 
 /// The latest value of one input, with what judges the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
