@@ -281,16 +281,16 @@ impl Ecu {
             self.warned_at = None;
         }
         if due(TURN / 2) {
-            let total = self.history.records().count();
-            let turn = steps / TURN;
-            let line = |index| {
-                self.history.records().nth(index).map(|record| FaultRecord {
+            let (turn, total) = (steps / TURN, self.history.kinds());
+            let line = |index: u32| {
+                let record = self.history.records().nth(index as usize)?;
+                Some(FaultRecord {
                     index: index as u8,
                     total: total as u8,
                     record,
                 })
             };
-            if let Some(line) = (turn as usize).checked_rem(total).and_then(line) {
+            if let Some(line) = turn.checked_rem(total).and_then(line) {
                 let _ = frames.push(line.encode(turn as u8));
             }
         }

@@ -161,6 +161,8 @@ pub struct History {
     /// How long ago, by fault.
     ages_s: [u16; 15],
     present: FaultSet,
+    /// Appeared since power-up.
+    ever: FaultSet,
     /// Start of the running second, so that ages need no instant that could outlive a wrap of the clock.
     second: Instant,
 }
@@ -175,6 +177,7 @@ impl History {
             counts: [0; 15],
             ages_s: [0; 15],
             present: FaultSet::NONE,
+            ever: FaultSet::NONE,
             second: now,
         }
     }
@@ -183,6 +186,7 @@ impl History {
     pub fn step(&mut self, now: Instant, present: FaultSet) {
         let appeared = present.without(self.present);
         self.present = present;
+        self.ever = self.ever.union(present);
         let another_second = now.since(self.second) >= SECOND;
         if another_second {
             self.second = now;
@@ -199,12 +203,18 @@ impl History {
         }
     }
 
+    /// How many kinds of fault ever appeared.
+    #[must_use]
+    pub const fn kinds(&self) -> u32 {
+        self.ever.bits().count_ones()
+    }
+
     /// Every fault that ever appeared, in the order of the bits.
     pub fn records(&self) -> impl Iterator<Item = Record> {
         let lines = self.counts.iter().zip(&self.ages_s);
         let records = Fault::ALL.into_iter().zip(lines);
         records
-            .filter(|(_, (count, _))| **count > 0)
+            .filter(|(fault, _)| self.ever.contains(*fault))
             .map(|(fault, (count, age_s))| Record {
                 fault,
                 count: *count,

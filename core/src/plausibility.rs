@@ -110,24 +110,20 @@ const SPEED_SPREAD: Speed = Speed::from_mps(2.0);
 /// Whether a new lane sample is no further from the last than a vehicle can move.
 #[must_use]
 pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
-    distance(last.e_y.bits(), new.e_y.bits()) <= i64::from(LANE_STEP.bits())
-        && distance(last.e_theta.bits(), new.e_theta.bits()) <= i64::from(YAW_STEP.bits())
+    last.e_y.bits().abs_diff(new.e_y.bits()) <= LANE_STEP.bits().unsigned_abs()
+        && last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
 }
 
 /// Whether a speed follows from the last one.
 #[must_use]
 pub fn speed_step_is_possible(last: Speed, new: Speed) -> bool {
-    distance(last.bits(), new.bits()) <= i64::from(SPEED_STEP.bits())
+    last.bits().abs_diff(new.bits()) <= SPEED_STEP.bits().unsigned_abs()
 }
 
 /// Whether two sources of speed agree: less than 2 m/s apart.
 #[must_use]
 pub fn speeds_agree(a: Speed, b: Speed) -> bool {
-    distance(a.bits(), b.bits()) < i64::from(SPEED_SPREAD.bits())
-}
-
-fn distance(a: i32, b: i32) -> i64 {
-    i64::from(a).saturating_sub(i64::from(b)).abs()
+    a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
 impl Plausibility {
