@@ -42,16 +42,13 @@ impl Actuator {
         self.oldest = self.oldest.wrapping_add(1);
         if self.fresh > 0 {
             self.fresh = self.fresh.saturating_sub(1);
-            let torque = i64::from(self.delivered.bits());
-            let margin = i64::from(MARGIN.bits());
             let (low, high) = self
                 .commanded
                 .iter()
                 .fold((commanded, commanded), |(low, high), t| {
                     (low.min(*t), high.max(*t))
                 });
-            let near = torque >= i64::from(low.bits()).saturating_sub(margin)
-                && torque <= i64::from(high.bits()).saturating_add(margin);
+            let near = self.delivered >= low.plus(MARGIN.opposite()) && self.delivered <= high.plus(MARGIN);
             self.astray = if near { 0 } else { self.astray.saturating_add(1) };
         }
         self.astray <= PATIENCE
