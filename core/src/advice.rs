@@ -48,9 +48,9 @@ impl Advice {
     }
 
     /// The work for one step, and the telemetry when it is its turn. A step that took a new sample has decoded and
-    /// checked it: the estimator gets it one step later, and the telemetry stands back.
+    /// checked it: the estimator gets it one step later, and the telemetry stands back for up to [`PATIENCE`].
     pub(crate) fn step(&mut self) -> Option<Frame> {
-        let [new, sample] = self.samples;
+        let [new, sample] = &self.samples;
         let mut is_free = new.is_none();
         match (&mut self.reliance, self.probe) {
             (Some(state), Some(_)) => self.estimator.step(state, sample.as_ref()),
@@ -64,16 +64,16 @@ impl Advice {
         }
         let steps = self.steps;
         self.steps = steps.wrapping_add(1);
-        // If there is another soon, that is.
-        self.due |= steps.is_multiple_of(TURN);
-        let now = self.due && (is_free || steps % TURN == PATIENCE);
+        let (turn, place) = (steps / TURN, steps % TURN);
+        self.due |= place == 0;
+        let now = self.due && (is_free || place == PATIENCE);
         self.due &= !now;
         now.then(|| {
             let telemetry = Telemetry {
                 probe: self.probe,
                 reliance: self.reliance.as_ref().and_then(RelianceState::reading),
             };
-            telemetry.encode((steps / TURN) as u8)
+            telemetry.encode(turn as u8)
         })
     }
 }
