@@ -13,14 +13,16 @@ const MARGIN: Torque = Torque::from_nm(0.1);
 const PATIENCE: u32 = 10;
 /// So many steps are judged by one measurement.
 const SPEAKS_FOR: u32 = 4;
-/// Commands that a measurement may be an echo of.
+/// Commands that a measurement may be an echo of. A power of two, so that the place is a mask.
 const COMMANDS: usize = 8;
 
 /// The last commands, and what came of them; at first nothing commanded, nothing delivered.
 #[derive(Debug, Clone, Default)]
 pub struct Actuator {
-    /// Newest first.
+    /// A ring.
     commanded: [Torque; COMMANDS],
+    /// Where the oldest is. Every number names a place, modulo the ring.
+    oldest: usize,
     delivered: Torque,
     /// Steps that the measurement still speaks for.
     fresh: u32,
@@ -36,20 +38,17 @@ impl Actuator {
     /// Takes the command of the last step; `false` when the motor has been away from what it was told for
     /// more than 10 ms. Without a measurement there is nothing to say: its silence is a fault of the column.
     pub fn obeys(&mut self, commanded: Torque) -> bool {
-        self.commanded.rotate_right(1);
-        self.commanded[0] = commanded;
+        self.commanded[self.oldest % COMMANDS] = commanded;
+        self.oldest = self.oldest.wrapping_add(1);
         if self.fresh > 0 {
             self.fresh = self.fresh.saturating_sub(1);
-            let torque = i64::from(self.delivered.bits());
-            let margin = i64::from(MARGIN.bits());
             let (low, high) = self
                 .commanded
                 .iter()
                 .fold((commanded, commanded), |(low, high), t| {
                     (low.min(*t), high.max(*t))
                 });
-            let near = torque >= i64::from(low.bits()).saturating_sub(margin)
-                && torque <= i64::from(high.bits()).saturating_add(margin);
+            let near = self.delivered >= low.plus(MARGIN.opposite()) && self.delivered <= high.plus(MARGIN);
             self.astray = if near { 0 } else { self.astray.saturating_add(1) };
         }
         self.astray <= PATIENCE

@@ -20,7 +20,8 @@ pub(crate) struct Advice {
     estimator: Reliance,
     /// While there is a probe.
     reliance: Option<RelianceState>,
-    sample: Option<Sample>,
+    /// What the last step saw, and the one before.
+    samples: [Option<Sample>; 2],
     probe: Option<Torque>,
     steps: u32,
     /// The telemetry's turn has come.
@@ -33,7 +34,7 @@ impl Advice {
         Self {
             estimator,
             reliance: None,
-            sample: None,
+            samples: [None; 2],
             probe: None,
             steps: 0,
             due: false,
@@ -42,13 +43,15 @@ impl Advice {
 
     /// Takes what a step saw: the column's sample, if it was new, and the probe, if there is one.
     pub(crate) fn take(&mut self, sample: Option<Sample>, probe: Option<Torque>) {
-        (self.sample, self.probe) = (sample, probe);
+        self.samples = [sample, self.samples[0]];
+        self.probe = probe;
     }
 
-    /// The work for one step, and the telemetry when it is its turn.
+    /// The work for one step, and the telemetry when it is its turn. A step that took a new sample has decoded and
+    /// checked it: the estimator gets it one step later, and the telemetry stands back for up to [`PATIENCE`].
     pub(crate) fn step(&mut self) -> Option<Frame> {
-        let sample = self.sample.take();
-        let mut is_free = sample.is_none();
+        let [new, sample] = &self.samples;
+        let mut is_free = new.is_none();
         match (&mut self.reliance, self.probe) {
             (Some(state), Some(_)) => self.estimator.step(state, sample.as_ref()),
             // To begin is work enough for a step.
@@ -61,16 +64,16 @@ impl Advice {
         }
         let steps = self.steps;
         self.steps = steps.wrapping_add(1);
-        // A sample is the most work there is; its step is spared the telemetry, if there is another soon.
-        self.due |= steps.is_multiple_of(TURN);
-        let now = self.due && (is_free || steps % TURN == PATIENCE);
+        let (turn, place) = (steps / TURN, steps % TURN);
+        self.due |= place == 0;
+        let now = self.due && (is_free || place == PATIENCE);
         self.due &= !now;
         now.then(|| {
             let telemetry = Telemetry {
                 probe: self.probe,
                 reliance: self.reliance.as_ref().and_then(RelianceState::reading),
             };
-            telemetry.encode((steps / TURN) as u8)
+            telemetry.encode(turn as u8)
         })
     }
 }

@@ -547,8 +547,7 @@ impl Step<'_> {
 }
 
 fn with(guidance: Torque, probe: Option<Torque>) -> Torque {
-    let probe = probe.unwrap_or(Torque::ZERO);
-    Torque::from_wide(i64::from(guidance.bits()).saturating_add(i64::from(probe.bits())))
+    guidance.plus(probe.unwrap_or(Torque::ZERO))
 }
 
 fn without(torque: Torque, probe: Option<Torque>) -> Torque {

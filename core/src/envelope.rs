@@ -12,7 +12,7 @@
 //! | reduction | abs(T) falls by at most 8 N.m/s, a rounding toward zero included |
 //! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
-use crate::quantity::{Gain, Instant, Micros, Torque, per_second_times, product, saturate};
+use crate::quantity::{Gain, Instant, Micros, Torque, per_second_times, product};
 use crate::vital::vital;
 
 /// Which limit held the torque back.
@@ -139,7 +139,7 @@ impl Envelope {
             self.absolute,
             LimitReason::Absolute,
         );
-        let window = sum(state.anchor.abs(), self.window);
+        let window = state.anchor.abs().plus(self.window);
         hold(&mut command, window.opposite(), window, LimitReason::Window);
         self.hold_rates(&mut command, at);
         // Last, and exempt from the reduction limit: whatever else holds, the driver's hand wins at once.
@@ -152,24 +152,22 @@ impl Envelope {
     /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
-        let step = |rate: Torque| i64::from(saturate(per_second_times(i64::from(rate.bits()), elapsed)));
+        let step = |rate: Torque| Torque::from_wide(per_second_times(i64::from(rate.bits()), elapsed));
         let growth = step(self.wind_up);
-        let fall = step(self.reduction)
-            .saturating_sub(i64::from(ROUNDING.bits()))
-            .max(0);
+        let fall = step(self.reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
         // Judged in the frame where the applied torque is positive.
         let mirror = at.applied.bits().is_negative();
         let turn = |t: Torque| if mirror { t.opposite() } else { t };
-        let applied = i64::from(at.applied.abs().bits());
+        let applied = at.applied.abs();
         let mut turned = (turn(command.0), command.1);
-        let high = Torque::from_wide(applied.saturating_add(growth));
+        let high = applied.plus(growth);
         hold(&mut turned, Torque::MIN, high, LimitReason::WindUp);
         if applied > fall {
-            let low = Torque::from_wide(applied.saturating_sub(fall));
+            let low = applied.plus(fall.opposite());
             hold(&mut turned, low, Torque::MAX, LimitReason::Reduction);
         } else {
             // Across zero: the old torque can fall to zero in this step, and the new one grows from there.
-            let low = Torque::from_wide(growth).opposite();
+            let low = growth.opposite();
             hold(&mut turned, low, Torque::MAX, LimitReason::WindUp);
         }
         *command = (turn(turned.0), turned.1);
@@ -178,7 +176,7 @@ impl Envelope {
     /// `clamp(L + 3*(T_d + 0.8), 0, L)` above, `-clamp(L + 3*(0.8 - T_d), 0, L)` below (defaults).
     fn override_bounds(&self, driver: Torque) -> (Torque, Torque) {
         let bound = |toward: Torque| {
-            let margin = sum(toward, self.override_from);
+            let margin = toward.plus(self.override_from);
             let shrunk = i64::from(self.absolute.bits())
                 .saturating_add(product(self.override_slope.bits(), margin.bits()));
             // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway. Not
@@ -195,8 +193,4 @@ fn hold(command: &mut (Torque, LimitReason), low: Torque, high: Torque, reason: 
     if held != command.0 {
         *command = (held, reason);
     }
-}
-
-fn sum(a: Torque, b: Torque) -> Torque {
-    Torque::from_wide(i64::from(a.bits()).saturating_add(i64::from(b.bits())))
 }

@@ -158,10 +158,14 @@ pub struct Record {
 pub struct History {
     /// How often, by fault.
     counts: [u8; 15],
-    /// How long ago, by fault.
-    ages_s: [u16; 15],
+    /// In which second, by fault. A step counts one second on, and no age.
+    seen_s: [u32; 15],
     present: FaultSet,
-    /// Start of the running second, so that ages need no instant that could outlive a wrap of the clock.
+    /// Appeared since power-up.
+    ever: FaultSet,
+    /// Whole seconds since power-up, saturating: no instant that could outlive a wrap of the clock.
+    seconds: u32,
+    /// Start of the running one.
     second: Instant,
 }
 
@@ -173,8 +177,10 @@ impl History {
     pub const fn new(now: Instant) -> Self {
         Self {
             counts: [0; 15],
-            ages_s: [0; 15],
+            seen_s: [0; 15],
             present: FaultSet::NONE,
+            ever: FaultSet::NONE,
+            seconds: 0,
             second: now,
         }
     }
@@ -183,32 +189,38 @@ impl History {
     pub fn step(&mut self, now: Instant, present: FaultSet) {
         let appeared = present.without(self.present);
         self.present = present;
-        let another_second = now.since(self.second) >= SECOND;
-        if another_second {
+        self.ever = self.ever.union(present);
+        if now.since(self.second) >= SECOND {
             self.second = now;
+            self.seconds = self.seconds.saturating_add(1);
         }
-        if !another_second && appeared == FaultSet::NONE {
+        if appeared == FaultSet::NONE {
             return;
         }
-        let lines = self.counts.iter_mut().zip(&mut self.ages_s);
-        for (fault, (count, age_s)) in Fault::ALL.into_iter().zip(lines) {
-            *age_s = age_s.saturating_add(u16::from(another_second));
+        let lines = self.counts.iter_mut().zip(&mut self.seen_s);
+        for (fault, (count, seen_s)) in Fault::ALL.into_iter().zip(lines) {
             if appeared.contains(fault) {
-                (*count, *age_s) = (count.saturating_add(1), 0);
+                (*count, *seen_s) = (count.saturating_add(1), self.seconds);
             }
         }
     }
 
+    /// How many kinds of fault ever appeared.
+    #[must_use]
+    pub const fn kinds(&self) -> u32 {
+        self.ever.bits().count_ones()
+    }
+
     /// Every fault that ever appeared, in the order of the bits.
     pub fn records(&self) -> impl Iterator<Item = Record> {
-        let lines = self.counts.iter().zip(&self.ages_s);
+        let lines = self.counts.iter().zip(&self.seen_s);
         let records = Fault::ALL.into_iter().zip(lines);
         records
-            .filter(|(_, (count, _))| **count > 0)
-            .map(|(fault, (count, age_s))| Record {
+            .filter(|(fault, _)| self.ever.contains(*fault))
+            .map(|(fault, (count, seen_s))| Record {
                 fault,
                 count: *count,
-                age_s: *age_s,
+                age_s: self.seconds.saturating_sub(*seen_s).min(u32::from(u16::MAX)) as u16,
             })
     }
 }

@@ -86,7 +86,7 @@ const RATE_BITS: u32 = 20;
 
 /// Largest rate the filter may hold, 1000 m/s or rad/s. No road or vehicle comes near it; the clamp keeps
 /// every product of the step inside an `i64` whatever the samples are.
-const MAX_RATE: i64 = 1000 << RATE_BITS;
+const MAX_RATE: u64 = 1000 << RATE_BITS;
 
 impl Law {
     /// The torque that the law asks for now, from the latest sample received.
@@ -117,20 +117,12 @@ impl Law {
             .saturating_sub(i64::from(from))
             .saturating_mul(1_000_000 << 4);
         let sum = tau.saturating_mul(i64::from(rate)).saturating_add(change);
-        let span = tau.saturating_add(i64::from(dt.us()) << 8);
-        // Half the divisor is added for rounding, with the sign of the sum since `/` truncates. The divisor
-        // is never zero (tau is at least 2.6 ms, params.rs); `checked_div` says so without a panic path.
-        let half = if sum < 0 {
-            span.wrapping_neg() >> 1
-        } else {
-            span >> 1
-        };
-        saturate(
-            sum.saturating_add(half)
-                .checked_div(span)
-                .unwrap_or(0)
-                .clamp(-MAX_RATE, MAX_RATE),
-        )
+        let span = tau.saturating_add(i64::from(dt.us()) << 8).unsigned_abs();
+        // Rounded to nearest. The divisor is never zero (tau is at least 2.6 ms, params.rs); `checked_div` says so
+        // without a panic path.
+        let size = sum.unsigned_abs().saturating_add(span >> 1);
+        let size = saturate(size.checked_div(span).unwrap_or(0).min(MAX_RATE).cast_signed());
+        if sum < 0 { size.saturating_neg() } else { size }
     }
 
     /// Exact wide products, one rounding. Gains have 24 fractional bits, errors are cut to 20 like the

@@ -21,7 +21,7 @@
 
 use crate::law::LaneSample;
 use crate::quantity::{
-    FRAC_BITS, Gain, Instant, Metres, Micros, Radians, Speed, Torque, per_second_times, product,
+    FRAC_BITS, Gain, Instant, Metres, Micros, Radians, Speed, Torque, per_second_times, product, saturate,
 };
 use crate::vital::vital;
 
@@ -50,8 +50,8 @@ vital! {
     pub struct PlausibilityState {
         speed: Speed,
         wheel: Radians,
-        /// Rate of the direction of movement, 2^-24 rad/s.
-        turning: Gain,
+        /// Rate of the direction of movement per wheel angle at this speed, 1/s.
+        turning_gain: Gain,
         has_lane: u32,
         lane: LaneSample,
         lane_predicted: Gain,
@@ -67,7 +67,7 @@ impl PlausibilityState {
     pub const NEW: Self = Self {
         speed: Speed::ZERO,
         wheel: Radians::ZERO,
-        turning: Gain::ZERO,
+        turning_gain: Gain::ZERO,
         has_lane: 0,
         lane: LaneSample {
             e_y: Metres::ZERO,
@@ -80,6 +80,11 @@ impl PlausibilityState {
         column_at: Instant::from_us(0),
         column_sum: Gain::ZERO,
     };
+
+    /// chi_dot, the rate of the direction of movement, 2^-24 rad/s.
+    fn turning(&self) -> i32 {
+        saturate(product(self.turning_gain.bits(), self.wheel.bits()))
+    }
 
     /// The lane was lost: what comes next has no past.
     pub fn forget_lane(&mut self) {
@@ -101,37 +106,37 @@ const YAW_STEP: Radians = Radians::from_rad(0.1);
 const SPEED_STEP: Speed = Speed::from_mps(1.0);
 /// Two sources that differ by this much are not both right.
 const SPEED_SPREAD: Speed = Speed::from_mps(2.0);
-/// The sums forget with this time constant.
-const MEMORY_US: i64 = 1_000_000;
 
 /// Whether a new lane sample is no further from the last than a vehicle can move.
 #[must_use]
 pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
-    distance(last.e_y.bits(), new.e_y.bits()) <= i64::from(LANE_STEP.bits())
-        && distance(last.e_theta.bits(), new.e_theta.bits()) <= i64::from(YAW_STEP.bits())
+    last.e_y.bits().abs_diff(new.e_y.bits()) <= LANE_STEP.bits().unsigned_abs()
+        && last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
 }
 
 /// Whether a speed follows from the last one.
 #[must_use]
 pub fn speed_step_is_possible(last: Speed, new: Speed) -> bool {
-    distance(last.bits(), new.bits()) <= i64::from(SPEED_STEP.bits())
+    last.bits().abs_diff(new.bits()) <= SPEED_STEP.bits().unsigned_abs()
 }
 
 /// Whether two sources of speed agree: less than 2 m/s apart.
 #[must_use]
 pub fn speeds_agree(a: Speed, b: Speed) -> bool {
-    distance(a.bits(), b.bits()) < i64::from(SPEED_SPREAD.bits())
-}
-
-fn distance(a: i32, b: i32) -> i64 {
-    i64::from(a).saturating_sub(i64::from(b)).abs()
+    a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
 impl Plausibility {
-    /// Takes the speed in use; returns nothing, for it has no counterpart but its second source.
+    /// Takes the speed in use; returns nothing, for it has no counterpart but its second source. How fast the
+    /// vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle
+    /// model.
     pub fn speed(&self, state: &mut PlausibilityState, speed: Speed) {
         state.speed = speed;
-        self.update_turning(state);
+        let v = speed.bits();
+        let slip = (i64::from(self.stability_factor.bits()).saturating_mul(product(v, v))) >> FRAC_BITS;
+        let divisor = slip.saturating_add(1 << FRAC_BITS);
+        let gain = (i64::from(self.curvature_gain.bits()).saturating_mul(i64::from(v))).checked_div(divisor);
+        state.turning_gain = Gain::from_wide(gain.unwrap_or(0));
     }
 
     /// Takes driver torque, wheel angle and the guidance torque applied; `false` when they cannot belong
@@ -149,7 +154,7 @@ impl Plausibility {
         let dt = now.since(state.column_at);
         if state.has_column != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
-            let lateral = product(state.speed.bits(), state.turning.bits());
+            let lateral = product(state.speed.bits(), state.turning());
             let aligning = i64::from(self.aligning_gain.bits()).saturating_mul(lateral) >> FRAC_BITS;
             let torque = i64::from(driver.bits())
                 .saturating_add(i64::from(applied.bits()))
@@ -159,7 +164,6 @@ impl Plausibility {
             state.column_sum = leak(state.column_sum, change, dt);
         }
         (state.has_column, state.column_at, state.wheel) = (1, now, wheel);
-        self.update_turning(state);
         i64::from(state.column_sum.bits()).abs() <= i64::from(self.column_margin.bits())
     }
 
@@ -170,7 +174,7 @@ impl Plausibility {
         if state.has_lane != 0 && dt.us() != 0 {
             let heading = product(state.speed.bits(), state.lane.e_theta.bits());
             let far = product(self.far_time.bits(), state.speed.bits());
-            let turned = (far.saturating_mul(i64::from(state.turning.bits()))) >> FRAC_BITS;
+            let turned = (far.saturating_mul(i64::from(state.turning()))) >> FRAC_BITS;
             let predicted = per_second_times(heading.saturating_sub(turned), dt);
             let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.e_y.bits()));
             state.lane_predicted = leak(state.lane_predicted, predicted, dt);
@@ -203,22 +207,11 @@ impl Plausibility {
         };
         (Metres::from_wide(missing), state.column_sum)
     }
-
-    /// `chi_dot = v*K_t*phi / (l*(1 + A*v^2))`, the steady state of the bicycle model.
-    fn update_turning(&self, state: &mut PlausibilityState) {
-        let v = state.speed.bits();
-        let slip = (i64::from(self.stability_factor.bits()).saturating_mul(product(v, v))) >> FRAC_BITS;
-        let divisor = slip.saturating_add(1 << FRAC_BITS);
-        let curvature = product(self.curvature_gain.bits(), state.wheel.bits());
-        let turning = (curvature.saturating_mul(i64::from(v))).checked_div(divisor);
-        state.turning = Gain::from_wide(turning.unwrap_or(0));
-    }
 }
 
-/// A leaking sum: `sum + change - sum*dt/memory`.
+/// A leaking sum: `sum + change - sum*dt/(1 s)`.
 fn leak(sum: Gain, change: i64, dt: Micros) -> Gain {
-    let dt = i64::from(dt.us()).min(MEMORY_US);
     let sum = i64::from(sum.bits());
-    let kept = sum.saturating_sub(sum.saturating_mul(dt) / MEMORY_US);
+    let kept = sum.saturating_sub(per_second_times(sum, dt));
     Gain::from_wide(kept.saturating_add(change))
 }

@@ -99,6 +99,12 @@ impl Torque {
         Self(self.0.saturating_abs())
     }
 
+    /// The sum, saturating.
+    #[must_use]
+    pub const fn plus(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+
     /// The torque of opposite direction. The most negative value saturates.
     #[must_use]
     pub const fn opposite(self) -> Self {

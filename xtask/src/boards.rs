@@ -156,12 +156,14 @@ fn of_image(elf: &Path) -> Result<Vec<Figure>> {
 }
 
 /// What a whole run over paper-course takes in QEMU, every frame of it compared: the stack that the lockstep image
-/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick and `Ecu::step`.
+/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick, `Ecu::step` and `Ecu::advise`. The
+/// probe is on, so that the estimator works.
 fn in_qemu(board: Board) -> Result<Vec<Figure>> {
     let text = tool::output(
         tool::cargo()
             .args(["run", "--release", "-p", "host-sim", "--", "pil"])
-            .args(["--machine", board.feature(), "--count", "--json"]),
+            .args(["--machine", board.feature(), "--count", "--json"])
+            .arg("examples/live-estimate.toml"),
     )?;
     let report: Value = serde_json::from_str(&text).context("host-sim pil --json")?;
     let steps = report["steps"].as_u64().unwrap_or(0);

@@ -56,25 +56,32 @@ impl Ecu {
     }
 
     fn flip(&mut self, region: Region, bit: usize) -> usize {
+        let mut words = 0;
         match region {
-            Region::Config => flip(&mut self.controller.config, bit),
-            Region::Controller => flip(&mut self.state.vitals, bit),
-            Region::Ecu => flip(&mut self.vitals, bit),
-            Region::Monitor => flip(&mut self.monitor, bit),
+            Region::Config => flip(&mut self.controller.config, bit, &mut words),
+            Region::Controller => flip(&mut self.state.vitals, bit, &mut words),
+            Region::Ecu => {
+                flip(&mut self.receivers.lane, bit, &mut words);
+                flip(&mut self.receivers.column, bit, &mut words);
+                flip(&mut self.receivers.speeds, bit, &mut words);
+                flip(&mut self.receivers.request, bit, &mut words);
+                flip(&mut self.vitals, bit, &mut words);
+            }
+            Region::Monitor => flip(&mut self.monitor, bit, &mut words),
         }
+        words.saturating_mul(32)
     }
 }
 
-/// Flips a bit and returns how many there are.
-fn flip<T: Vital>(guarded: &mut Guarded<T>, bit: usize) -> usize {
-    let mut first = 0_usize;
+/// Flips a bit of a region if it lies here, `words` words into it, and counts the words.
+fn flip<T: Vital>(guarded: &mut Guarded<T>, bit: usize, words: &mut usize) {
     guarded.change_copies(&mut |word| {
-        let mask = bit
-            .checked_sub(first)
-            .filter(|at| *at < 32)
-            .map_or(0, |at| 1_u32.wrapping_shl(at as u32));
-        first = first.saturating_add(32);
+        let mask = if bit / 32 == *words {
+            1_u32.wrapping_shl(bit as u32)
+        } else {
+            0
+        };
+        *words = words.saturating_add(1);
         word ^ mask
     });
-    first
 }

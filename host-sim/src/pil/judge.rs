@@ -89,8 +89,8 @@ impl fmt::Display for Decoded {
     }
 }
 
-/// What the target spent on the ticks of a run, all frames received and the step: instructions in QEMU, cycles of
-/// the core on a board.
+/// What the target spent on the ticks of a run, all frames received, the step and the advice: instructions in QEMU,
+/// cycles of the core on a board.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Spent {
     /// The most of any tick.
@@ -99,7 +99,7 @@ pub struct Spent {
     pub worst_step: u64,
     /// The mean.
     pub mean: f64,
-    /// The most of any advice: what the controller does after its frames have left.
+    /// The most of any advice alone: what the controller does after its frames have left.
     pub worst_advice: u32,
     /// Its mean.
     pub mean_advice: f64,
@@ -165,7 +165,7 @@ impl Judge {
         Ok(self.report)
     }
 
-    /// Compares one answer. Returns what the step and the advice cost.
+    /// Compares one answer. Returns what the step with its advice cost, and the advice alone.
     fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
@@ -199,7 +199,7 @@ impl Judge {
         }
     }
 
-    /// What a step and its advice cost.
+    /// What a step with its advice cost, and the advice alone.
     fn account(&mut self, cost: StepCost) -> [u32; 2] {
         let cycles = [cost.cycles, cost.advice_cycles];
         let (spent, most) = match self.counter {
@@ -208,11 +208,12 @@ impl Judge {
             Counter::Cycles => (cycles, &mut self.report.cycles),
         };
         let most = most.get_or_insert_default();
-        if spent[0] > most.worst {
-            most.worst = spent[0];
+        let [step, advice] = spent;
+        if step + advice > most.worst {
+            most.worst = step + advice;
             most.worst_step = self.report.steps;
         }
-        most.worst_advice = most.worst_advice.max(spent[1]);
-        spent
+        most.worst_advice = most.worst_advice.max(advice);
+        [step + advice, advice]
     }
 }

@@ -1,0 +1,229 @@
+//! What the ECU hears: for each input the latest value, with what judges the next.
+//!
+//! Every receiver is guarded apart, so that a frame costs the check of its own and not of all. Not here: what the
+//! values lead to.
+
+use crate::actuator::Actuator;
+use crate::bus::e2e::ReceiverState;
+use crate::bus::messages::{Column as ColumnMessage, Demand, LanePreview, Message, TIMEOUT, Vehicle};
+use crate::bus::{Frame, Reject};
+use crate::controller::{Column, Input, Inputs, Request};
+use crate::faults::{Fault, FaultSet};
+use crate::law::LaneSample;
+use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
+use crate::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use crate::vital::{Guarded, Vital};
+
+/// Spans beyond half a wrap of the clock are negative.
+const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
+
+/// The latest value of one input, with what judges the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+pub(super) struct Slot<T> {
+    e2e: ReceiverState,
+    /// [`LOST`], [`HELD`] or [`NEW`], as an [`Input`].
+    state: u32,
+    /// 1 when the sender did not vouch for its last value.
+    invalid: u32,
+    /// When it was true.
+    at: Instant,
+    value: T,
+}
+
+/// Nothing heard, or not for too long.
+const LOST: u32 = 0;
+/// A value that a step has seen.
+const HELD: u32 = 1;
+/// A value that no step has seen.
+const NEW: u32 = 2;
+
+impl<T: Vital> Vital for Slot<T> {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self {
+            e2e: self.e2e.map_words(change),
+            state: change(self.state),
+            invalid: change(self.invalid),
+            at: self.at.map_words(change),
+            value: self.value.map_words(change),
+        }
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        self.e2e.is_inverse_of(&other.e2e)
+            & self.state.is_inverse_of(&other.state)
+            & self.invalid.is_inverse_of(&other.invalid)
+            & self.at.is_inverse_of(&other.at)
+            & self.value.is_inverse_of(&other.value)
+    }
+}
+
+impl<T: Vital> Slot<T> {
+    /// Nothing heard; `value` only fills the place.
+    fn guarded(e2e: ReceiverState, value: T, now: Instant) -> Guarded<Self> {
+        Guarded::new(Self {
+            e2e,
+            state: LOST,
+            invalid: 0,
+            at: now,
+            value,
+        })
+    }
+
+    fn put(&mut self, value: T, at: Instant) {
+        (self.state, self.value, self.at) = (NEW, value, at);
+    }
+
+    fn last(&self) -> Option<T> {
+        (self.state != LOST).then_some(self.value)
+    }
+
+    /// What a step sees. A stale value is dropped, so that no instant outlives a wrap of the clock, and its
+    /// sender has to be trusted anew.
+    fn take(&mut self, now: Instant) -> Input<T> {
+        if self.state != LOST && now.since(self.at) > TIMEOUT {
+            self.state = LOST;
+            self.e2e = ReceiverState::NEW;
+        }
+        let seen = self.state;
+        self.state = seen.min(HELD);
+        match seen {
+            LOST => Input::Lost,
+            HELD => Input::Held(self.value),
+            _ => Input::New(self.value),
+        }
+    }
+}
+
+/// Bytes of frames accepted since the last step, for the monitor's own decoding.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Accepted {
+    pub(super) lane: Option<[u8; 8]>,
+    pub(super) column: Option<[u8; 8]>,
+    pub(super) demand: Option<[u8; 8]>,
+}
+
+/// The receivers of all inputs.
+#[derive(Debug, Clone)]
+pub(super) struct Receivers {
+    pub(super) lane: Guarded<Slot<LaneSample>>,
+    pub(super) column: Guarded<Slot<Column>>,
+    pub(super) speeds: Guarded<Slot<[Speed; 2]>>,
+    pub(super) request: Guarded<Slot<Request>>,
+    pub(super) actuator: Actuator,
+    pub(super) accepted: Accepted,
+}
+
+impl Receivers {
+    /// Nothing heard; `e2e` says whether the senders are trusted already.
+    pub(super) fn new(e2e: ReceiverState, now: Instant) -> Self {
+        let lane = LaneSample {
+            e_y: Metres::ZERO,
+            e_theta: Radians::ZERO,
+            at: now,
+        };
+        let column = Column {
+            driver_torque: Torque::ZERO,
+            wheel_angle: Radians::ZERO,
+        };
+        let request = Request {
+            engage: 0,
+            authority: Gain::ZERO,
+            probe: 0,
+        };
+        Self {
+            lane: Slot::guarded(e2e, lane, now),
+            column: Slot::guarded(e2e, column, now),
+            speeds: Slot::guarded(e2e, [Speed::ZERO; 2], now),
+            request: Slot::guarded(e2e, request, now),
+            actuator: Actuator::default(),
+            accepted: Accepted::default(),
+        }
+    }
+
+    /// Takes a frame. `None` if the receiver that it is for is damaged.
+    pub(super) fn receive(&mut self, frame: &Frame, now: Instant) -> Option<Result<(), Reject>> {
+        let Self {
+            actuator, accepted, ..
+        } = self;
+        match frame.id() {
+            LanePreview::ID => self.lane.change(|slot| {
+                let lane = LanePreview::decode(&mut slot.e2e, frame)?;
+                slot.invalid = u32::from(!lane.valid);
+                if !lane.valid {
+                    return Ok(());
+                }
+                let at = now.before(lane.age);
+                let sample = LaneSample {
+                    e_y: lane.e_y,
+                    e_theta: lane.e_theta,
+                    at,
+                };
+                if let Some(last) = slot.last() {
+                    // A span of almost a whole wrap of the clock is a step back in time: what differences
+                    // samples would take it for a gap and start anew.
+                    if at.since(last.at) > HALF_WRAP {
+                        return Err(Reject::Older);
+                    }
+                    if !lane_step_is_possible(&last, &sample) {
+                        return Err(Reject::Step);
+                    }
+                }
+                slot.put(sample, at);
+                accepted.lane = frame.full_data();
+                Ok(())
+            }),
+            ColumnMessage::ID => self.column.change(|slot| {
+                let c = ColumnMessage::decode(&mut slot.e2e, frame)?;
+                let column = Column {
+                    driver_torque: c.driver_torque,
+                    wheel_angle: c.wheel_angle,
+                };
+                slot.put(column, now);
+                actuator.deliver(c.motor_torque);
+                accepted.column = frame.full_data();
+                Ok(())
+            }),
+            Vehicle::ID => self.speeds.change(|slot| {
+                let speeds = Vehicle::decode(&mut slot.e2e, frame)?.speeds;
+                let follows = |last: [Speed; 2]| {
+                    last.iter()
+                        .zip(&speeds)
+                        .all(|(last, new)| speed_step_is_possible(*last, *new))
+                };
+                if slot.last().is_some_and(|last| !follows(last)) {
+                    return Err(Reject::Step);
+                }
+                slot.put(speeds, now);
+                Ok(())
+            }),
+            Demand::ID => self.request.change(|slot| {
+                let demand = Demand::decode(&mut slot.e2e, frame)?;
+                let request = Request {
+                    engage: u32::from(demand.engage),
+                    authority: demand.authority,
+                    probe: u32::from(demand.probe),
+                };
+                slot.put(request, now);
+                accepted.demand = frame.full_data();
+                Ok(())
+            }),
+            _ => Some(Ok(())),
+        }
+    }
+
+    /// What a step sees, or `None` if a receiver is damaged.
+    pub(super) fn take(&mut self, now: Instant) -> Option<Inputs> {
+        let (lane, invalid) = self.lane.change(|slot| (slot.take(now), slot.invalid != 0))?;
+        let mut faults = FaultSet::NONE;
+        // An invalid preview is the reason of a time-out, not a fault by itself: one may be a blink.
+        faults.insert_if(lane == Input::Lost && invalid, Fault::LaneInvalid);
+        Some(Inputs {
+            lane,
+            column: self.column.change(|slot| slot.take(now))?,
+            speeds: self.speeds.change(|slot| slot.take(now))?,
+            request: self.request.change(|slot| slot.take(now))?,
+            faults,
+        })
+    }
+}
