@@ -86,6 +86,18 @@ impl PlausibilityState {
         saturate(product(self.turning_gain.bits(), self.wheel.bits()))
     }
 
+    /// The movement predicted, and what of it was not seen, positive in its direction. 2^-24 m.
+    fn missing(&self) -> (i64, i64) {
+        let predicted = i64::from(self.lane_predicted.bits());
+        let missing = predicted.saturating_sub(i64::from(self.lane_seen.bits()));
+        let missing = if predicted.is_negative() {
+            missing.saturating_neg()
+        } else {
+            missing
+        };
+        (predicted, missing)
+    }
+
     /// The lane was lost: what comes next has no past.
     pub fn forget_lane(&mut self) {
         (self.has_lane, self.lane_predicted, self.lane_seen) = (0, Gain::ZERO, Gain::ZERO);
@@ -181,16 +193,8 @@ impl Plausibility {
             state.lane_seen = leak(state.lane_seen, seen, dt);
         }
         (state.has_lane, state.lane) = (1, sample);
-        let (predicted, seen) = (
-            i64::from(state.lane_predicted.bits()),
-            i64::from(state.lane_seen.bits()),
-        );
+        let (predicted, missing) = state.missing();
         let margin = i64::from(self.lane_margin.bits());
-        let missing = if predicted < 0 {
-            seen.saturating_sub(predicted)
-        } else {
-            predicted.saturating_sub(seen)
-        };
         // Half the margin has to be predicted: a movement that nothing predicts is no proof of a fault.
         missing <= margin || predicted.abs() <= margin >> 1
     }
@@ -198,14 +202,7 @@ impl Plausibility {
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
     pub fn used(state: &PlausibilityState) -> (Metres, Gain) {
-        let predicted = i64::from(state.lane_predicted.bits());
-        let missing = predicted.saturating_sub(i64::from(state.lane_seen.bits()));
-        let missing = if predicted < 0 {
-            missing.wrapping_neg()
-        } else {
-            missing
-        };
-        (Metres::from_wide(missing), state.column_sum)
+        (Metres::from_wide(state.missing().1), state.column_sum)
     }
 }
 

@@ -317,6 +317,41 @@ fn lane(e_y: f64, e_theta: f64) -> LaneSample {
 }
 
 #[test]
+fn what_was_lost_is_not_held_against_what_comes() {
+    let checks = Config::PAPER.plausibility;
+    let mut state = PlausibilityState::NEW;
+    checks.speed(&mut state, Speed::from_mps(20.0));
+    let at = |ms: u32| Instant::from_us(1_000).after(Micros::from_ms(ms));
+    let full = |state: &mut PlausibilityState, ms| {
+        checks.column(state, at(ms), Torque::from_nm(20.0), Radians::ZERO, Torque::ZERO)
+    };
+    let standing = |state: &mut PlausibilityState, ms| {
+        let sample = lane(0.0, 0.05);
+        checks.lane(state, LaneSample { at: at(ms), ..sample })
+    };
+    // 1 m/s to the side that does not come, and 20 N.m that turn nothing: one sample before each margin.
+    assert!((0..=496).step_by(8).all(|ms| standing(&mut state, ms)));
+    assert!((0..=28).step_by(2).all(|ms| full(&mut state, ms)));
+    let used = |state: &PlausibilityState| {
+        let (lane, column) = Plausibility::used(state);
+        [lane.m(), column.si()]
+    };
+    // 1 - exp(-t) metres after 0.496 s; 20 N.m for 28 ms, less what 1 s of memory forgets.
+    let [seen, summed] = used(&state);
+    assert!((seen - 0.391).abs() < 2e-3, "{seen}");
+    assert!((summed - 0.552).abs() < 2e-3, "{summed}");
+    let mut lost = state.clone();
+    lost.forget_lane();
+    lost.forget_column();
+    assert_eq!(used(&lost), [0.0, 0.0]);
+    // After a second without frames: with its past the state would take both for the end of one long movement.
+    assert!(standing(&mut lost, 1_500) && full(&mut lost, 1_500));
+    assert_eq!(used(&lost), [0.0, 0.0]);
+    assert!(!full(&mut state, 1_500));
+    assert!(!standing(&mut state, 1_500));
+}
+
+#[test]
 fn steps_at_their_edges() {
     const LSB: f64 = 1.0 / 16_777_216.0;
     let (y, theta) = (Metres::from_m(0.3).m(), Radians::from_rad(0.1).rad());
