@@ -5,7 +5,7 @@
 //! end of the course. Order within a step: look at the road, let the guidance decide, record, then let the
 //! plant move for 1 ms under the torque decided.
 //!
-//! A run has *diverged* when the centre of gravity is more than a lane width off the centreline, when the
+//! A run has *diverged* when the centre of gravity is more than 10 m off the centreline, when the
 //! direction of movement is more than 90 degrees off the road's at a far point, or when a look-ahead point has
 //! no unique foot on the centreline. It is stopped there and flagged; its samples up to there are finite.
 
@@ -18,6 +18,9 @@ use crate::models::road::{Centreline, Foot, Tracker};
 use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::scenario::{Condition, FAILURE_REACTION_S, FailureKind, Scenario, Sensors};
 use crate::trace::{Sample, Trace};
+
+/// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
+const DIVERGED_M: f64 = 10.0;
 
 /// Samples per second of a trace.
 pub const SAMPLE_RATE_HZ: u32 = 200;
@@ -205,7 +208,7 @@ pub fn drive<G: Guidance, O: Observer>(
             let Some(foot) = centreline.project(x, y, &mut body) else {
                 break diverged;
             };
-            if foot.offset_m.abs() > centreline.lane_width_m() {
+            if foot.offset_m.abs() > DIVERGED_M {
                 break diverged;
             }
             trace

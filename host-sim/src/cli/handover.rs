@@ -1,35 +1,35 @@
 //! `host-sim handover`.
 
 use clap::Args;
-use host_sim::studies::handover::{MOST, ROWS, Row, study};
+use host_sim::studies::handover::{ROWS, Results, Row, study};
 
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Print the rows as one JSON list instead of a table
+    /// Print the results as one JSON object instead of a table
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let bar = progress::bar(ROWS as u64, "rows");
-    let rows = study(|| bar.inc(1))?;
+    let results = study(|| bar.inc(1))?;
     bar.finish_and_clear();
     if arguments.json {
-        print_json(&rows)?;
+        print_json(&results)?;
     } else {
-        print(&readable(&rows))?;
+        print(&readable(&results))?;
     }
-    Ok(if rows.iter().any(Row::is_broken) {
+    Ok(if results.rows.iter().any(Row::is_broken) {
         Outcome::Failed
     } else {
         Outcome::Good
     })
 }
 
-fn readable(rows: &[Row]) -> String {
+fn readable(results: &Results) -> String {
     let headings = [
         "km/h",
         "t_p/s",
@@ -43,7 +43,7 @@ fn readable(rows: &[Row]) -> String {
         "",
     ];
     let mut lines = vec![headings.map(String::from).to_vec()];
-    for row in rows {
+    for row in &results.rows {
         let verdict = match (row.manual_stable, row.is_judged(), row.is_broken()) {
             (false, ..) => "manual driver unstable",
             (true, false, _) => "not judged",
@@ -63,12 +63,12 @@ fn readable(rows: &[Row]) -> String {
             verdict.into(),
         ]);
     }
-    let judged = rows.iter().filter(|row| row.is_judged());
-    let worst = judged.filter_map(|row| row.handover_ratio).fold(0.0, f64::max);
     format!(
         "Peak lateral error in the first curve of paper-course, stretched to the speed (0.93 m/s2), failure in the \
          arc.\nRatio: over the larger of the no-failure and the manual peak.\n\n{}\nLargest handover ratio of a \
-         judged row: {worst:.2} (at most {MOST}).",
-        table::text(&lines)
+         judged row: {:.2} (at most {}).",
+        table::text(&lines),
+        results.largest_judged_ratio,
+        results.most
     )
 }

@@ -69,7 +69,12 @@ enum Outcome {
     Good,
     /// A check or a comparison failed.
     Failed,
+    /// By a signal.
+    Interrupted,
 }
+
+/// What shells report of a program that was interrupted: 128 and the signal's number.
+const INTERRUPTED: u8 = 130;
 
 /// Why a command could not do its work: a message for people.
 #[derive(Debug)]
@@ -98,6 +103,7 @@ pub(crate) fn main() -> ExitCode {
     match result {
         Ok(Outcome::Good) => ExitCode::SUCCESS,
         Ok(Outcome::Failed) => ExitCode::from(1),
+        Ok(Outcome::Interrupted) => ExitCode::from(INTERRUPTED),
         Err(BadInput(message)) => {
             eprintln!("error: {message}");
             ExitCode::from(2)

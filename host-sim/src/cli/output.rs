@@ -9,14 +9,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use host_sim::report::FileSet;
 use host_sim::studies::OutputError;
 
-use super::BadInput;
+use super::{BadInput, INTERRUPTED};
 
 /// What an interrupt has to remove. Locked while a set begins and while its files are moved into place, so that
 /// an interrupt waits.
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
-
-/// What shells report of a program that was interrupted: 128 and the signal's number.
-const INTERRUPTED: i32 = 130;
 
 pub(super) struct Output {
     files: FileSet,
@@ -32,7 +29,7 @@ impl Output {
                 // What stays is cleared by the next run.
                 let _ = std::fs::remove_dir_all(staging);
             }
-            process::exit(INTERRUPTED);
+            process::exit(INTERRUPTED.into());
         })?;
         let mut unfinished = lock_unfinished();
         let files = FileSet::begin(directory)?;

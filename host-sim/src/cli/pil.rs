@@ -1,6 +1,8 @@
 //! `host-sim pil [SCENARIO.toml]`.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use host_sim::input::InputError;
@@ -33,6 +35,9 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Set by an interrupt or a request to terminate: QEMU must not outlive this program.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let scenario = match &arguments.scenario {
         Some(path) => Scenario::load(path)?,
@@ -48,11 +53,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             count: arguments.count,
         },
     };
+    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed))?;
     let result = processor::run(&scenario, &target, |step| {
         // A thousand updates a second would cost more than the steps.
         if step.is_multiple_of(1000) {
             bar.set_position(step.into());
         }
+        if INTERRUPTED.load(Ordering::Relaxed) {
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
     });
     bar.finish_and_clear();
     let report = match result {
@@ -64,6 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
                 .map_or("pil".into(), Path::to_string_lossy);
             return Err(InputError::new(name, message).into());
         }
+        Err(ProcessorError::Interrupted) => return Ok(Outcome::Interrupted),
         Err(ProcessorError::Target(error @ PilError::Missing(_))) => return Err(error.into()),
         // A target that cannot be built, started or heard is a comparison that failed, not bad usage.
         Err(ProcessorError::Target(error)) => {

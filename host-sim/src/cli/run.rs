@@ -20,7 +20,7 @@ pub(super) struct Arguments {
     /// Directory for a figure, the time series, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Also every frame of the bus, as `candump -L` writes it (bus.log, some 20 MB for paper-course); read it with
+    /// Also every frame of the bus, as `candump -L` writes it (bus.log, some 14 MB for paper-course); read it with
     /// `cantools decode core/haptic.dbc < bus.log`
     #[arg(long, requires = "out")]
     bus_log: bool,

@@ -2,13 +2,12 @@
 //! the envelope alone.
 
 use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Request};
-use haptic_core::envelope::LimitReason;
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
 use haptic_core::params::Setup;
 use haptic_core::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
 
-use super::{Applied, Guidance, View};
+use super::{Applied, Guidance, View, is_limited};
 
 /// The shipping controller, fed directly and active from the start.
 #[derive(Debug, Clone)]
@@ -66,7 +65,7 @@ impl Guidance for Direct {
         let command = self.controller.step(&mut self.state, now, applied, &inputs);
         Applied {
             torque_nm: command.torque.nm(),
-            limited: command.limit != LimitReason::None,
+            limited: is_limited(command.limit),
         }
     }
 }

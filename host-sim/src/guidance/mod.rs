@@ -12,6 +12,7 @@ mod float_law;
 mod over_bus;
 
 use haptic_core::bus::Frame;
+use haptic_core::envelope::LimitReason;
 use haptic_core::quantity::Instant;
 
 pub use direct::Direct;
@@ -58,6 +59,11 @@ pub struct Applied {
     pub torque_nm: f64,
     /// Whether a limit held it back.
     pub limited: bool,
+}
+
+/// A mode that allows less torque than the law asks for is no limit: a fade or a handover is what was asked.
+fn is_limited(reason: LimitReason) -> bool {
+    !matches!(reason, LimitReason::None | LimitReason::Mode)
 }
 
 /// The seat of the controller.

@@ -10,12 +10,11 @@ use haptic_core::bus::messages::{
     Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Vehicle,
 };
 use haptic_core::ecu::Ecu;
-use haptic_core::envelope::LimitReason;
 use haptic_core::params::Setup;
 use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
 use heapless::Vec;
 
-use super::{Applied, Guidance, View};
+use super::{Applied, Guidance, View, is_limited};
 use crate::models::sensors;
 
 /// The column's sensors send every 2 ms.
@@ -121,7 +120,7 @@ impl Guidance for OverBus {
         if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &step.guidance) {
             self.applied = Applied {
                 torque_nm: guidance.torque.nm(),
-                limited: guidance.limit != LimitReason::None,
+                limited: is_limited(guidance.limit),
             };
         }
         self.applied

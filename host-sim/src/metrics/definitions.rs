@@ -106,7 +106,8 @@ metrics! {
         "Largest |T_h|.",
         "Wang et al. 2022, section 3.2 (against its 5 N.m limit)";
     limited_time_share, "Time at a limit", "1",
-        "Share of time in which a limit held the guidance torque back.",
+        "Share of time in which a limit held the guidance torque back; a mode that allows none (a fade, \
+         Standby) is no limit.",
         "ours";
     conflict_time_share, "Conflict", "1",
         "Share of time in which driver and guidance turn the wheel against each other: T_d and T_h of opposite \

@@ -22,7 +22,7 @@ use crate::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenar
 /// Speeds of the study, km/h.
 pub const SPEEDS_KMH: [f64; 9] = [40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0];
 /// Most that a survived failure may cost: times the larger of the no-failure and the manual peak.
-pub const MOST: f64 = 1.25;
+const MOST: f64 = 1.25;
 /// Rows of the study.
 pub const ROWS: usize = SPEEDS_KMH.len() * DRIVERS_T_P.len() * 3;
 /// The failure, s after the start at 60 km/h: 6.7 m into the arc, as on the paper's course.
@@ -69,11 +69,22 @@ impl Row {
     }
 }
 
+/// What the study found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// By speed, delay and reliance.
+    pub rows: Vec<Row>,
+    /// Largest handover ratio of the judged rows.
+    pub largest_judged_ratio: f64,
+    /// Most that it may be.
+    pub most: f64,
+}
+
 /// Runs every row on all cores; `progress` is called after each.
 ///
 /// # Errors
 /// As [`Scenario::check`]; none of these scenarios meets one.
-pub fn study(progress: impl Fn() + Sync) -> Result<Vec<Row>, String> {
+pub fn study(progress: impl Fn() + Sync) -> Result<Results, String> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
         .flat_map(|kmh| DRIVERS_T_P.map(|t_p| (*kmh, t_p)))
@@ -82,7 +93,13 @@ pub fn study(progress: impl Fn() + Sync) -> Result<Vec<Row>, String> {
         .into_par_iter()
         .map(|(kmh, t_p)| rows_of(kmh, t_p, &progress))
         .collect::<Result<_, String>>()?;
-    Ok(rows.into_iter().flatten().collect())
+    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let judged = rows.iter().filter(|row| row.is_judged());
+    Ok(Results {
+        largest_judged_ratio: judged.filter_map(|row| row.handover_ratio).fold(0.0, f64::max),
+        most: MOST,
+        rows,
+    })
 }
 
 fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<Row>, String> {

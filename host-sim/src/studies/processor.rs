@@ -1,6 +1,8 @@
 //! Processor in the loop: a scenario on this host, every frame of it also to the ECU's image in QEMU or on a board,
 //! and every answer compared. The image has the controller's parameters of the scenario.
 
+use std::ops::ControlFlow;
+
 use haptic_core::lockstep::{Start, StartState};
 use haptic_core::quantity::Instant;
 
@@ -17,9 +19,11 @@ pub enum ProcessorError {
     Scenario(String),
     /// The image cannot be built, started or heard.
     Target(PilError),
+    /// `progress` broke off.
+    Interrupted,
 }
 
-/// Runs a scenario over the bus. `progress` is told each step's number.
+/// Runs a scenario over the bus. `progress` is told each step's number, and may break off.
 ///
 /// # Errors
 /// A manual scenario, which has no controller to compare, or one past the bus, the image's only way in; as
@@ -27,7 +31,7 @@ pub enum ProcessorError {
 pub fn run(
     scenario: &Scenario,
     target: &Target,
-    mut progress: impl FnMut(u32),
+    mut progress: impl FnMut(u32) -> ControlFlow<()>,
 ) -> Result<Report, ProcessorError> {
     let checked = scenario.check().and_then(|()| scenario.check_times());
     checked.map_err(ProcessorError::Scenario)?;
@@ -60,15 +64,16 @@ pub fn run(
         &mut |cycle: &Cycle| {
             // The host's loop needs no answer, so it simply runs out when the target is gone.
             if broken.is_none() {
-                broken = pil
-                    .tick(cycle.view.now(), cycle.frames_in, cycle.frames_out)
-                    .err();
-                progress(cycle.view.step);
+                let answered = pil.tick(cycle.view.now(), cycle.frames_in, cycle.frames_out);
+                broken = answered.err().map(ProcessorError::Target);
+                if progress(cycle.view.step).is_break() {
+                    broken = Some(ProcessorError::Interrupted);
+                }
             }
         },
     );
     match broken {
-        Some(error) => Err(ProcessorError::Target(error)),
+        Some(error) => Err(error),
         None => pil.finish().map_err(ProcessorError::Target),
     }
 }
