@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::{env, fs};
 
 /// Features that choose a board, and the board's memory map in `src/boards`.
-const MAPS: [(&str, &str); 3] = [
+const MAPS: [(&str, &str); 4] = [
     ("MPS2_AN386", "mps2.x"),
     ("MPS2_AN500", "mps2.x"),
     ("NUCLEO_G474RE", "nucleo_g474re.x"),
+    ("SAM_E54_XPRO", "sam_e54_xpro.x"),
 ];
 
 fn main() {

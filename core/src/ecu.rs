@@ -282,15 +282,14 @@ impl Ecu {
         }
         if due(TURN / 2) {
             let (turn, total) = (steps / TURN, self.history.kinds());
-            let line = |index: u32| {
-                let record = self.history.records().nth(index as usize)?;
-                Some(FaultRecord {
+            let index = turn.checked_rem(total);
+            let record = index.and_then(|index| self.history.records().nth(index as usize));
+            if let Some((index, record)) = index.zip(record) {
+                let line = FaultRecord {
                     index: index as u8,
                     total: total as u8,
                     record,
-                })
-            };
-            if let Some(line) = turn.checked_rem(total).and_then(line) {
+                };
                 let _ = frames.push(line.encode(turn as u8));
             }
         }

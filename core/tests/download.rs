@@ -1,7 +1,8 @@
 //! A set of parameters over the bus: taken only whole, in order, in Standby and within its ranges.
 
-use haptic_core::bus::Frame;
-use haptic_core::bus::messages::WriteOutcome;
+use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::messages::{Message, ParameterStatus, WriteOutcome};
+use haptic_core::bus::{Frame, Reject};
 use haptic_core::download::{Download, frames};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
@@ -87,6 +88,16 @@ fn no_other_mode_takes_anything() {
             assert_eq!(download.receive(frame, now), None, "{mode:?}");
         }
     }
+}
+
+#[test]
+fn other_messages_between_the_fields_do_no_harm() {
+    let other = Frame::new(0x141, &[0; 8]).unwrap();
+    let mixed: Vec<Frame> = frames(&SET)
+        .into_iter()
+        .flat_map(|frame| [other, frame])
+        .collect();
+    assert_eq!(receive(&mixed, Mode::Standby), (Some(SET), WriteOutcome::Taken));
 }
 
 /// Each frame lost, sent twice, or swapped with its neighbour.
@@ -189,4 +200,20 @@ fn the_status_names_the_set_in_use() {
         (status.stored, status.damaged, status.sequence),
         (false, false, 0)
     );
+}
+
+/// Three bits have room for eight outcomes; there are six.
+#[test]
+fn a_status_with_an_outcome_that_is_none_is_refused() {
+    let status = |code: u8| {
+        let mut data = [0, 0, code, 0, 0, 0, 0, 0];
+        ParameterStatus::PROTECTION.protect(&mut data, 1);
+        ParameterStatus::decode(
+            &mut { ReceiverState::TRUSTED },
+            &Frame::new(0x320, &data).unwrap(),
+        )
+    };
+    assert_eq!(status(5).map(|status| status.outcome), Ok(WriteOutcome::Taken));
+    assert_eq!(status(6), Err(Reject::Range));
+    assert_eq!(status(7), Err(Reject::Range));
 }

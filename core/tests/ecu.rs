@@ -556,3 +556,14 @@ fn engaged_from_the_start_for_studies() {
     assert_eq!(ecu.step(now.after(Micros::from_ms(1))).command.mode, Mode::Active);
     assert_eq!(ecu.config(), Some(Setup::PAPER.config));
 }
+
+#[test]
+fn without_a_fault_the_history_is_silent() {
+    let mut rig = Rig::paper();
+    rig.engage = true;
+    rig.ecu = Ecu::engaged(&Setup::PAPER, rig.now());
+    for _ in 0..250 {
+        let step = rig.tick();
+        assert_eq!((step.command.faults, step.others.len()), (FaultSet::NONE, 0));
+    }
+}

@@ -31,6 +31,8 @@ pub(crate) enum Board {
     Mps2An500,
     /// ST NUCLEO-G474RE.
     NucleoG474re,
+    /// Microchip SAM E54 Xplained Pro.
+    SamE54Xpro,
 }
 
 impl Board {
@@ -39,6 +41,7 @@ impl Board {
             Self::Mps2An386 => "mps2-an386",
             Self::Mps2An500 => "mps2-an500",
             Self::NucleoG474re => "nucleo-g474re",
+            Self::SamE54Xpro => "sam-e54-xpro",
         }
     }
 
@@ -47,6 +50,7 @@ impl Board {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => None,
             Self::NucleoG474re => Some("STM32G474RETx"),
+            Self::SamE54Xpro => Some("ATSAME54P20A"),
         }
     }
 

@@ -21,9 +21,19 @@ mod nucleo_g474re;
 #[cfg(feature = "nucleo-g474re")]
 pub use nucleo_g474re::NucleoG474re as ThisBoard;
 
-#[cfg(not(any(feature = "mps2-an386", feature = "mps2-an500", feature = "nucleo-g474re")))]
+#[cfg(feature = "sam-e54-xpro")]
+mod sam_e54_xpro;
+#[cfg(feature = "sam-e54-xpro")]
+pub use sam_e54_xpro::SamE54Xpro as ThisBoard;
+
+#[cfg(not(any(
+    feature = "mps2-an386",
+    feature = "mps2-an500",
+    feature = "nucleo-g474re",
+    feature = "sam-e54-xpro"
+)))]
 compile_error!(
-    "no board is chosen: build haptic-firmware with --features mps2-an386, mps2-an500 or nucleo-g474re"
+    "no board is chosen: build haptic-firmware with --features mps2-an386, mps2-an500, nucleo-g474re or sam-e54-xpro"
 );
 
 /// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; an
