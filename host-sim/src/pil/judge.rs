@@ -1,7 +1,7 @@
 //! Reads the target's answers and compares them with what the host's controller said.
 
 use std::fmt;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, Message};
@@ -141,8 +141,12 @@ impl Judge {
         }
     }
 
-    /// Compares until nothing more is expected. Ends the machine.
-    pub(super) fn run(mut self, expected: &Receiver<Expected>) -> Result<Report, PilError> {
+    /// Compares until nothing more is expected, drops `answering`, and waits for the machine to end.
+    pub(super) fn run(
+        mut self,
+        expected: &Receiver<Expected>,
+        answering: SyncSender<()>,
+    ) -> Result<Report, PilError> {
         let mut start = None;
         let mut total = [0_u64; 2];
         for expected in expected {
@@ -154,6 +158,7 @@ impl Judge {
             self.answers.steps = self.report.steps;
             self.report.steps_per_second = self.report.steps as f64 / start.elapsed().as_secs_f64();
         }
+        drop(answering);
         let spent = self.report.instructions.as_mut().or(self.report.cycles.as_mut());
         if let Some(spent) = spent {
             [spent.mean, spent.mean_advice] = total.map(|total| total as f64 / self.report.steps as f64);

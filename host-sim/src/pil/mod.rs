@@ -28,7 +28,7 @@ pub mod stepped;
 use std::fmt;
 use std::io::{BufWriter, Write};
 use std::str::FromStr;
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
 use haptic_core::bus::Frame;
@@ -144,6 +144,8 @@ pub struct Pil {
     /// None once the run is over: closing it tells the target so.
     input: Option<BufWriter<Box<dyn Write + Send>>>,
     expected: Option<SyncSender<Expected>>,
+    /// Closed by the judge when no answer is missing any more, or none will come.
+    answered: Receiver<()>,
     judge: Option<JoinHandle<Result<Report, PilError>>>,
     channel: Channel,
 }
@@ -189,10 +191,12 @@ impl Pil {
             }
         };
         let (expected, expectations) = sync_channel(window);
+        let (answering, answered) = sync_channel(0);
         let mut pil = Self {
             input: Some(BufWriter::new(input)),
             expected: Some(expected),
-            judge: Some(std::thread::spawn(move || judge.run(&expectations))),
+            answered,
+            judge: Some(std::thread::spawn(move || judge.run(&expectations, answering))),
             channel,
         };
         pil.greet(params, start)?;
@@ -269,11 +273,14 @@ impl Pil {
     /// Says that no more is expected, closes the target's input, and takes the judge's word.
     fn end(&mut self) -> Result<Report, PilError> {
         self.expected = None;
-        if let Some(mut input) = self.input.take()
-            && self.channel == Channel::Slcan
-        {
-            // Lost only if the target is gone, which the judge will say.
-            let _ = input.write_all(link::CLOSE);
+        if let Some(mut input) = self.input.take() {
+            // What is lost is lost only if the target is gone, which the judge will say.
+            let _ = input.flush();
+            // A serial port forgets what was not yet read when its other end, told to end, closes it.
+            let _ = self.answered.recv();
+            if self.channel == Channel::Slcan {
+                let _ = input.write_all(link::CLOSE);
+            }
         }
         let judge = self
             .judge
