@@ -340,7 +340,7 @@ fn what_was_lost_is_not_held_against_what_comes() {
     let [seen, summed] = used(&state);
     assert!((seen - 0.391).abs() < 2e-3, "{seen}");
     assert!((summed - 0.552).abs() < 2e-3, "{summed}");
-    let mut lost = state.clone();
+    let mut lost = state;
     lost.forget_lane();
     lost.forget_column();
     assert_eq!(used(&lost), [0.0, 0.0]);
