@@ -4,14 +4,14 @@
 use std::path::Path;
 
 use super::evaluate::{DRIVERS_T_P, Evaluation, Results};
+use super::files::{write_figure, write_report};
 use super::{OutputError, RunRecord, curves, notes};
 use crate::metrics::Definition;
 use crate::models::road::PAPER_COURSE;
 use crate::plot::lateral_error::{DriverPanel, figure};
 use crate::plot::{Figure, Marker};
 use crate::report::{
-    Block, Cell, Report, Section, Table, definitions_table, metrics_table, write_file, write_json,
-    write_trace_csv,
+    Block, Cell, Report, Section, Table, definitions_table, metrics_table, write_json, write_trace_csv,
 };
 use crate::scenario::{Condition, FailureKind, Scenario};
 
@@ -33,11 +33,7 @@ pub(super) fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), Out
         ("figure9_handover", handover_figure(evaluation)),
     ];
     for (name, figure) in &figures {
-        let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-        write_file(&directory.join(format!("{name}.svg")), |f| {
-            f.write_all(svg.as_bytes())
-        })?;
-        write_file(&directory.join(format!("{name}.png")), |f| f.write_all(&png))?;
+        write_figure(directory, name, figure)?;
     }
     for (scenario, run) in &evaluation.runs {
         let name = format!(
@@ -47,9 +43,10 @@ pub(super) fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), Out
         write_trace_csv(&directory.join("runs").join(name), &run.trace)?;
     }
     write_json(&directory.join("results.json"), &evaluation.results)?;
-    let html = report(&evaluation.results, figures.map(|(_, figure)| figure)).to_html()?;
-    write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
-    Ok(())
+    write_report(
+        directory,
+        &report(&evaluation.results, figures.map(|(_, figure)| figure)),
+    )
 }
 
 fn nominal_figure(evaluation: &Evaluation) -> Figure {

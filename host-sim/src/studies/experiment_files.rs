@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::OutputError;
 use super::experiment::{Drive, Experiment, Finding};
+use super::files::{write_figure, write_report};
 use crate::identify::{Parameter, Parameters};
 use crate::plot::{Axis, Figure, Line, Panel};
 use crate::report::{Block, Cell, Report, Section, Table, write_file, write_json};
@@ -16,16 +17,13 @@ pub(super) fn write(experiment: &Experiment, directory: &Path) -> Result<(), Out
         figures.push(("torque", torque(drive)));
     }
     for (name, figure) in &figures {
-        let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-        write_file(&directory.join(format!("{name}.svg")), |f| {
-            f.write_all(svg.as_bytes())
-        })?;
-        write_file(&directory.join(format!("{name}.png")), |f| f.write_all(&png))?;
+        write_figure(directory, name, figure)?;
     }
     write_json(&directory.join("results.json"), experiment)?;
-    let html = report(experiment, figures.into_iter().map(|f| f.1).collect()).to_html()?;
-    write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
-    Ok(())
+    write_report(
+        directory,
+        &report(experiment, figures.into_iter().map(|f| f.1).collect()),
+    )
 }
 
 pub(super) fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {

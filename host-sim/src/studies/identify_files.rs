@@ -4,10 +4,11 @@
 use std::path::Path;
 
 use super::OutputError;
+use super::files::{write_figure, write_report};
 use super::identify::IdentifiedDrive;
 use crate::identify::{History, Identification, autocorrelation};
 use crate::plot::{Axis, Figure, Line, Panel};
-use crate::report::{Block, Cell, Report, Section, Table, write_file, write_json};
+use crate::report::{Block, Cell, Report, Section, Table, write_json};
 
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
@@ -20,16 +21,10 @@ pub(super) fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), Out
         ("over_time", over_time(drive)),
     ];
     for (name, figure) in &figures {
-        let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-        write_file(&directory.join(format!("{name}.svg")), |f| {
-            f.write_all(svg.as_bytes())
-        })?;
-        write_file(&directory.join(format!("{name}.png")), |f| f.write_all(&png))?;
+        write_figure(directory, name, figure)?;
     }
     write_json(&directory.join("results.json"), &drive.results)?;
-    let html = report(drive, figures.map(|f| f.1)).to_html()?;
-    write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
-    Ok(())
+    write_report(directory, &report(drive, figures.map(|f| f.1)))
 }
 
 fn axis(label: &str) -> Axis {

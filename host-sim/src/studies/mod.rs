@@ -19,6 +19,7 @@ pub mod evaluate;
 mod evaluation_files;
 pub mod experiment;
 mod experiment_files;
+mod files;
 pub mod handover;
 pub mod identify;
 mod identify_files;

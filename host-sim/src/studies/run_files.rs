@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::files::{write_figure, write_report};
 use super::reliance::reliance_panel;
 use super::run::SingleRun;
 use super::{OutputError, curves, notes};
@@ -16,13 +17,10 @@ use crate::trace::Sample;
 
 pub(super) fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(single);
-    let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-    write_file(&directory.join("run.svg"), |f| f.write_all(svg.as_bytes()))?;
-    write_file(&directory.join("run.png"), |f| f.write_all(&png))?;
+    write_figure(directory, "run", &figure)?;
     write_trace_csv(&directory.join("run.csv"), &single.run.trace)?;
     write_json(&directory.join("results.json"), &single.results)?;
-    let html = report(single, figure).to_html()?;
-    write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
+    write_report(directory, &report(single, figure))?;
     if !single.bus.is_empty() {
         write_file(&directory.join("bus.log"), |f| {
             for (ms, frame) in &single.bus {

@@ -5,7 +5,8 @@ use std::path::Path;
 use super::super::OutputError;
 use super::{Example, NEAR, REMNANT, Reading, Results, SETTLING_S};
 use crate::plot::{Axis, Figure, Line, Panel};
-use crate::report::{Block, Cell, Report, Section, Table, write_file, write_json};
+use crate::report::{Block, Cell, Report, Section, Table, write_json};
+use crate::studies::files::{write_figure, write_report};
 
 /// Most examples in the figure.
 const EXAMPLES: usize = 4;
@@ -54,13 +55,9 @@ impl Results {
     /// What could not be written or drawn.
     pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
         let figure = self.figure();
-        let (svg, png) = (figure.to_svg()?, figure.to_png()?);
-        write_file(&directory.join("reliance.svg"), |f| f.write_all(svg.as_bytes()))?;
-        write_file(&directory.join("reliance.png"), |f| f.write_all(&png))?;
+        write_figure(directory, "reliance", &figure)?;
         write_json(&directory.join("results.json"), self)?;
-        let html = self.report(figure).to_html()?;
-        write_file(&directory.join("report.html"), |f| f.write_all(html.as_bytes()))?;
-        Ok(())
+        write_report(directory, &self.report(figure))
     }
 
     /// Changing drives, spread over the participants.
