@@ -2,15 +2,19 @@
 //! the restart that it causes; one that is wrong changes nothing; and power lost at every step of a write, hundreds
 //! of times, never loses the last good set.
 //!
-//! The status frames are taken apart by hand, from `core/haptic.dbc`.
+//! The status frames are taken apart by hand, from `core/haptic.dbc`. What `host-sim parameters` does over an adapter
+//! is done to the same image behind a serial port.
 
 mod machine;
 
-use std::process::Command;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
 
+use haptic_core::bus::messages::WriteOutcome;
 use haptic_core::bus::slcan;
 use haptic_core::download;
 use haptic_core::params::Params;
+use host_sim::pil::parameters::Product;
 use machine::{Machine, image};
 
 const BOARD: &str = "mps2-an386";
@@ -109,6 +113,52 @@ fn a_set_that_is_wrong_changes_nothing_and_is_told() {
         let told = (0..5).any(|_| status(&mut machine) == (IN_USE(0, outcome), POWER_ON, STANDBY));
         assert!(told, "outcome {outcome} within 5 s");
     }
+}
+
+#[test]
+fn the_workbench_stores_a_set_over_a_serial_adapter() {
+    let mut qemu = Command::new("qemu-system-arm")
+        .args(["-machine", BOARD, "-display", "none", "-monitor", "none"])
+        .args(["-serial", "pty", "-serial", "null"])
+        .args(["-icount", "shift=5,sleep=off"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .arg("-kernel")
+        .arg(image(BOARD, "steering-ecu"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("qemu-system-arm is missing: apt-get install qemu-system-arm");
+    let mut line = String::new();
+    let mut said = BufReader::new(qemu.stdout.take().unwrap());
+    said.read_line(&mut line).unwrap();
+    // "char device redirected to /dev/pts/3 (label serial0)"
+    let port = line.split_whitespace().find(|word| word.starts_with("/dev/"));
+    let mut product = Product::on(port.unwrap_or_else(|| panic!("QEMU says: {line}"))).unwrap();
+    let status = product.status().unwrap();
+    assert_eq!(
+        (status.stored, status.damaged, status.sequence),
+        (false, false, 0)
+    );
+    let softer = Params {
+        torque_limit_nm: 3.0,
+        ..Params::PAPER
+    };
+    for sequence in [1, 2] {
+        let status = product.store(&softer).unwrap();
+        assert_eq!(
+            (status.stored, status.damaged, status.sequence),
+            (true, false, sequence)
+        );
+    }
+    // Not even sent: the ECU's answer would be "out of range".
+    let too_much = Params {
+        torque_limit_nm: 5.5,
+        ..Params::PAPER
+    };
+    assert!(product.store(&too_much).is_err());
+    assert_eq!(product.status().unwrap().outcome, WriteOutcome::None);
+    qemu.kill().unwrap();
+    qemu.wait().unwrap();
 }
 
 /// The image cuts the supply of its flash at every number of operations, resets, and looks (`power_loss.rs`).

@@ -292,6 +292,37 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     }
 }
 
+/// Before anything is sent.
+#[test]
+fn parameters_that_no_ecu_takes_and_a_bus_that_is_not_there_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(
+        directory.path().join("strong.toml"),
+        "[guidance]\ntorque_limit_nm = 6\n",
+    )
+    .unwrap();
+    let cases: [(&[&str], &[&str]); 3] = [
+        (
+            &["parameters", "strong.toml", "--can", "can99"],
+            &["strong.toml: ", "torque_limit_nm = 6", "0.1", "5"],
+        ),
+        (&["parameters", "--can", "can99"], &["can99"]),
+        (&["parameters"], &["--can"]),
+    ];
+    for (arguments, expected) in cases {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        for word in expected {
+            assert!(
+                stderr(&output).contains(word),
+                "{arguments:?} gave {}",
+                stderr(&output)
+            );
+        }
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
 /// What to install, in one line, and no failed comparison.
 #[cfg(unix)]
 #[test]

@@ -13,6 +13,7 @@ mod faults;
 mod handover;
 mod identify;
 mod output;
+mod parameters;
 mod participants;
 mod pil;
 mod progress;
@@ -57,6 +58,8 @@ enum Command {
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
+    /// What parameters an ECU on a real bus uses; new ones for it to store
+    Parameters(parameters::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
     /// How well the ECU reads the drivers' reliance from its probe, against the truth
@@ -97,6 +100,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Faults(arguments)) => faults::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
+        Some(Command::Parameters(arguments)) => parameters::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
         Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };

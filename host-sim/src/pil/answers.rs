@@ -96,7 +96,7 @@ impl Answers {
 }
 
 /// Reads on a thread of its own, so that waiting for bytes can have a limit.
-fn pump(mut output: impl Read + Send + 'static) -> Receiver<Vec<u8>> {
+pub(super) fn pump(mut output: impl Read + Send + 'static) -> Receiver<Vec<u8>> {
     let (to, from) = channel();
     std::thread::spawn(move || {
         let mut buffer = [0; 65536];

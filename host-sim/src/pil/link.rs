@@ -8,6 +8,8 @@ use super::Channel;
 
 /// What an SLCAN client sends first: close what is open, 500 kbit/s, open.
 pub(super) const OPEN: &[u8] = b"C\rS6\rO\r";
+/// After the other end has forgotten it.
+pub(super) const REOPEN: &[u8] = b"O\r";
 /// And last.
 pub(super) const CLOSE: &[u8] = b"C\r";
 

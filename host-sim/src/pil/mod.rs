@@ -12,7 +12,7 @@
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`adapter`]: the way to a board.
 //! - [`link`]: frames as bytes.
 //! - [`judge`]: compares the answers, on its own thread. - [`stepped`]: a target for whoever judges by himself,
-//!   and may reach into its memory.
+//!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
 //!
 //! Not here: the plant and the scenario.
 
@@ -22,6 +22,7 @@ mod gdb;
 pub mod image;
 pub mod judge;
 mod link;
+pub mod parameters;
 pub mod qemu;
 pub mod stepped;
 

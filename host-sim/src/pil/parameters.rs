@@ -1,0 +1,246 @@
+//! The parameters of a product on a bus: which set it has in use, and a new one for it to store.
+//!
+//! The client sends a set as `haptic_core::download` has it and believes it stored when the ECU, started anew, says
+//! that a set of another number is in use: an ECU reads back what it stores, and the bus carries no values out.
+//! Not here: what is in a set, and the way to the bus (`adapter`).
+
+use std::io::Write;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::messages::{Guidance, Message, ParameterStatus, WriteOutcome};
+use haptic_core::download::{Download, frames};
+use haptic_core::modes::Mode;
+use haptic_core::params::Params;
+
+use super::adapter::{self, Adapter};
+use super::answers::pump;
+use super::link::{self, Decoder};
+use super::{Channel, PilError};
+
+/// Longest wait for a status, which comes every second, and a start takes less than another.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Statuses after a set was sent: its storing and the start take less than these seconds.
+const STATUSES: usize = 5;
+/// A port that is silent for so long may belong to an ECU that speaks SLCAN itself and has just started anew.
+const REOPEN: Duration = Duration::from_millis(100);
+
+/// The ECU at the other end of an adapter.
+pub struct Product {
+    input: Box<dyn Write + Send>,
+    bytes: Receiver<Vec<u8>>,
+    pending: std::vec::IntoIter<u8>,
+    decoder: Decoder,
+    channel: Channel,
+}
+
+impl Product {
+    /// Opens the way to a bus, named as for [`super::Target::Board`].
+    ///
+    /// # Errors
+    /// What is missing on the way.
+    pub fn on(adapter: &str) -> Result<Self, PilError> {
+        let Adapter {
+            channel,
+            input,
+            output,
+        } = adapter::open(adapter)?;
+        let mut product = Self {
+            input,
+            bytes: pump(output),
+            pending: Vec::new().into_iter(),
+            decoder: Decoder::new(channel),
+            channel,
+        };
+        if channel == Channel::Slcan {
+            product.write(link::OPEN)?;
+        }
+        Ok(product)
+    }
+
+    /// Which set is in use, and what became of the last one sent.
+    ///
+    /// # Errors
+    /// No ECU says so.
+    pub fn status(&mut self) -> Result<ParameterStatus, PilError> {
+        Ok(self.status_and_mode()?.0)
+    }
+
+    /// Sends a set and waits until it is in use. The ECU must be in Standby, and starts anew with the set.
+    ///
+    /// # Errors
+    /// Why it is not in use.
+    pub fn store(&mut self, params: &Params) -> Result<ParameterStatus, PilError> {
+        let frames = frames(params);
+        // The bus rounds to f32, which may be too far at the end of a range: the ECU's own judgement, before it is asked.
+        let mut judge = Download::NEW;
+        if !frames
+            .iter()
+            .any(|frame| judge.receive(frame, Mode::Standby).is_some())
+        {
+            let message = "a parameter is at the end of its range, and beyond it as the bus's 32-bit number";
+            return Err(PilError::Failed(message.into()));
+        }
+        let (before, mode) = self.status_and_mode()?;
+        if mode != Mode::Standby {
+            return Err(PilError::Failed(format!(
+                "the ECU is in {mode:?}; it takes parameters in Standby only"
+            )));
+        }
+        for frame in &frames {
+            self.write(&link::encode(self.channel, frame))?;
+        }
+        for since in 0..STATUSES {
+            if let Some(verdict) = verdict(&before, &self.status()?, since) {
+                return verdict.map_err(|why| PilError::Failed(why.into()));
+            }
+        }
+        Err(PilError::Failed(format!(
+            "after {STATUSES} s the ECU still has set {} in use: its flash takes no other, or frames were lost",
+            before.sequence
+        )))
+    }
+
+    /// The next status, and the mode of the last torque frame before it.
+    fn status_and_mode(&mut self) -> Result<(ParameterStatus, Mode), PilError> {
+        let until = Instant::now() + PATIENCE;
+        let mut mode = None;
+        while Instant::now() < until {
+            let Some(frame) = self.frame()? else {
+                continue;
+            };
+            // Two counters of one second tell nothing: each frame is judged by itself.
+            let mut receiver = ReceiverState::TRUSTED;
+            match frame.id() {
+                Guidance::ID => {
+                    mode = Guidance::decode(&mut receiver, &frame)
+                        .ok()
+                        .map(|guidance| guidance.mode)
+                        .or(mode);
+                }
+                ParameterStatus::ID => {
+                    let status = ParameterStatus::decode(&mut receiver, &frame).ok();
+                    if let Some(found) = status.zip(mode) {
+                        return Ok(found);
+                    }
+                }
+                _ => {}
+            }
+        }
+        Err(PilError::Failed(format!(
+            "no ECU told of its parameters for {} s: does it run steering-ecu, is the bus terminated, and do adapter \
+             and ECU both run at 500 kbit/s?",
+            PATIENCE.as_secs()
+        )))
+    }
+
+    /// The next frame; None when none came for [`REOPEN`].
+    fn frame(&mut self) -> Result<Option<Frame>, PilError> {
+        loop {
+            for byte in self.pending.by_ref() {
+                if let Some(frame) = self.decoder.push(byte).map_err(PilError::Failed)? {
+                    return Ok(Some(frame));
+                }
+            }
+            match self.bytes.recv_timeout(REOPEN) {
+                Ok(bytes) => self.pending = bytes.into_iter(),
+                Err(RecvTimeoutError::Timeout) => {
+                    if self.channel == Channel::Slcan {
+                        self.write(link::REOPEN)?;
+                    }
+                    return Ok(None);
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PilError::Failed("the adapter is gone".into()));
+                }
+            }
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PilError> {
+        let written = self.input.write_all(bytes).and_then(|()| self.input.flush());
+        written.map_err(|e| PilError::Failed(format!("the adapter takes no frames: {e}")))
+    }
+}
+
+impl Drop for Product {
+    fn drop(&mut self) {
+        if self.channel == Channel::Slcan {
+            // An adapter that is gone is closed.
+            let _ = self.write(link::CLOSE);
+        }
+    }
+}
+
+/// What a status says of a set that was sent when the status was `before`; None: nothing yet. `since` counts the
+/// statuses after it, of which the first may be older than the set.
+fn verdict(
+    before: &ParameterStatus,
+    now: &ParameterStatus,
+    since: usize,
+) -> Option<Result<ParameterStatus, &'static str>> {
+    if now.sequence != before.sequence {
+        return Some(Ok(*now));
+    }
+    if since == 0 && now == before {
+        return None;
+    }
+    Some(Err(match now.outcome {
+        WriteOutcome::None | WriteOutcome::Receiving | WriteOutcome::Taken => return None,
+        WriteOutcome::NotInStandby => "the ECU refused the set: it was no longer in Standby",
+        WriteOutcome::OutOfOrder => {
+            "the ECU refused the set: a frame was lost, or somebody else sends parameters too"
+        }
+        WriteOutcome::OutOfRange => "the ECU refused the set: its ranges are not this program's",
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn status(sequence: u32, outcome: WriteOutcome) -> ParameterStatus {
+        ParameterStatus {
+            stored: sequence > 0,
+            damaged: false,
+            outcome,
+            sequence,
+        }
+    }
+
+    #[test]
+    fn another_number_is_a_set_in_use_and_the_wrap_is_one() {
+        for (last, next) in [(0, 1), (7, 8), (u32::MAX, 0)] {
+            let now = status(next, WriteOutcome::None);
+            let before = status(last, WriteOutcome::None);
+            assert_eq!(verdict(&before, &now, 0), Some(Ok(now)));
+        }
+    }
+
+    #[test]
+    fn a_refusal_counts_at_once_if_it_is_new_and_an_old_one_if_it_stays() {
+        for refusal in [
+            WriteOutcome::NotInStandby,
+            WriteOutcome::OutOfOrder,
+            WriteOutcome::OutOfRange,
+        ] {
+            let now = status(3, refusal);
+            let fresh = verdict(&status(3, WriteOutcome::None), &now, 0);
+            assert!(matches!(fresh, Some(Err(_))), "{refusal:?}");
+            assert_eq!(verdict(&now, &now, 0), None, "may be older than the set");
+            assert!(matches!(verdict(&now, &now, 1), Some(Err(_))), "{refusal:?}");
+        }
+    }
+
+    #[test]
+    fn a_set_under_way_is_waited_for() {
+        for outcome in [WriteOutcome::None, WriteOutcome::Receiving, WriteOutcome::Taken] {
+            for since in [0, 1] {
+                let before = status(3, WriteOutcome::OutOfOrder);
+                assert_eq!(verdict(&before, &status(3, outcome), since), None, "{outcome:?}");
+            }
+        }
+    }
+}
