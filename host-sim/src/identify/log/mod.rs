@@ -44,9 +44,9 @@ const LIMITS: [(f64, &str); 6] = [
 /// A wheel angle recorded more coarsely than this (about 1.1 deg) is not in radians.
 const COARSEST_WHEEL_STEP_RAD: f64 = 0.02;
 
-/// Share of a sample period by which a time stamp may miss the even grid: 10 % lets stamps rounded to a
-/// millisecond at 120 Hz pass.
-const TIME_STAMP_TOLERANCE: f64 = 0.1;
+/// Share of a sample period by which a time stamp may miss the even grid: rounding to a millisecond makes it 6 %
+/// at 120 Hz and 12.5 % at 250 Hz.
+const TIME_STAMP_TOLERANCE: f64 = 0.15;
 
 /// Sample periods that the models here are valid for, s: the muscle's lag of 0.1 s needs 20 Hz at least.
 const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.05);
@@ -136,7 +136,8 @@ impl DriveLog {
         })
     }
 
-    /// Reads and checks the file at `path`. A `manual` drive may lack the guidance column: it is then zero.
+    /// Reads and checks the file at `path`. Lines that begin with `#` are skipped; upper and lower case are one in
+    /// the header. Of a `manual` drive the guidance may be missing, as a column or as a number: it is then zero.
     ///
     /// # Errors
     /// The file cannot be read, or what it holds is refused; the text begins with the path.
@@ -151,27 +152,42 @@ impl DriveLog {
     /// # Errors
     /// A missing or doubled column, a field that is no finite number, a value beyond its column's range, time
     /// stamps that run backwards, repeat, leave a gap or are uneven, or a record that is too short.
-    pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(source);
-        let header = reader
-            .byte_headers()
-            .map_err(|e| LogError(e.to_string()))?
-            .clone();
-        let index = find_columns(&header, manual)?;
+    pub fn read(mut source: impl Read, manual: bool) -> Result<Self, LogError> {
+        let mut bytes = Vec::new();
+        source
+            .read_to_end(&mut bytes)
+            .map_err(|e| LogError(e.to_string()))?;
+        let text = String::from_utf8_lossy(&bytes);
+        // Numbered here, for the parser counts neither skipped lines nor those that end in CR and LF.
+        let (lines, kept): (Vec<u64>, Vec<&str>) = (1..)
+            .zip(text.trim_start_matches('\u{feff}').lines())
+            .filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty())
+            .unzip();
+        let table = kept.join("\n");
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(table.as_bytes());
+        let header = reader.headers().map_err(|e| LogError(e.to_string()))?.clone();
+        let index = find_columns(&header, lines.first().copied().unwrap_or(1), manual)?;
+        let lines = &lines[1..];
         let mut columns: [Vec<f64>; 6] = Default::default();
-        let mut lines = Vec::new();
-        let mut record = csv::ByteRecord::new();
-        loop {
-            match reader.read_byte_record(&mut record) {
-                Ok(true) => {}
-                Ok(false) => break,
-                Err(e) => return refuse(describe(&e)),
+        for (record, &line) in reader.records().zip(lines) {
+            let record = record.map_err(|e| LogError(format!("line {line}: {e}")))?;
+            if record.len() != header.len() {
+                return refuse(format!(
+                    "line {line}: {} fields where the header has {}",
+                    record.len(),
+                    header.len()
+                ));
             }
-            let line = record.position().map_or(0, csv::Position::line);
-            lines.push(line);
             for (c, column) in columns.iter_mut().enumerate() {
                 column.push(match index[c] {
-                    Some(i) => field(&record, i, line, c)?,
+                    // Not used, but if it is there, it shows whether the drive was a manual one.
+                    Some(i) if manual && c == GUIDANCE_COLUMN => {
+                        field(&record[i], line, c).unwrap_or_default()
+                    }
+                    Some(i) => field(&record[i], line, c)?,
                     None => 0.0,
                 });
             }
@@ -184,11 +200,11 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
         ] = columns;
-        let dt_s = check_time(&time, &lines)?;
-        check_wheel_resolution(&wheel_angle_rad)?;
+        let (start_s, dt_s) = check_time(&time, lines)?;
+        check_wheel_resolution(&wheel_angle_rad, lines)?;
         check_sensor(&driver_torque_nm)?;
         Ok(Self {
-            start_s: time[0],
+            start_s,
             dt_s,
             e_y_m,
             e_theta_rad,
@@ -211,16 +227,15 @@ fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
 }
 
 /// Where each of [`COLUMNS`] stands; all that are missing are named at once.
-fn find_columns(header: &csv::ByteRecord, manual: bool) -> Result<[Option<usize>; 6], LogError> {
-    let names: Vec<String> = header
-        .iter()
-        .map(|h| {
-            String::from_utf8_lossy(h)
-                .trim_start_matches('\u{feff}')
-                .trim()
-                .to_owned()
-        })
-        .collect();
+fn find_columns(header: &csv::StringRecord, line: u64, manual: bool) -> Result<[Option<usize>; 6], LogError> {
+    if header.len() == 1
+        && let Some(separator) = header[0].chars().find(|c| [';', '\t'].contains(c))
+    {
+        return refuse(format!(
+            "line {line}: this file is separated by {separator:?}; commas are wanted"
+        ));
+    }
+    let names: Vec<String> = header.iter().map(str::to_ascii_lowercase).collect();
     let mut index = [None; 6];
     let mut missing = Vec::new();
     for (c, wanted) in COLUMNS.iter().enumerate() {
@@ -231,7 +246,7 @@ fn find_columns(header: &csv::ByteRecord, manual: bool) -> Result<[Option<usize>
             .map(|(i, _)| i);
         index[c] = places.next();
         if places.next().is_some() {
-            return refuse(format!("line 1: column {wanted} is there twice"));
+            return refuse(format!("line {line}: column {wanted} is there twice"));
         }
         if index[c].is_none() && !(manual && c == GUIDANCE_COLUMN) {
             // The unit is the last part of a name: a column that differs only there is a likely mistake.
@@ -243,27 +258,12 @@ fn find_columns(header: &csv::ByteRecord, manual: bool) -> Result<[Option<usize>
         }
     }
     if !missing.is_empty() {
-        return refuse(format!("line 1: missing column(s): {}", missing.join(", ")));
+        return refuse(format!("line {line}: missing column(s): {}", missing.join(", ")));
     }
     Ok(index)
 }
 
-fn describe(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::UnequalLengths {
-            pos,
-            expected_len,
-            len,
-        } => {
-            let line = pos.as_ref().map_or(0, csv::Position::line);
-            format!("line {line}: {len} fields where the header has {expected_len}")
-        }
-        _ => error.to_string(),
-    }
-}
-
-fn field(record: &csv::ByteRecord, i: usize, line: u64, c: usize) -> Result<f64, LogError> {
-    let text = String::from_utf8_lossy(&record[i]);
+fn field(text: &str, line: u64, c: usize) -> Result<f64, LogError> {
     let name = COLUMNS[c];
     let Ok(value) = text.parse::<f64>() else {
         return refuse(format!("line {line}: {name} is {text:?}, which is not a number"));
@@ -282,8 +282,8 @@ fn field(record: &csv::ByteRecord, i: usize, line: u64, c: usize) -> Result<f64,
     Ok(value)
 }
 
-/// Checks the time stamps and returns the sample period, s.
-fn check_time(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
+/// Checks the time stamps and returns start and period of the even grid that fits them best, s.
+fn check_time(time: &[f64], lines: &[u64]) -> Result<(f64, f64), LogError> {
     if time.len() < 3 {
         return refuse(format!("the log has {} rows, which is too few", time.len()));
     }
@@ -314,46 +314,52 @@ fn check_time(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
                 step / usual - 1.0
             ));
         }
-        if (step - usual).abs() > TIME_STAMP_TOLERANCE * usual {
-            return refuse(format!(
-                "line {}: uneven time stamps, a step of {step:.6} s where the usual one is {usual:.6} s",
-                lines[k + 1]
-            ));
-        }
     }
-    let span = time[time.len() - 1] - time[0];
-    let dt = span / (time.len() - 1) as f64;
-    // Small deviations of one sign add up to a drift that the step by step check does not see.
-    if let Some(k) = (0..time.len()).find(|&k| (time[k] - time[0] - k as f64 * dt).abs() > 0.5 * dt) {
+    let (start, dt) = even_grid(time);
+    let missed = |k: usize| (time[k] - start - k as f64 * dt).abs();
+    let worst = (0..time.len()).max_by(|&a, &b| missed(a).total_cmp(&missed(b)));
+    if let Some(k) = worst.filter(|&k| missed(k) > TIME_STAMP_TOLERANCE * dt) {
         return refuse(format!(
             "line {}: uneven time stamps, time_s is {} where an even grid has {:.6}",
             lines[k],
             time[k],
-            time[0] + k as f64 * dt
+            start + k as f64 * dt
         ));
     }
+    let span = time[time.len() - 1] - time[0];
     if span < SHORTEST_S {
         return refuse(too_short(span));
     }
-    Ok(dt)
+    Ok((start, dt))
+}
+
+/// Start and period of the even grid through `time`, by least squares.
+fn even_grid(time: &[f64]) -> (f64, f64) {
+    let middle = (time.len() - 1) as f64 / 2.0;
+    let (mut mean, mut product, mut square) = (0.0, 0.0, 0.0);
+    for (k, t) in time.iter().enumerate() {
+        let from_middle = k as f64 - middle;
+        mean += (t - time[0]) / time.len() as f64;
+        product += from_middle * (t - time[0]);
+        square += from_middle * from_middle;
+    }
+    let dt = product / square;
+    (time[0] + mean - middle * dt, dt)
 }
 
 fn too_short(span_s: f64) -> String {
     format!("the log covers {span_s:.3} s, less than {SHORTEST_S} s")
 }
 
-fn check_wheel_resolution(wheel_angle: &[f64]) -> Result<(), LogError> {
+fn check_wheel_resolution(wheel_angle: &[f64], lines: &[u64]) -> Result<(), LogError> {
     let step = wheel_angle
         .windows(2)
         .map(|w| (w[1] - w[0]).abs())
         .filter(|&d| d > 1e-12)
         .fold(f64::INFINITY, f64::min);
     if step.is_finite() && step > COARSEST_WHEEL_STEP_RAD {
-        let line = wheel_angle
-            .windows(2)
-            .position(|w| (w[1] - w[0]).abs() > 1e-12)
-            .unwrap_or(0)
-            + 3;
+        let first = wheel_angle.windows(2).position(|w| (w[1] - w[0]).abs() > 1e-12);
+        let line = lines[first.unwrap_or(0) + 1];
         return refuse(format!(
             "line {line}: wheel_angle_rad moves by {step:.3} at least, coarser than {COARSEST_WHEEL_STEP_RAD} rad: \
              is it in degrees?"

@@ -4,8 +4,12 @@ const HEADER: &str = "time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_n
 
 /// 12 s at 100 Hz; `edit` may change the fields of data row `k` (line `k + 2`).
 fn text(edit: impl Fn(usize, &mut [String; 6])) -> String {
+    rows(1200, edit)
+}
+
+fn rows(count: usize, edit: impl Fn(usize, &mut [String; 6])) -> String {
     let mut out = HEADER.to_owned();
-    for k in 0..1200 {
+    for k in 0..count {
         let t = k as f64 / 100.0;
         let mut row = [
             format!("{t:.4}"),
@@ -71,6 +75,13 @@ fn a_manual_log_may_lack_the_guidance_column() {
     let log = DriveLog::read(without.as_bytes(), true).unwrap();
     assert!(log.guidance_torque_nm.iter().all(|&t| t == 0.0));
     assert!(error(&without).contains("missing column(s): guidance_torque_nm"));
+    // Or the numbers in it.
+    for nothing in ["", "NaN", "-"] {
+        let empty = text(|_, r| r[4] = nothing.to_owned());
+        let log = DriveLog::read(empty.as_bytes(), true).unwrap();
+        assert!(log.guidance_torque_nm.iter().all(|&t| t == 0.0));
+        assert!(error(&empty).starts_with("line 2: guidance_torque_nm is "));
+    }
 }
 
 #[test]
@@ -120,9 +131,69 @@ fn time_that_stops_jumps_or_limps_is_named_with_its_line() {
     }));
     assert!(e.contains("uneven time stamps"), "{e}");
     assert!(error(&text(|k, r| r[0] = format!("{}", 10 * k))).contains("is it in ms?"));
-    // Stamps rounded to a millisecond at 120 Hz are even enough.
-    let rounded = text(|k, r| r[0] = format!("{:.3}", k as f64 / 120.0 * 1.2));
-    assert!(DriveLog::read(rounded.as_bytes(), false).is_ok());
+}
+
+#[test]
+fn stamps_rounded_to_a_millisecond_are_read_as_the_even_grid_that_they_are() {
+    for rate_hz in [60.0, 120.0, 144.0, 240.0, 250.0] {
+        let time_s = |k: usize| 1000.0 + k as f64 / rate_hz;
+        let rounded = rows(2600, |k, r| {
+            r[0] = format!("{:.3}", time_s(k));
+            r[1] = "0".to_owned();
+            r[2] = "0".to_owned();
+        });
+        let log = DriveLog::read(rounded.as_bytes(), false).unwrap();
+        for k in [0, 1300, 2599] {
+            assert!((log.time_s(k) - time_s(k)).abs() < 5e-5, "{rate_hz} Hz, row {k}");
+        }
+    }
+    // A lost sample among them is a gap, a clock that was set is uneven, each with its line.
+    let stamp = |k: usize, late: f64| format!("{:.3}", k as f64 / 120.0 + late);
+    let e = error(&rows(2600, |k, r| r[0] = stamp(k + usize::from(k >= 700), 0.0)));
+    assert!(e.starts_with("line 702: gap of 0.01"), "{e}");
+    let e = error(&rows(2600, |k, r| {
+        r[0] = stamp(k, if k < 700 { 0.0 } else { 0.0033 })
+    }));
+    assert!(
+        e.starts_with("line 70") && e.contains("uneven time stamps"),
+        "{e}"
+    );
+}
+
+#[test]
+fn comments_capitals_and_windows_line_ends_are_read_and_lines_counted_with_them() {
+    let plain = DriveLog::read(text(|_, _| {}).as_bytes(), false).unwrap();
+    let dressed = |t: &str| {
+        let t = t.replace(
+            HEADER,
+            &format!("# drive 7\n# by hand\n{}", HEADER.to_uppercase()),
+        );
+        t.replace("\n0.0500,", "\n# overtaken\n0.0500,")
+            .replace('\n', "\r\n")
+    };
+    let read = DriveLog::read(dressed(&text(|_, _| {})).as_bytes(), false).unwrap();
+    assert_eq!(read, plain);
+    // Row 40 is line 42 of the plain file; three comments stand before it.
+    let e = error(&dressed(&text(|k, r| {
+        if k == 40 {
+            r[5] = "x".to_owned();
+        }
+    })));
+    assert!(e.starts_with("line 45: driver_torque_nm is \"x\""), "{e}");
+    let e = error(&dressed(&text(|_, _| {})).replace("E_Y_M", "E_Y_MM"));
+    assert!(e.starts_with("line 3: missing column(s): e_y_m"), "{e}");
+    assert!(error("# only a comment").contains("missing column(s): time_s"));
+}
+
+#[test]
+fn another_separator_is_named() {
+    for (separator, name) in [(";", "';'"), ("\t", "'\\t'")] {
+        let e = error(&text(|_, _| {}).replace(',', separator));
+        assert_eq!(
+            e,
+            format!("line 1: this file is separated by {name}; commas are wanted")
+        );
+    }
 }
 
 #[test]
