@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use host_sim::identify::{Identification, Options, open_recording};
+use host_sim::input::in_range;
 use host_sim::models::road::Course;
-use host_sim::scenario::DEFAULT_SPEED_KMH;
+use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
 
 use super::output::Output;
@@ -52,13 +53,8 @@ enum MethodArgument {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let mut options = Options {
-        manual: arguments.manual,
-        ..Options::default()
-    };
-    for assignment in &arguments.fix {
-        options.fix(assignment)?;
-    }
+    let options = Options::given(arguments.manual, &arguments.fix)?;
+    in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
         MethodArgument::NoiseModel => Method::NoiseModel,

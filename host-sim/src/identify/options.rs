@@ -40,29 +40,57 @@ const FIXABLE: [(&str, f64, f64); 11] = [
     ("a_1", 1e-4, 10.0),
     ("a_2", 1e-4, 10.0),
     ("a_3", 1e-4, 100.0),
-    ("gain_1", -10.0, 10.0),
-    ("gain_2", -10.0, 10.0),
-    ("gain_3", -100.0, 100.0),
+    ("gain_1", 0.0, 10.0),
+    ("gain_2", 0.0, 10.0),
+    ("gain_3", 0.0, 100.0),
     ("t_p", 0.0, 0.6),
-    ("k_d", 0.0, 20.0),
+    // Above zero, so that there is a scale to split the gains with, whatever K_nms is.
+    ("k_d", 0.1, 20.0),
     ("k_hg", 0.0, 1.0),
     ("k_nms", 0.0, 10.0),
     ("t_nms", 0.01, 1.0),
 ];
 
 impl Options {
-    /// Takes a `NAME=VALUE`.
+    /// What is known of a drive, from every `NAME=VALUE` that was given.
+    ///
+    /// # Errors
+    /// As [`Options::fix`]; a name that is given twice; K_hg of a `manual` drive.
+    pub fn given(manual: bool, assignments: &[String]) -> Result<Self, FixError> {
+        let mut options = Self {
+            manual,
+            ..Self::default()
+        };
+        let mut names = Vec::new();
+        for assignment in assignments {
+            let name = options.fix(assignment)?;
+            if names.contains(&name) {
+                return Err(FixError(format!(
+                    "--fix {assignment}: {name} is given twice, once is allowed"
+                )));
+            }
+            names.push(name);
+        }
+        if manual && options.k_hg.is_some() {
+            return Err(FixError(
+                "--fix k_hg: a --manual drive has no k_hg to fix".to_owned(),
+            ));
+        }
+        Ok(options)
+    }
+
+    /// Takes a `NAME=VALUE` and returns the name.
     ///
     /// # Errors
     /// No `=`, an unknown name, a value that is no number or outside the name's range.
-    pub fn fix(&mut self, assignment: &str) -> Result<(), FixError> {
+    pub fn fix(&mut self, assignment: &str) -> Result<&'static str, FixError> {
         let Some((name, text)) = assignment.split_once('=') else {
             return Err(FixError(format!(
                 "--fix {assignment}: NAME=VALUE is wanted, such as k_d=3.2"
             )));
         };
         let name = name.trim().to_ascii_lowercase();
-        let Some(&(_, low, high)) = FIXABLE.iter().find(|(n, ..)| *n == name) else {
+        let Some(&(name, low, high)) = FIXABLE.iter().find(|(n, ..)| *n == name) else {
             let names: Vec<&str> = FIXABLE.iter().map(|f| f.0).collect();
             return Err(FixError(format!(
                 "--fix {name}: unknown, one of {} is wanted",
@@ -78,7 +106,7 @@ impl Options {
                 "--fix {name}: {value} is outside {low} to {high}"
             )));
         }
-        match name.as_str() {
+        match name {
             "a_1" => self.a[0] = Some(value),
             "a_2" => self.a[1] = Some(value),
             "a_3" => self.a[2] = Some(value),
@@ -91,7 +119,7 @@ impl Options {
             "k_nms" => self.muscle.k_nms = value,
             _ => self.muscle.t_nms_s = value,
         }
-        Ok(())
+        Ok(name)
     }
 
     /// Whether what is given can all be true for the noise model, in which gain_i = (K_d + K_nms)*a_i: K_d and one
@@ -141,10 +169,32 @@ mod tests {
             ("k_hg=1.5", "k_hg: 1.5 is outside 0 to 1"),
             ("t_p=soon", "\"soon\" is not a number"),
             ("t_p=NaN", "NaN is outside"),
+            ("k_d=0", "k_d: 0 is outside 0.1 to 20"),
+            ("gain_2=-0.1", "gain_2: -0.1 is outside 0 to 10"),
         ] {
             let e = o.fix(fix).unwrap_err().to_string();
             assert!(e.contains(says), "{e}");
         }
+    }
+
+    #[test]
+    fn a_name_given_twice_and_the_k_hg_of_a_manual_drive_are_refused() {
+        let given = |manual, fixes: &[&str]| {
+            let fixes: Vec<String> = fixes.iter().map(|&f| f.to_owned()).collect();
+            Options::given(manual, &fixes)
+        };
+        let error = given(false, &["k_d=3", "k_nms=1", " K_D =4"]).unwrap_err();
+        assert!(error.to_string().contains("k_d is given twice"), "{error}");
+        let error = given(true, &["k_hg=0.2"]).unwrap_err();
+        assert!(
+            error.to_string().contains("a --manual drive has no k_hg"),
+            "{error}"
+        );
+        let options = given(false, &["k_d=3", "k_hg=0.2"]).unwrap();
+        assert_eq!(
+            (options.manual, options.k_d, options.k_hg),
+            (false, Some(3.0), Some(0.2))
+        );
     }
 
     #[test]
