@@ -235,6 +235,10 @@ pub(crate) fn covariance(h: &DMatrix<f64>, chosen: &[usize]) -> DMatrix<f64> {
         out[(i, i)] = f64::INFINITY;
     }
     let n = live.len();
+    // Everything given, or without effect: nalgebra has no eigenvalues of an empty matrix.
+    if n == 0 {
+        return out;
+    }
     let scale: Vec<f64> = live.iter().map(|&i| h[(i, i)].sqrt()).collect();
     let eigen =
         DMatrix::from_fn(n, n, |r, c| h[(live[r], live[c])] / (scale[r] * scale[c])).symmetric_eigen();
@@ -351,5 +355,6 @@ mod tests {
         let together = DMatrix::from_row_slice(2, 2, &[1.0, 3.0, 3.0, 9.0]);
         let c = covariance(&together, &[0, 1]);
         assert_eq!((c[(0, 0)], c[(1, 1)]), (f64::INFINITY, f64::INFINITY));
+        assert_eq!(covariance(&together, &[]), DMatrix::zeros(2, 2));
     }
 }
