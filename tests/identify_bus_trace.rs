@@ -27,6 +27,10 @@ static DRIVE: LazyLock<(String, Vec<f64>)> = LazyLock::new(|| {
     };
     scenario.guidance.probe = true;
     scenario.guidance.controller.probe_amplitude_nm = 0.2;
+    record(&scenario)
+});
+
+fn record(scenario: &Scenario) -> (String, Vec<f64>) {
     let (mut text, mut seen) = (String::new(), Vec::new());
     let road = Centreline::new(&scenario.course);
     let watch = &mut |cycle: &Cycle| {
@@ -40,9 +44,9 @@ static DRIVE: LazyLock<(String, Vec<f64>)> = LazyLock::new(|| {
             text.push('\n');
         }
     };
-    closed_loop::observe(&scenario, &road, watch).unwrap();
+    closed_loop::observe(scenario, &road, watch).unwrap();
     (text, seen)
-});
+}
 
 fn open(
     text: &str,
@@ -84,6 +88,39 @@ fn the_driver_is_found_from_the_bus() {
             "{parameter:?} against {truth}"
         );
     }
+}
+
+/// The default drive, without remnant and probe: what the bus does not carry exactly is all the noise there is, and it
+/// draws K_hg (truth: 0.5) beyond 1. Nothing that goes with K_hg may then be called known; what stays put along its
+/// ridge is, and the truth (4*0.1, 4*0.05, 4*3.7; 0.1 s) lies there.
+#[test]
+fn a_bound_that_the_data_contradict_takes_the_verdict_of_all_that_it_moves() {
+    let (text, _) = record(&Scenario::default());
+    let (log, _) = open(&text, None).unwrap();
+    let found = identify_with_noise_model(&log, &Options::default());
+    let p = &found.parameters;
+    assert!(p.k_hg.on_bound && p.k_hg.optimum == Some(1.0));
+    for parameter in [p.gain_1, p.gain_2, p.gain_3, p.t_p, p.k_hg] {
+        assert!(!parameter.identified && parameter.estimate.is_none());
+        assert!(parameter.interval_95.is_none(), "{parameter:?}");
+    }
+    assert!(found.notes.iter().any(|n| n.contains("k_hg rests on a bound")));
+    assert!(
+        !found
+            .notes
+            .iter()
+            .any(|n| n.contains("standard error is too large"))
+    );
+    let on_ridge = found
+        .combinations
+        .iter()
+        .find(|c| c.name.starts_with("gain_3 - "))
+        .unwrap();
+    let slope: f64 = on_ridge.name["gain_3 - ".len()..]
+        .trim_end_matches("*k_hg")
+        .parse()
+        .unwrap();
+    assert!((on_ridge.estimate - (14.8 - 0.5 * slope)).abs() < 4.0 * on_ridge.standard_error);
 }
 
 #[test]

@@ -64,6 +64,60 @@ fn without_noise_every_identifiable_parameter_is_within_one_percent() {
     assert!(found.fit_percent > 99.0);
 }
 
+/// Even without a probe: so little noise leaves room for no second explanation, and the standard errors say so.
+#[test]
+fn without_noise_and_probe_too_every_parameter_is_within_one_percent() {
+    let (log, truth) = load("guided-clean");
+    let found = identify_with_noise_model(&log, &Options::default());
+    let k_hg = (found.parameters.k_hg, number(&truth, "K_hg"));
+    let [gains @ .., (t_p, true_t_p)] = with_truth(&found, &truth);
+    assert!((t_p.estimate.unwrap() - true_t_p).abs() < 0.002);
+    for (parameter, value) in gains.into_iter().chain([k_hg]) {
+        assert!(
+            (parameter.estimate.unwrap() / value - 1.0).abs() < 0.01,
+            "{parameter:?}"
+        );
+        assert_covers(&parameter, value);
+    }
+}
+
+#[test]
+fn the_published_way_refuses_what_is_outside_table_4() {
+    let (log, _) = load("guided-probe");
+    let mut options = Options::default();
+    options.fix("k_d=7").unwrap();
+    let error = identify_as_published(&log, &options).unwrap_err().to_string();
+    assert!(error.starts_with("--fix k_d: 7 is outside 1 to 5"), "{error}");
+}
+
+/// Every parameter given: there is nothing to search, and the fit is that of the truth, whose torque explains more
+/// than half of a drive with this remnant.
+#[test]
+fn a_driver_who_is_known_altogether_is_simulated() {
+    let (log, truth) = load("guided-probe");
+    let mut options = Options::default();
+    for (name, key) in [
+        ("a_1", "a1"),
+        ("a_2", "a2"),
+        ("a_3", "a3"),
+        ("t_p", "t_p"),
+        ("k_d", "K_d"),
+        ("k_hg", "K_hg"),
+    ] {
+        options.fix(&format!("{name}={}", number(&truth, key))).unwrap();
+    }
+    for found in [
+        identify_as_published(&log, &options).unwrap(),
+        identify_with_noise_model(&log, &options),
+    ] {
+        let p = &found.parameters;
+        assert!(p.t_p.fixed && p.k_hg.fixed && p.k_d.fixed && p.a_1.fixed);
+        assert!((p.a_1.estimate.unwrap() - 0.09).abs() < 1e-12);
+        assert!(found.correlation.names.is_empty());
+        assert!((50.0..80.0).contains(&found.fit_percent), "{}", found.fit_percent);
+    }
+}
+
 #[test]
 fn with_a_probe_k_hg_is_read_through_the_remnant() {
     let (log, truth) = load("guided-probe");

@@ -75,6 +75,23 @@ fn without_noise_all_parameters_are_within_one_percent() {
     });
 }
 
+/// K_hg 0 and 1 are drivers too: a bound that rounding passes by a hair is no contradiction.
+#[test]
+fn drivers_at_either_end_of_k_hg_are_identified() {
+    for k_hg in [0.0, 1.0] {
+        let mut driver = participants()[0].guided;
+        driver.k_hg = Some(k_hg);
+        let found = identified_without_noise(&driver);
+        for (parameter, truth) in with_truth(&found, &driver) {
+            let estimate = parameter.estimate.unwrap();
+            assert!(
+                (estimate - truth).abs() < 0.01 * truth.max(0.1),
+                "{estimate} for {truth}"
+            );
+        }
+    }
+}
+
 /// 14 participants x 5 seeds with a 0.2 N.m probe: K_hg is read within 0.05 in each drive, and the 95 % intervals of
 /// all parameters hold the truth as often as they promise.
 #[test]

@@ -48,7 +48,7 @@ const TOLERANCE: f64 = 1e-4;
 /// Identifies the driver of `log` as the paper does.
 ///
 /// # Errors
-/// A fixed `gain_i`, which is no parameter of this method.
+/// A fixed `gain_i`, which is no parameter of this method; a fixed value outside table 4.
 pub fn identify(log: &DriveLog, options: &Options) -> Result<Identification, FixError> {
     if let Some(i) = options.gain.iter().position(Option::is_some) {
         return Err(FixError(format!(
@@ -56,10 +56,25 @@ pub fn identify(log: &DriveLog, options: &Options) -> Result<Identification, Fix
             n = i + 1
         )));
     }
+    for ((name, value), (_, low, high)) in NAMES.iter().zip(known(options)).zip(TABLE_4) {
+        if let (Some(name), Some(v)) = (name, value)
+            && !(low..=high).contains(&v)
+        {
+            return Err(FixError(format!(
+                "--fix {name}: {v} is outside {low} to {high}, the interval of table 4 that the paper's method keeps to"
+            )));
+        }
+    }
     let problem = Problem::new(log, options);
     let start = TABLE_4.map(|(default, ..)| default);
     let optimum = minimise(&start, &problem.bounds, TOLERANCE, |p| problem.evaluate(p));
     Ok(problem.report(options, &optimum))
+}
+
+/// What the caller knows of each parameter, in the order of [`NAMES`].
+fn known(options: &Options) -> [Option<f64>; COUNT] {
+    let [a_1, a_2, a_3] = options.a;
+    [a_1, a_2, a_3, options.t_p_s, options.k_d, options.k_hg]
 }
 
 struct Problem<'a> {
@@ -79,15 +94,7 @@ type Unit = SVector<f64, 5>;
 impl<'a> Problem<'a> {
     fn new(log: &'a DriveLog, options: &Options) -> Self {
         let mut bounds = TABLE_4.map(|(_, low, high)| Bounds::new(low, high));
-        let known = [
-            options.a[0],
-            options.a[1],
-            options.a[2],
-            options.t_p_s,
-            options.k_d,
-            options.k_hg,
-        ];
-        for (bound, value) in bounds.iter_mut().zip(known) {
+        for (bound, value) in bounds.iter_mut().zip(known(options)) {
             if let Some(v) = value {
                 *bound = Bounds::new(v, v);
             }
@@ -197,7 +204,7 @@ impl<'a> Problem<'a> {
                 } else {
                     f64::INFINITY
                 };
-                Parameter::estimated(p[i], p[i], variance, self.bounds[i], high - low)
+                Parameter::estimated(p[i], 0.0, variance, self.bounds[i], high - low)
             }
         };
         let sum = p[K_D] + self.k_nms;
@@ -207,8 +214,7 @@ impl<'a> Problem<'a> {
                 + 2.0 * sum * p[i] * errors[(i, K_D)]
                 + p[i] * p[i] * errors[(K_D, K_D)];
             let (_, low, high) = TABLE_4[i];
-            let mut g =
-                Parameter::estimated(sum * p[i], sum * p[i], variance, Bounds::FREE, 4.0 * (high - low));
+            let mut g = Parameter::estimated(sum * p[i], 0.0, variance, Bounds::FREE, 4.0 * (high - low));
             let (a, k_d) = (parameter(i), parameter(K_D));
             g.identified &= a.identified && k_d.identified;
             g.estimate = g.estimate.filter(|_| g.identified);

@@ -1,11 +1,17 @@
 //! What an identification says, and when it says that it cannot say.
 //!
-//! **Identified**: the parameter's 95 % interval is at most 40 % as wide as its variation interval (table 4 of
-//! the paper for a_i, K_d and K_hg; the search interval for t_p; the variation interval of a_i times the
-//! default K_d + K_nms = 4 for `gain_i`), i.e. its standard error is at most 0.102 of that width; and, if the
-//! optimum is on a bound, the unbounded optimum is within three standard errors of the bound, so that the
-//! bound trims noise and does not hide a contradiction. A parameter that is not identified has no `estimate`.
-//! What the search ended on is kept in `optimum`, for those who want to see where a method would have put it.
+//! **Identified**: the parameter's standard error is at most 0.102 of its variation interval (table 4 of the
+//! paper for a_i, K_d and K_hg; the search interval for t_p; the variation interval of a_i times the default
+//! K_d + K_nms = 4 for `gain_i`), i.e. a 95 % interval that no bound cuts is at most 40 % as wide; and no
+//! bound contradicts it. A bound is *contradicted* if the optimum lies on it and the unbounded optimum lies
+//! beyond it by more than three standard errors and a hundredth of the variation interval: then it does not
+//! trim noise, the model does not hold, and so neither do the standard errors. Neither the parameter on that
+//! bound nor any that the bound moves by more than three of its standard errors (with the first held) is then
+//! identified, nor has it an interval. A parameter that is not identified has no `estimate`. What the search
+//! ended on is kept in `optimum`, for those who want to see where a method would have put it.
+//!
+//! The 95 % interval belongs to the unbounded optimum; on the side where the optimum lies it reaches as far
+//! as the likelihood ratio to that optimum allows, so it always holds the estimate.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -17,7 +23,7 @@ use super::search::{Bounds, Termination};
 pub struct Parameter {
     /// The estimate; none where the data do not identify the parameter.
     pub estimate: Option<f64>,
-    /// Standard error; none where the data put no bound on it at all.
+    /// Standard error; none where the data put no bound on it at all, or contradict the model.
     pub standard_error: Option<f64>,
     /// 95 % interval, cut to the range that the parameter can have.
     pub interval_95: Option<[f64; 2]>,
@@ -55,33 +61,46 @@ impl Parameter {
         }
     }
 
-    /// From where the search ended, the point that it would have reached without bounds (to first order) and
-    /// the variance there.
+    /// From where the search ended, how much farther it would have gone without bounds (to first order) and the
+    /// variance there.
     pub(crate) fn estimated(
         optimum: f64,
-        unbounded: f64,
+        pull: f64,
         variance: f64,
         bounds: Bounds,
         variation_width: f64,
     ) -> Self {
-        let on_bound = bounds.touches(optimum);
-        let determined = variance.is_finite() && unbounded.is_finite();
+        let not = Self::not_identified(optimum, bounds);
+        if !variance.is_finite() || !pull.is_finite() {
+            return not;
+        }
         let standard_error = variance.max(0.0).sqrt();
-        let identified = determined
-            && STANDARD_NORMAL_95 * standard_error <= 0.5 * WIDEST_INTERVAL_SHARE * variation_width
-            && (!on_bound || (unbounded - optimum).abs() <= 3.0 * standard_error);
+        let margin = STANDARD_NORMAL_95 * standard_error;
+        let identified = margin <= 0.5 * WIDEST_INTERVAL_SHARE * variation_width;
+        let towards_optimum = margin.hypot(pull);
+        let (below, above) = if pull > 0.0 {
+            (towards_optimum, margin)
+        } else {
+            (margin, towards_optimum)
+        };
+        let unbounded = optimum + pull;
         Self {
             estimate: identified.then_some(optimum),
-            standard_error: determined.then_some(standard_error),
-            interval_95: determined.then(|| {
-                [-1.0, 1.0].map(|s| {
-                    (unbounded + s * STANDARD_NORMAL_95 * standard_error).clamp(bounds.low, bounds.high)
-                })
-            }),
+            standard_error: Some(standard_error),
+            interval_95: Some(
+                [unbounded - below, unbounded + above].map(|end| end.clamp(bounds.low, bounds.high)),
+            ),
             identified,
-            on_bound,
-            fixed: false,
+            ..not
+        }
+    }
+
+    /// Of a search that ended at `optimum`, which says nothing of the parameter.
+    pub(crate) fn not_identified(optimum: f64, bounds: Bounds) -> Self {
+        Self {
+            on_bound: bounds.touches(optimum),
             optimum: Some(optimum),
+            ..Self::ABSENT
         }
     }
 
@@ -285,4 +304,23 @@ pub struct Identification {
     /// Signals to plot.
     #[serde(skip)]
     pub traces: Traces,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unbounded optimum 1.2 with standard error 0.1, bound 1. The log likelihood at the bound is (0.2/0.1)^2/2 = 2
+    /// below the peak; 95 % is 1.96^2/2 farther down, at 1.2 -+ 0.1 sqrt(4 + 1.96^2) = 1.2 - 0.28002 downwards.
+    #[test]
+    fn the_interval_of_a_parameter_on_its_bound_reaches_down_by_the_likelihood_ratio() {
+        let p = Parameter::estimated(1.0, 0.2, 0.01, Bounds::new(0.0, 1.0), 1.0);
+        let [low, high] = p.interval_95.unwrap();
+        assert!((low - 0.919_98).abs() < 1e-4 && high == 1.0, "{low} {high}");
+        assert!(p.on_bound && p.identified && p.estimate == Some(1.0));
+        // Off any bound: 1.96 standard errors to both sides.
+        let p = Parameter::estimated(0.5, 0.0, 0.01, Bounds::new(0.0, 1.0), 1.0);
+        let [low, high] = p.interval_95.unwrap();
+        assert!((low - 0.304).abs() < 1e-4 && (high - 0.696).abs() < 1e-4);
+    }
 }

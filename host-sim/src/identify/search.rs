@@ -266,15 +266,6 @@ pub(crate) fn covariance(h: &DMatrix<f64>, chosen: &[usize]) -> DMatrix<f64> {
     out
 }
 
-/// How far the unbounded optimum is from the bounded one, to first order: `-H^-1 g`.
-pub(crate) fn pull_of_bounds(errors: &DMatrix<f64>, gradient: &DVector<f64>, variance: f64) -> DVector<f64> {
-    if variance > 0.0 {
-        -(errors * gradient) / variance
-    } else {
-        DVector::zeros(gradient.len())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,8 +2,8 @@
 //!
 //! Measured torque = driver (see [`super::signals`]) + constant + n, where the disturbance n is a first-order
 //! low-passed Gaussian (the remnant) plus white sensor noise. Sampled, that is exactly an ARMA(1,1) process,
-//! `n_k = rho n_{k-1} + e_k - theta e_{k-1}` with rho and theta not negative. The sum of squared one-step prediction errors e is minimised over
-//! driver and disturbance together.
+//! `n_k = rho n_{k-1} + e_k - theta e_{k-1}` with rho and theta not negative. The sum of squared one-step
+//! prediction errors e is minimised over driver and disturbance together.
 //!
 //! Why not simply fit the torque: in a closed loop the remnant turns the wheel, the car and so the inputs. A fit
 //! of the simulated torque sees inputs that carry the remnant of seconds ago, whose correlation with the
@@ -68,7 +68,8 @@ const START_CORNERS_HZ: [f64; 2] = [0.5, 5.0];
 /// this leaves the estimate within two hundredths of a standard error of the optimum.
 const TOLERANCE: f64 = 1e-8;
 /// Prediction errors below this, N.m, are those of interpolation in a record without noise: no sensor resolves
-/// them, and no share of them is worth an iteration.
+/// them, and no share of them is worth an iteration. They are systematic, so that the rows do not average them out
+/// as if they were noise: the standard errors are never taken from smaller ones.
 const SMALLEST_ERROR_NM: f64 = 1e-5;
 
 /// Identifies the driver of `log`.
@@ -88,6 +89,8 @@ struct Problem<'a> {
 impl<'a> Problem<'a> {
     fn new(signals: &'a Signals, options: &Options) -> Self {
         let mut bounds = [Bounds::FREE; COUNT];
+        // A driver who steers away from the target line is none.
+        bounds[..3].fill(Bounds::new(0.0, f64::INFINITY));
         bounds[K_HG] = Bounds::new(0.0, 1.0);
         bounds[T_P] = Bounds::new(0.0, LONGEST_DELAY_S);
         bounds[RHO] = Bounds::new(0.0, 0.999_99);

@@ -6,15 +6,22 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{COUNT, K_HG, NAMES, Problem, RHO, T_P, THETA, VARIATION_WIDTHS};
+use super::{COUNT, K_HG, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA, VARIATION_WIDTHS};
 use crate::identify::diagnostics;
 use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
+use crate::identify::paper::TABLE_4;
 use crate::identify::result::{
-    Combination, Correlation, Identification, Parameter, Parameters, Remnant, STANDARD_NORMAL_95, Start,
-    Traces,
+    Combination, Correlation, Identification, Parameter, Parameters, Remnant, Start, Traces,
 };
-use crate::identify::search::{Optimum, covariance, pull_of_bounds};
+use crate::identify::search::{Bounds, Optimum, covariance};
+
+/// Standard errors by which a bound may trim an optimum; beyond, the data contradict it.
+const TRIMMED_AT_MOST: f64 = 3.0;
+
+/// Share of its variation interval by which a parameter may pass a bound all the same: in a record without noise,
+/// standard errors are that small.
+const TRIMMED_SHARE: f64 = 0.01;
 
 impl Problem<'_> {
     pub(super) fn report(
@@ -32,31 +39,29 @@ impl Problem<'_> {
         let free: Vec<usize> = (0..COUNT).filter(|&i| !known(i)).collect();
         let rows = self.signals.len() - self.first_row;
         let variance = 2.0 * optimum.quadratic.loss / rows.saturating_sub(free.len()).max(1) as f64;
-        let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
-        // Where the search would have gone without bounds, if it came to rest on one.
-        let held = [K_HG, T_P]
-            .into_iter()
-            .any(|i| self.is_free(i) && self.bounds[i].touches(p[i]));
-        let pull = if held {
-            pull_of_bounds(&errors, &optimum.quadratic.gradient, variance)
-        } else {
-            DVector::zeros(COUNT)
-        };
+        let error_variance = variance.max(SMALLEST_ERROR_NM.powi(2));
+        let errors = covariance(&optimum.quadratic.hessian, &free) * error_variance;
+        let trim = self.trim(optimum, &free, &errors, error_variance);
         let parameter = |i: usize| {
-            if self.is_free(i) {
+            if !self.is_free(i) {
+                Parameter::fixed(p[i])
+            } else if trim.contradicted[i] {
+                Parameter::not_identified(p[i], self.bounds[i])
+            } else {
                 Parameter::estimated(
                     p[i],
-                    p[i] + pull[i],
+                    trim.pull[i],
                     errors[(i, i)],
                     self.bounds[i],
                     VARIATION_WIDTHS[i],
                 )
-            } else {
-                Parameter::fixed(p[i])
             }
         };
         let gains = [0, 1, 2].map(parameter);
-        let (k_d, a) = split_scale(&gains, options);
+        let split = split_scale(&gains, &trim.pull, &errors, options);
+        let (k_d, a) = split
+            .clone()
+            .unwrap_or((Parameter::ABSENT, [Parameter::ABSENT; 3]));
         let k_hg = if options.manual {
             Parameter::ABSENT
         } else {
@@ -73,8 +78,10 @@ impl Problem<'_> {
             gain_2: gains[1],
             gain_3: gains[2],
         };
-        let mut notes = self.notes(log, options, &parameters, &starts);
-        let combinations = if !k_hg.identified && k_hg.standard_error.is_some_and(|s| s > 0.0) {
+        let mut notes = self.notes(log, options, &parameters, &trim, &starts);
+        notes.extend(split.err());
+        let along_k_hg = trim.bounds.iter().all(|&(i, _)| i == K_HG);
+        let combinations = if !options.manual && !k_hg.identified && along_k_hg {
             self.combinations(p, &errors)
         } else {
             Vec::new()
@@ -120,12 +127,48 @@ impl Problem<'_> {
         }
     }
 
+    /// What the driver's bounds did to the optimum.
+    fn trim(&self, optimum: &Optimum, free: &[usize], errors: &DMatrix<f64>, variance: f64) -> Trim {
+        let held: Vec<usize> = free
+            .iter()
+            .copied()
+            .filter(|&i| self.bounds[i].touches(optimum.point[i]))
+            .collect();
+        let pull = if held.is_empty() {
+            DVector::zeros(COUNT)
+        } else {
+            -(errors * &optimum.quadratic.gradient) / variance
+        };
+        let beyond = |i: usize, errors: &DMatrix<f64>| {
+            pull[i].is_finite() && pull[i].abs() > TRIMMED_AT_MOST * errors[(i, i)].sqrt()
+        };
+        let bounds: Vec<usize> = held
+            .into_iter()
+            .filter(|&i| beyond(i, errors) && pull[i].abs() > TRIMMED_SHARE * VARIATION_WIDTHS[i])
+            .collect();
+        let contradicted = if bounds.is_empty() {
+            [false; COUNT]
+        } else {
+            let others: Vec<usize> = free.iter().copied().filter(|i| !bounds.contains(i)).collect();
+            let with_bounds = covariance(&optimum.quadratic.hessian, &others) * variance;
+            std::array::from_fn(|i| beyond(i, &with_bounds))
+        };
+        Trim {
+            bounds: bounds
+                .into_iter()
+                .map(|i| (i, optimum.point[i] + pull[i]))
+                .collect(),
+            contradicted,
+            pull,
+        }
+    }
+
     /// What stays put along the ridge of K_hg: each other parameter minus its regression on K_hg.
     fn combinations(&self, p: &[f64], errors: &DMatrix<f64>) -> Vec<Combination> {
         let spread = errors[(K_HG, K_HG)];
         [0, 1, 2, T_P]
             .into_iter()
-            .filter(|&i| self.is_free(i) && errors[(i, i)].is_finite() && spread.is_finite())
+            .filter(|&i| self.is_free(i) && errors[(i, i)].is_finite() && spread.is_finite() && spread > 0.0)
             .map(|i| {
                 let slope = errors[(i, K_HG)] / spread;
                 let left = errors[(i, i)] - slope * errors[(i, K_HG)];
@@ -139,9 +182,16 @@ impl Problem<'_> {
             .collect()
     }
 
-    fn notes(&self, log: &DriveLog, options: &Options, found: &Parameters, starts: &[Start]) -> Vec<String> {
+    fn notes(
+        &self,
+        log: &DriveLog,
+        options: &Options,
+        found: &Parameters,
+        trim: &Trim,
+        starts: &[Start],
+    ) -> Vec<String> {
         let mut notes = Vec::new();
-        if !found.k_d.identified {
+        if options.k_d.is_none() && options.a.iter().all(Option::is_none) {
             notes.push(
                 "k_d and a_1, a_2, a_3 cannot be told apart: the torque depends on gain_i = (k_d + k_nms)*a_i alone. \
                  Give one of them with --fix to split the gains."
@@ -153,12 +203,25 @@ impl Problem<'_> {
                 "guidance_torque_nm is zero throughout: k_hg has no effect; was it a --manual drive?"
                     .to_owned(),
             );
-        } else if !options.manual && !found.k_hg.identified {
+        } else if !options.manual && !found.k_hg.identified && !trim.contradicted[K_HG] {
             notes.push(
                 "k_hg is not identified: the standard error is too large a share of its range 0 to 1. A probe \
                  torque makes it readable."
                     .to_owned(),
             );
+        }
+        for &(i, unbounded) in &trim.bounds {
+            let moved: Vec<&str> = (0..COUNT)
+                .filter(|&j| trim.contradicted[j])
+                .filter_map(|j| NAMES[j])
+                .collect();
+            notes.push(format!(
+                "{} rests on a bound that the data contradict: without it the optimum is at {:.4}. No driver of this \
+                 model made this record, so nothing that the bound moves is identified: {}.",
+                NAMES[i].unwrap_or_default(),
+                unbounded,
+                moved.join(", ")
+            ));
         }
         if options.manual && log.guidance_torque_nm.iter().any(|&t| t != 0.0) {
             notes.push("guidance_torque_nm is not zero, and was ignored as for a manual drive".to_owned());
@@ -201,7 +264,7 @@ impl Problem<'_> {
         self.filter(p, &u[self.first_row..])
     }
 
-    /// `(1 - rho/q)/(1 - theta/q)` applied to `u`, begun as in [`Problem::evaluate`].
+    /// `(1 - rho/q)/(1 - theta/q)` applied to `u`, begun as in [`Problem::sums`].
     fn filter(&self, p: &[f64], u: &[f64]) -> Vec<f64> {
         let (rho, theta) = (p[RHO], p[THETA]);
         let mut last = u[0];
@@ -216,54 +279,75 @@ impl Problem<'_> {
     }
 }
 
+/// What the driver's bounds did to the optimum.
+struct Trim {
+    /// How far the unbounded optimum is from the bounded one, to first order.
+    pull: DVector<f64>,
+    /// Parameters on a bound that the data contradict, and where they would be without it.
+    bounds: Vec<(usize, f64)>,
+    /// Those, and all that move with them.
+    contradicted: [bool; COUNT],
+}
+
 /// Splits the gains with what the caller knows of the scale: K_d, or one a_i.
-fn split_scale(gains: &[Parameter; 3], options: &Options) -> (Parameter, [Parameter; 3]) {
+///
+/// # Errors
+/// The a_i given would need a K_d that is not above zero.
+fn split_scale(
+    gains: &[Parameter; 3],
+    pull: &DVector<f64>,
+    errors: &DMatrix<f64>,
+    options: &Options,
+) -> Result<(Parameter, [Parameter; 3]), String> {
     let k_nms = options.muscle.k_nms;
     if let Some(k_d) = options.k_d {
-        return (
+        return Ok((
             Parameter::fixed(k_d),
             gains.map(|g| g.scaled(1.0 / (k_d + k_nms))),
-        );
+        ));
     }
     let Some((known, a)) = options.a.iter().enumerate().find_map(|(i, a)| a.map(|a| (i, a))) else {
-        return (Parameter::ABSENT, [Parameter::ABSENT; 3]);
+        return Ok((Parameter::ABSENT, [Parameter::ABSENT; 3]));
     };
-    // K_d = gain / a - K_nms; the other a_i = gain_i / (K_d + K_nms), with the error of both gains as if
-    // independent.
+    // K_d = gain / a - K_nms; the other a_i are a times the ratio of their gain to the known one's.
+    let optimum = [0, 1, 2].map(|i| gains[i].optimum.unwrap_or(0.0));
+    let k_d = optimum[known] / a - k_nms;
+    if k_d <= 0.0 {
+        return Err(format!(
+            "a_{n} = {a} contradicts the data: gain_{n} = {:.4} would make k_d {k_d:.4}, which is not above 0; \
+             k_d, and the a_i with it, stay unknown.",
+            optimum[known],
+            n = known + 1
+        ));
+    }
     let sum = gains[known].scaled(1.0 / a);
     let k_d = Parameter {
         estimate: sum.estimate.map(|x| x - k_nms),
         interval_95: sum.interval_95.map(|i| i.map(|x| x - k_nms)),
-        optimum: sum.optimum.map(|x| x - k_nms),
+        optimum: Some(k_d),
         ..sum
     };
     let split = |i: usize| {
         if i == known {
             return Parameter::fixed(a);
         }
-        let (Some(s), Some(g)) = (sum.optimum, gains[i].optimum) else {
-            return Parameter::ABSENT;
-        };
-        if s == 0.0 {
-            return Parameter::ABSENT;
+        let ratio = optimum[i] / optimum[known];
+        let unbounded_ratio = (optimum[i] + pull[i]) / (optimum[known] + pull[known]);
+        if gains[i].standard_error.is_none() || gains[known].standard_error.is_none() {
+            return Parameter::not_identified(a * ratio, Bounds::FREE);
         }
-        let value = g / s;
-        let standard_error = gains[i]
-            .standard_error
-            .zip(sum.standard_error)
-            .map(|(e_g, e_s)| (e_g.powi(2) + (value * e_s).powi(2)).sqrt() / s.abs());
-        let identified = gains[i].identified && sum.identified;
-        Parameter {
-            estimate: identified.then_some(value),
-            standard_error,
-            interval_95: standard_error.map(|e| [-1.0, 1.0].map(|z| value + z * STANDARD_NORMAL_95 * e)),
-            identified,
-            on_bound: false,
-            fixed: false,
-            optimum: Some(value),
-        }
+        let relative =
+            errors[(i, i)] - 2.0 * ratio * errors[(i, known)] + ratio * ratio * errors[(known, known)];
+        let (_, low, high) = TABLE_4[i];
+        Parameter::estimated(
+            a * ratio,
+            a * (unbounded_ratio - ratio),
+            (a / optimum[known]).powi(2) * relative,
+            Bounds::FREE,
+            high - low,
+        )
     };
-    (k_d, [split(0), split(1), split(2)])
+    Ok((k_d, [split(0), split(1), split(2)]))
 }
 
 /// Splits the ARMA(1,1) disturbance into a low-passed and a white part. From the autocovariances of
@@ -282,5 +366,47 @@ fn remnant(rho: f64, theta: f64, variance: f64, dt_s: f64) -> Remnant {
         sd_nm: low_passed.then(|| (driving / (1.0 - rho * rho)).sqrt()),
         white_sd_nm: white.sqrt(),
         innovation_sd_nm: variance.sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gain(estimate: f64) -> Parameter {
+        Parameter::estimated(estimate, 0.0, 0.01, Bounds::FREE, 8.0)
+    }
+
+    /// gain_1 = 0.4, gain_3 = 15 with variances 0.04 and 0.09 and covariance 0.03; a_3 = 3.75 makes the scale 4, so
+    /// K_d = 3 and a_1 = 0.1. By hand: r = 0.4/15, var a_1 = (0.04 - 2 r 0.03 + r^2 0.09)/4^2 = 0.002404.
+    #[test]
+    fn gains_are_split_with_the_covariance_of_their_errors() {
+        let mut errors = DMatrix::zeros(COUNT, COUNT);
+        errors[(0, 0)] = 0.04;
+        errors[(2, 2)] = 0.09;
+        errors[(0, 2)] = 0.03;
+        errors[(2, 0)] = 0.03;
+        let mut options = Options::default();
+        options.fix("a_3=3.75").unwrap();
+        let gains = [gain(0.4), gain(0.04), gain(15.0)];
+        let pull = DVector::zeros(COUNT);
+        let (k_d, [a_1, _, a_3]) = split_scale(&gains, &pull, &errors, &options).unwrap();
+        assert!((k_d.optimum.unwrap() - 3.0).abs() < 1e-12 && a_3.fixed);
+        assert!((a_1.optimum.unwrap() - 0.1).abs() < 1e-12);
+        assert!((a_1.standard_error.unwrap() - 0.002_404_f64.sqrt()).abs() < 1e-9);
+    }
+
+    /// 15/50 - 1 = -0.7 N.m/rad is no driver's.
+    #[test]
+    fn an_a_that_would_need_a_negative_k_d_is_contradicted() {
+        let mut options = Options::default();
+        options.fix("a_3=50").unwrap();
+        let gains = [gain(0.4), gain(0.04), gain(15.0)];
+        let (pull, errors) = (DVector::zeros(COUNT), DMatrix::zeros(COUNT, COUNT));
+        let error = split_scale(&gains, &pull, &errors, &options).unwrap_err();
+        assert!(
+            error.contains("a_3 = 50") && error.contains("k_d -0.7"),
+            "{error}"
+        );
     }
 }

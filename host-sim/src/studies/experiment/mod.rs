@@ -271,8 +271,7 @@ pub(super) fn identified_driver(scenario: &Scenario, found: &Identification, mus
     let p = &found.parameters;
     let k_d = p.k_d.optimum.unwrap_or(TABLE_4[4].0);
     let sum = k_d + muscle.k_nms;
-    // A driver model has no negative gains; an estimate near zero may be.
-    let a = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| (gain.optimum.unwrap_or(0.0) / sum).max(0.0));
+    let a = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| gain.optimum.unwrap_or(0.0) / sum);
     let mut again = scenario.clone();
     again.driver.a1 = a[0];
     again.driver.a2 = a[1];
