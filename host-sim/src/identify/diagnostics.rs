@@ -134,8 +134,8 @@ mod tests {
         assert_eq!((w.statistic, w.p_value, w.white), (0.0, 1.0, true));
     }
 
-    /// The residual is the input of 6 samples before, which repeats every 6: correlation 1 already at lag 0, so z = sqrt(n) there up to the
-    /// ends, and independence is denied. The other input is zero and says nothing.
+    /// The residual is the input of 6 samples before, which repeats every 6: correlation 1 already at lag 0, so
+    /// z = sqrt(n) there up to the ends, and independence is denied. The other input is zero and says nothing.
     #[test]
     fn a_residual_that_repeats_an_input_is_seen() {
         let u: Vec<f64> = (0..1000)

@@ -11,7 +11,8 @@
 //! its value belongs to the middle of that millisecond, from where it is moved to the sample instant along its
 //! slope, and then taken as the others. Where T_h jumps faster than the torque envelope can move, a probe
 //! switched (or the guidance failed) on the sample instant, and the old value is held up to it. Half a
-//! millisecond matters: with a 2.5 Hz sine as probe it is 10 ms of t_p. The delay is exact for the same lines, at any fraction of a sample, and so is its derivative:
+//! millisecond matters: with a 2.5 Hz sine as probe it is 10 ms of t_p. The delay is exact for the same lines, at
+//! any fraction of a sample, and so is its derivative:
 //! `d/dt_p L[u](t - t_p) = -(u - L[u])(t - t_p) / t_nms`.
 
 use super::log::DriveLog;
