@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::{speed, tool};
 
 /// Where the drives are recorded: participant 5 of the paper, 186 s on the built-in course, at 120 Hz.
-const LOGS: &str = "target/bench-identify";
+const OUT: &str = "target/bench-identify";
 
 pub(crate) fn run() -> Result<()> {
     tool::ensure(&[("python3", "python3-venv")])?;
@@ -24,9 +24,8 @@ pub(crate) fn run() -> Result<()> {
                 "0.2",
                 "--json",
                 "--out",
-                LOGS,
+                OUT,
                 "--logs",
-                LOGS,
             ]),
     )?;
     println!(
@@ -34,7 +33,7 @@ pub(crate) fn run() -> Result<()> {
         "one fit", "rows", "ours, ms", "SciPy, ms", "faster", "loss, ours", "loss, SciPy"
     );
     for name in ["guided", "manual"] {
-        let log = format!("{LOGS}/participant-05-{name}.csv");
+        let log = format!("{OUT}/logs/participant-05-{name}.csv");
         let text = tool::output(tool::command(&python).args(["bench/identify.py", &log]))?;
         let report: Value = serde_json::from_str(&text).context("bench/identify.py")?;
         let figure = |key: &str| {

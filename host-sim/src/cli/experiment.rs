@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::identify::Muscle;
-use host_sim::report::FileSet;
 use host_sim::studies::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
 
 use super::output::Output;
@@ -35,9 +34,9 @@ pub(super) struct Arguments {
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/experiment")]
     out: PathBuf,
-    /// Write the recorded drives too, a CSV file each, into this directory
-    #[arg(long, value_name = "DIR", conflicts_with = "repetitions")]
-    logs: Option<PathBuf>,
+    /// Write the recorded drives too, a CSV file each, into the directory's logs/
+    #[arg(long, conflicts_with = "repetitions")]
+    logs: bool,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
@@ -62,15 +61,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         return Ok(Outcome::Good);
     }
     let output = Output::begin(&arguments.out)?;
-    let logs = arguments.logs.as_deref().map(FileSet::begin).transpose()?;
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
-    output.finish(|place| result.write(place))?;
-    if let Some(logs) = logs {
-        result.write_logs(logs.staging())?;
-        logs.finish()?;
-    }
+    output.finish(|place| {
+        if arguments.logs {
+            result.write_logs(&place.join("logs"))?;
+        }
+        result.write(place)
+    })?;
     if arguments.json {
         print_json(&result)?;
     } else {
