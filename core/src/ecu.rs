@@ -162,6 +162,10 @@ impl Ecu {
 
     /// One step of the 1 kHz loop.
     pub fn step(&mut self, now: Instant) -> Step {
+        #[cfg(feature = "fault-injection")]
+        if self.injected.lane_never_ages {
+            self.receivers.renew_lane(now);
+        }
         let (mut v, mut inputs) = match (self.vitals.get(), self.receivers.take(now)) {
             (Some(vitals), Some(inputs)) => (*vitals, inputs),
             _ => self.begin_anew(now),
@@ -170,7 +174,7 @@ impl Ecu {
         let mut faults = FaultSet::from_bits(v.faults as u16);
         faults.insert_if(!self.receivers.actuator.obeys(v.applied), Fault::Actuator);
         faults.insert_if(
-            steps % SELF_TEST == 1 && !self.monitor_refuses_nonsense(),
+            steps % SELF_TEST == 1 && !self.monitor_refuses_nonsense(steps / SELF_TEST),
             Fault::SelfTest,
         );
         faults.insert_if(self.monitor.get().is_none(), Fault::Memory);
@@ -296,15 +300,17 @@ impl Ecu {
         frames
     }
 
-    /// The self-test: the monitor must refuse 8 N.m, which no profile allows.
-    fn monitor_refuses_nonsense(&self) -> bool {
-        let mut state = MonitorState::NEW;
-        let nonsense = (0x7FFF_u64 << 12 | u64::from(Mode::Active as u8) << 32).to_le_bytes();
+    /// The self-test: each turn the monitor must refuse what only one of its rules refuses.
+    fn monitor_refuses_nonsense(&self, turn: u32) -> bool {
+        let Some(monitor) = self.monitor.get() else {
+            return true;
+        };
+        let (mut state, guidance) = monitor.nonsense(turn);
         let evidence = Evidence {
             lane: None,
             column: None,
             demand: None,
-            guidance: &nonsense,
+            guidance: &guidance,
             elapsed_us: 1000,
         };
         !self.permits(&mut state, &evidence)
@@ -313,7 +319,7 @@ impl Ecu {
     /// Asks the monitor. One whose limits are damaged permits nothing.
     fn permits(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         #[cfg(feature = "fault-injection")]
-        if self.injected.monitor_agrees {
+        if (self.injected.monitor_passes)(evidence.guidance) {
             return true;
         }
         self.monitor

@@ -5,11 +5,14 @@
 //! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
 //! module: a mistake there must not repeat itself here. It shares how memory is guarded, and nothing else.
 //!
-//! What it refuses: a torque beyond the limit, growing too fast, in a mode without torque, against a driver
-//! who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for.
-//! The last is coarse (proportional part and rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for
-//! 20 ms, or while the torque falls: the envelope may still be bringing an honest change about. While the
-//! host asks for the probe, and for a second after, the band is wider by the probe's amplitude.
+//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), in a mode without
+//! torque, against a driver who overrides, on lane data that is too old, or, in Active, away from the torque that
+//! lane errors ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and
+//! rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count:
+//! the envelope may still be bringing an honest change about. While the host asks for the probe, and for a second
+//! after, the band is wider by the probe's amplitude.
+//!
+//! Each rule can be tried by itself: [`Monitor::nonsense`].
 
 use crate::vital::vital;
 
@@ -37,6 +40,7 @@ vital! {
         before: Lane,
         /// For how long there may still be a probe.
         probe_left_us: i32,
+        /// How many steps the torque was outside its band and not falling, since it was inside.
         astray_ms: i32,
         /// 1 after the first disagreement.
         withdrawn: i32,
@@ -68,8 +72,10 @@ pub struct Evidence<'a> {
     pub elapsed_us: u32,
 }
 
-/// Modes as the frame codes them: Active, Fade, Handover.
+/// Modes as the frame codes them; the last with torque is Handover.
+const STANDBY: i32 = 1;
 const ACTIVE: i32 = 2;
+const FADE: i32 = 3;
 const LAST_WITH_TORQUE: i32 = 4;
 /// Half an LSB on each side, and the roundings of this file.
 const TOLERANCE_MNM: i32 = 3;
@@ -85,6 +91,8 @@ const OLDEST_LANE_US: i32 = 40_000;
 const OVERRIDE_FROM_MNM: i32 = 800;
 const OVERRIDE_SLOPE: i32 = 3;
 const OVERRIDE_SLACK_MNM: i32 = 50;
+/// How many rules there are to try.
+pub const RULES: u32 = 6;
 /// Rates are taken over at least this.
 const RATE_SPAN_US: i32 = 50_000;
 
@@ -120,15 +128,19 @@ impl Monitor {
         state.observe(evidence, elapsed_us);
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
-        let grown = torque
-            .saturating_abs()
-            .saturating_sub(state.torque_mnm.saturating_abs());
-        let allowed = self
-            .growth_mnm_per_ms
-            .saturating_mul(elapsed_us.clamp(1000, 2000))
-            / 1000;
+        let changes_sign = (torque ^ state.torque_mnm).is_negative();
+        let old = if changes_sign { 0 } else { state.torque_mnm };
+        let grown = torque.saturating_abs().saturating_sub(old.saturating_abs());
+        let allowed = if mode == ACTIVE {
+            self.growth_mnm_per_ms
+                .saturating_mul(elapsed_us.clamp(1000, 2000))
+                .saturating_div(1000)
+                .saturating_add(TOLERANCE_MNM)
+        } else {
+            0
+        };
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
-            && grown <= allowed.saturating_add(TOLERANCE_MNM)
+            && grown <= allowed
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
             && self.leaves_the_driver_in_charge(torque, state.driver_mnm)
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
@@ -181,13 +193,34 @@ impl Monitor {
         let high = position.max(both).max(0).saturating_add(band);
         let low = position.min(both).min(0).saturating_sub(band);
         let falling = torque.saturating_abs() < state.torque_mnm.saturating_abs();
-        let astray = !(low..=high).contains(&torque) && !falling;
-        state.astray_ms = if astray {
-            state.astray_ms.saturating_add(1)
-        } else {
-            0
-        };
+        if (low..=high).contains(&torque) {
+            state.astray_ms = 0;
+        } else if !falling {
+            state.astray_ms = state.astray_ms.saturating_add(1);
+        }
         state.astray_ms <= ASTRAY_MS
+    }
+
+    /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
+    /// exactly one rule refuses. Each of [`RULES`] turns tries another one. (Below a limit of 0.4 N.m nothing can be
+    /// astray, and the limit refuses that turn.)
+    #[must_use]
+    pub fn nonsense(&self, turn: u32) -> (MonitorState, [u8; 8]) {
+        // As long as nothing else is said: a held torque that each rule allows.
+        let (mut torque, mut grown, mut mode, mut state) = (100, 0, ACTIVE, MonitorState::NEW);
+        match turn % RULES {
+            0 => (torque, mode) = (self.limit_mnm.saturating_add(20), FADE),
+            1 => grown = torque,
+            2 => mode = STANDBY,
+            3 => state.driver_mnm = -20_000,
+            4 => state.lane.age_us = 1_000_000,
+            _ => (torque, state.astray_ms) = (400, ASTRAY_MS),
+        }
+        state.torque_mnm = torque.saturating_sub(grown);
+        // The least count that is cut to so many mN.m again.
+        let count = torque.saturating_mul(4096) / 1000 + 1;
+        let word = u64::from(count.cast_unsigned()) << 12 | u64::from(mode.cast_unsigned()) << 32;
+        (state, word.to_le_bytes())
     }
 }
 

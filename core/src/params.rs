@@ -153,7 +153,7 @@ impl Config {
         Err(_) => panic!("the paper's parameters are in range"),
     };
 
-    /// Checks every parameter.
+    /// Checks every parameter. The ends of a range are in it, also as the nearest f32.
     ///
     /// # Errors
     /// The first parameter that is not a number within its range.
@@ -198,8 +198,10 @@ impl Config {
         let mut i = 0;
         while i < checks.len() {
             let (name, value, min, max) = checks[i];
+            // The bus carries an f32: a bound that is none must not be refused for its rounding.
+            let (least, most) = (f64::min(min, min as f32 as f64), f64::max(max, max as f32 as f64));
             // NaN compares false, so it is rejected too.
-            if !(value >= min && value <= max) {
+            if !(value >= least && value <= most) {
                 return Err(ParamError {
                     name,
                     value,

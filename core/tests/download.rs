@@ -173,6 +173,56 @@ fn a_value_out_of_its_range_spoils_the_set() {
     }
 }
 
+/// The ends of every range as `params.rs` documents them, of which a binary32 does not hold all. Nothing is changed on
+/// the way but by that rounding, of at most 6e-8 of the value.
+#[test]
+fn the_ends_of_every_range_are_taken() {
+    type Field = fn(&mut Params) -> &mut f64;
+    let fields: [(Field, f64, f64); 19] = [
+        (|p| &mut p.k_1, 0.0, 4.0),
+        (|p| &mut p.a_1, 0.0, 100.0),
+        (|p| &mut p.a_2, 0.0, 100.0),
+        (|p| &mut p.a_3, 0.0, 100.0),
+        (|p| &mut p.a_4, 0.0, 100.0),
+        (|p| &mut p.rate_corner_hz, 0.5, 60.0),
+        (|p| &mut p.torque_limit_nm, 0.1, 5.0),
+        (|p| &mut p.wind_up_nm_per_s, 0.5, 4.0),
+        (|p| &mut p.reduction_nm_per_s, 4.0, 8.0),
+        (|p| &mut p.least_speed_mps, 0.5, 30.0),
+        (|p| &mut p.probe_amplitude_nm, 0.0, 0.3),
+        (|p| &mut p.probe_frequency_hz, 1.0, 5.0),
+        (|p| &mut p.t_nms_s, 0.01, 1.0),
+        (|p| &mut p.k_nms, 0.0, 10.0),
+        (|p| &mut p.vehicle.curvature_gain_1pm, 0.001, 0.1),
+        (|p| &mut p.vehicle.stability_factor_s2pm2, 0.0, 0.01),
+        (|p| &mut p.vehicle.aligning_gain_nms2pm, 0.0, 20.0),
+        (|p| &mut p.vehicle.column_damping_nms, 0.0, 10.0),
+        (|p| &mut p.vehicle.far_time_s, 0.1, 3.0),
+    ];
+    for (i, (field, min, max)) in fields.into_iter().enumerate() {
+        for end in [min, max] {
+            // Others so small that no product is beyond its own range.
+            let mut sent = Params {
+                k_1: 0.25,
+                a_3: 1.0,
+                probe_amplitude_nm: 0.1,
+                probe_frequency_hz: 1.5,
+                ..SET
+            };
+            *field(&mut sent) = end;
+            let (taken, outcome) = receive(&frames(&sent), Mode::Standby);
+            assert_eq!(outcome, WriteOutcome::Taken, "field {i} = {end}");
+            let got = *field(&mut taken.unwrap());
+            assert!((got - end).abs() <= 6e-8 * end, "field {i}: {got} for {end}");
+            for (beyond, by) in [(min, -1e-6), (max, 1e-6)] {
+                *field(&mut sent) = beyond + by * max;
+                let (_, outcome) = receive(&frames(&sent), Mode::Standby);
+                assert_eq!(outcome, WriteOutcome::OutOfRange, "field {i} beyond {beyond}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_refused_set_can_be_sent_again() {
     let mut download = Download::NEW;

@@ -150,6 +150,42 @@ fn a_handover_starts_from_the_torque_before_the_silence() {
 }
 
 #[test]
+fn a_handover_after_an_implausible_input_starts_from_the_torque_250_ms_before() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::active_in_curve(sign * 0.4);
+        // The second source drifts to 1.9 m/s above the first.
+        for k in 1..=19 {
+            rig.speeds = [rig::SPEED, rig::SPEED + 0.1 * f64::from(k)];
+            rig.run(10);
+        }
+        // At most 5 ms of history lie between two remembered outputs, and the torque rises by 2.4 mN.m per ms.
+        let mut outputs = Vec::new();
+        for k in 0..300 {
+            rig.curve(sign * (0.4 + 0.0024 * f64::from(k)));
+            rig.tick();
+            outputs.push(rig.applied);
+        }
+        rig.speeds[1] = rig::SPEED + 2.1;
+        let (ms, step) = rig.run_until(10, |step| step.command.mode == Mode::Handover);
+        assert!(step.command.faults.contains(Fault::SpeedImplausible));
+        let declared = outputs.len() + ms as usize - 1;
+        let trusted = outputs[declared - 250];
+        assert!(
+            (0.4..0.7).contains(&(sign * trusted)) && sign * rig.applied > 1.0,
+            "{trusted} of {}",
+            rig.applied
+        );
+        for k in 2..=2000 {
+            let got = rig.tick().command.torque.nm();
+            let ramp = trusted * (1.0 - f64::from(k) / 2000.0);
+            // Before, the reduction limit brings it down to the ramp at 8 mN.m per step.
+            assert!(k < 150 || (got - ramp).abs() <= 0.02, "{k}: {got}, not {ramp}");
+        }
+        assert_eq!(rig.applied, 0.0);
+    }
+}
+
+#[test]
 fn a_silence_of_20_ms_is_no_fault() {
     for sender in [LANE, COLUMN, VEHICLE, DEMAND] {
         let mut rig = Rig::active_in_curve(1.0);
@@ -276,6 +312,40 @@ fn speeds_that_disagree_and_speeds_too_low() {
     let step = rig.tick();
     assert_eq!(step.command.mode, Mode::Standby, "slower than 5 m/s, class A");
     assert_eq!(step.command.faults, FaultSet::NONE);
+    // One of two is enough: which of them is right is unknown.
+    for slow in [0, 1] {
+        let mut rig = Rig::active_in_curve(0.0);
+        for k in 0..=110 {
+            rig.speeds = [rig::SPEED - 0.1 * f64::from(k); 2];
+            rig.run(10);
+        }
+        assert_eq!(rig.tick().command.mode, Mode::Active, "5.67 m/s");
+        rig.speeds[slow] = 4.9;
+        rig.run(10);
+        assert_ne!(rig.tick().command.mode, Mode::Active, "4.9 m/s");
+        assert_eq!(rig.run(300).command.mode, Mode::Standby);
+    }
+}
+
+#[test]
+fn at_a_walking_pace_nothing_is_implausible() {
+    for (speed, plausible) in [(4.9, true), (5.5, false)] {
+        // To the side at 0.3 rad without getting there, and 5 N.m that turn nothing.
+        let drifts = |rig: &mut Rig| rig.lane.e_theta = haptic_core::quantity::Radians::from_rad(0.3);
+        let pushes = |rig: &mut Rig| rig.driver = Some(5.0);
+        let wrongs: [(&dyn Fn(&mut Rig), Fault); 2] = [
+            (&drifts, Fault::LaneImplausible),
+            (&pushes, Fault::ColumnImplausible),
+        ];
+        for (wrong, fault) in wrongs {
+            let mut rig = Rig::paper();
+            rig.speeds = [speed; 2];
+            wrong(&mut rig);
+            rig.run(100);
+            let declared = (0..2000).any(|_| rig.tick().command.faults.contains(fault));
+            assert_eq!(declared, !plausible, "{speed} {fault:?}");
+        }
+    }
 }
 
 #[test]
@@ -300,6 +370,27 @@ fn a_disengagement_fades_at_4_nm_per_s() {
     rig.run(30);
     rig.engage = true;
     assert_eq!(rig.run(1000).command.mode, Mode::Standby);
+}
+
+/// Every second step comes 10 ms late: the ramp goes on by 44 mN.m in two steps, the reduction limit earns 24.
+#[test]
+fn a_fade_lasts_until_the_torque_is_zero_even_where_steps_are_late() {
+    let mut rig = Rig::active_in_curve(1.5);
+    rig.engage = false;
+    rig.run_until(11, |step| step.command.mode == Mode::Fade);
+    let (mut before, mut steps) = (rig.applied, 0);
+    loop {
+        let step = rig.tick_after(if steps % 2 == 0 { 10_000 } else { 1_000 });
+        steps += 1;
+        assert!(before - rig.applied <= 0.016, "{before} to {}", rig.applied);
+        before = rig.applied;
+        if step.command.mode == Mode::Standby {
+            break;
+        }
+        assert_eq!(step.command.mode, Mode::Fade);
+    }
+    // 1.5 N.m at 12 mN.m a step; the ramp itself ends after 68.
+    assert!((120..=135).contains(&steps), "{steps}");
 }
 
 #[test]
@@ -476,10 +567,79 @@ fn no_parameters_or_a_reset_loop_lock() {
 #[test]
 fn a_monitor_stuck_at_ok_is_found_within_a_second() {
     let mut rig = Rig::active_in_curve(1.0);
-    rig.ecu.hold_monitor(true);
+    rig.ecu.blind_monitor(|_| true);
     let (ms, step) = rig.run_until(1000, |step| step.command.mode == Mode::Fault);
     assert!(ms <= 512 && step.command.faults.contains(Fault::SelfTest), "{ms}");
     assert_eq!(step.command.torque, Torque::ZERO);
+}
+
+#[test]
+fn a_monitor_with_one_dead_rule_is_found_when_its_turn_comes() {
+    // What each passes, no drive at 1 N.m shows: 5 N.m and more, a torque in Standby, less than 0.5 N.m in Active.
+    let dead: [fn(&[u8; 8]) -> bool; 3] = [
+        |bytes| u64::from_le_bytes(*bytes) >> 12 & 0xFFFF > 5 * 4096,
+        |bytes| bytes[4] & 0x0F == 1 && u64::from_le_bytes(*bytes) >> 12 & 0xFFFF != 0,
+        |bytes| bytes[4] & 0x0F == 2 && u64::from_le_bytes(*bytes) >> 12 & 0xFFFF < 2048,
+    ];
+    for passes in dead {
+        let mut rig = Rig::active_in_curve(1.0);
+        rig.ecu.blind_monitor(passes);
+        let (ms, step) = rig.run_until(6 * 512, |step| step.command.mode == Mode::Fault);
+        assert!(step.command.faults.contains(Fault::SelfTest), "{ms}");
+    }
+    let mut rig = Rig::active_in_curve(1.0);
+    for _ in 0..12 * 512 {
+        let step = rig.tick();
+        assert_eq!((step.command.faults, step.permitted), (FaultSet::NONE, true));
+    }
+}
+
+#[test]
+fn a_lane_preview_that_never_ages_is_stale_to_the_monitor() {
+    let mut rig = Rig::active_in_curve(1.0);
+    while !rig.ticks.is_multiple_of(8) {
+        rig.tick();
+    }
+    rig.tick();
+    rig.ecu.keep_lane_fresh();
+    rig.silent[LANE] = true;
+    let (ms, step) = rig.run_until(100, |step| step.command.mode != Mode::Active);
+    assert_eq!((ms, step.command.mode), (41, Mode::Fault));
+    assert!(step.command.faults.contains(Fault::Monitor) && !step.permitted);
+}
+
+#[test]
+fn the_monitor_hears_that_the_host_asks_for_the_probe() {
+    // The law lies by 0.25 N.m, within the monitor's 0.3; the probe's 0.2 on top are not.
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::active_in_curve(0.0);
+        rig.ecu.force_law(Some(Torque::from_nm(sign * 0.25)));
+        rig.run(100);
+        rig.probe = true;
+        let mut most: f64 = 0.0;
+        // Its amplitude is whole after the first period of 400 ms.
+        for _ in 0..900 {
+            assert_eq!(rig.tick().command.mode, Mode::Active);
+            most = most.max(sign * rig.applied);
+        }
+        assert!(most > 0.44, "{most} N.m");
+    }
+}
+
+#[test]
+fn a_law_that_lies_with_interruptions_meets_the_monitor_too() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::active_in_curve(0.0);
+        let mut ms = 0;
+        while rig.tick().command.mode == Mode::Active {
+            ms += 1;
+            let lie = if ms % 16 == 0 { 0.0 } else { sign * 5.0 };
+            rig.ecu.force_law(Some(Torque::from_nm(lie)));
+            assert!(rig.applied.abs() < 0.4, "{} N.m after {ms} ms", rig.applied);
+        }
+        // 0.3 N.m of band at 15*4 - 8 mN.m in 16 ms, and 20 ms of patience.
+        assert!((90..=125).contains(&ms), "{ms}");
+    }
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Randomised operation, checked in every cycle, across wraps of the microsecond clock. 300,000 cycles by
-//! default, more by `HAPTIC_CYCLES`; the whole of it, 10^8 cycles and 23 wraps:
+//! default, more by `HAPTIC_CYCLES`; the whole of it, 10^8 cycles and 24 wraps:
 //!
 //! ```text
 //! HAPTIC_CYCLES=100000000 cargo test --release -p haptic-core --test endurance -- --nocapture
@@ -151,7 +151,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; 16]) {
         };
         if dead > 1000 {
             rig.ecu = Ecu::new(Some(&setup), Boot::default(), rig.now());
-            (rig.motor, rig.heard_driver, rig.heard_engage) = (|t| t, None, None);
+            (rig.motor, rig.heard) = (|t| t, rig::Heard::default());
             (dead, rig.engage) = (0, false);
             watch.restart(&rig);
             (events.reasons, before) = (FaultSet::NONE, FaultSet::NONE);

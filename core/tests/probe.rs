@@ -184,7 +184,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
             let permitted = monitor.step(&mut state, &evidence);
             // The first step grows too fast for the monitor; it is not what this is about.
             if *ms == 0 && !permitted {
-                state = grown(&monitor, state_before, &lane, &demand);
+                state = grown(&monitor, state_before, &demand);
                 return false;
             }
             !permitted
@@ -196,20 +196,27 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
     assert!((3_020..=3_060).contains(&ended), "{ended}");
 }
 
-/// Brings a monitor up to 0.45 N.m at its own pace, with the probe asked for if `demand` does.
-fn grown(monitor: &Monitor, mut state: MonitorState, lane: &[u8; 8], demand: &[u8; 8]) -> MonitorState {
+/// Brings a monitor up to 0.45 N.m at its own pace on a lane error of 1 m, which asks for 0.5 N.m, with the probe asked
+/// for if `demand` does.
+fn grown(monitor: &Monitor, mut state: MonitorState, demand: &[u8; 8]) -> MonitorState {
+    let lane = haptic_core::bus::messages::LanePreview {
+        valid: true,
+        e_y: haptic_core::quantity::Metres::from_m(1.0),
+        ..Default::default()
+    };
+    let lane = bytes(&lane.encode(0));
     for mnm in (0..=450).step_by(4) {
         let guidance = Guidance {
             torque: Torque::from_nm(f64::from(mnm) * 1e-3),
             limit: LimitReason::None,
-            mode: Mode::Fade,
+            mode: Mode::Active,
             warning: false,
             faults: FaultSet::NONE,
             reset: ResetCause::PowerOn,
         };
         let guidance = bytes(&guidance.encode(0));
         let evidence = Evidence {
-            lane: Some(lane),
+            lane: Some(&lane),
             column: None,
             demand: Some(demand),
             guidance: &guidance,

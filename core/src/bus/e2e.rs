@@ -7,7 +7,8 @@
 //!
 //! The receiver rejects one bad frame and goes on; a sender that was silent past its time-out has to show
 //! three clean frames in a row before it is trusted again. Terms: *delta* is the counter's step from the
-//! last accepted frame, modulo 16.
+//! last accepted frame, modulo 16; *clean* is a frame that is intact, the next in count, and in range. (A preview
+//! that says of itself that it is not valid is clean: its sender is heard, and honest.)
 
 use crate::vital::vital;
 
@@ -140,6 +141,12 @@ impl ReceiverState {
         clean: CLEAN_FRAMES_TO_TRUST,
     };
 
+    /// Whether the next frame in order is used at once.
+    #[must_use]
+    pub const fn is_trusted(&self) -> bool {
+        self.clean >= CLEAN_FRAMES_TO_TRUST
+    }
+
     /// Judges a frame and remembers its counter. `max_delta` is the largest step that lost frames explain
     /// within the message's time-out.
     ///
@@ -151,17 +158,17 @@ impl ReceiverState {
         }
         let counter = u32::from(data[1] & 0x0F);
         let delta = (self.last != NONE).then(|| counter.wrapping_sub(self.last) & 0x0F);
-        if self.clean < CLEAN_FRAMES_TO_TRUST {
+        if !self.is_trusted() {
             self.clean = if delta == Some(1) {
                 self.clean.saturating_add(1)
             } else {
                 1
             };
             self.last = counter;
-            return if self.clean < CLEAN_FRAMES_TO_TRUST {
-                Err(Reject::NotTrusted)
-            } else {
+            return if self.is_trusted() {
                 Ok(())
+            } else {
+                Err(Reject::NotTrusted)
             };
         }
         match delta {

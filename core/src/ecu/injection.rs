@@ -1,5 +1,5 @@
 //! Faults from inside, for campaigns and tests: bits of the vital memory, a law that lies, a monitor that
-//! always agrees. Faults on the bus need nothing of this: they are injected as bytes.
+//! agrees when it should not, a lane preview that never ages. Faults on the bus need nothing of this: they are injected as bytes.
 //!
 //! Only with the feature `fault-injection`, which no product image has. With nothing injected an ECU of such
 //! a build behaves as any other, bit for bit.
@@ -9,9 +9,19 @@ use crate::quantity::Torque;
 use crate::vital::{Guarded, Vital};
 
 /// Faults held until they are taken back.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Injected {
-    pub(super) monitor_agrees: bool,
+    pub(super) monitor_passes: fn(&[u8; 8]) -> bool,
+    pub(super) lane_never_ages: bool,
+}
+
+impl Default for Injected {
+    fn default() -> Self {
+        Self {
+            monitor_passes: |_| false,
+            lane_never_ages: false,
+        }
+    }
 }
 
 /// Where a bit of the vital memory lies.
@@ -50,9 +60,14 @@ impl Ecu {
         self.state.forced_law = torque;
     }
 
-    /// Makes the monitor agree with everything.
-    pub fn hold_monitor(&mut self, agrees: bool) {
-        self.injected.monitor_agrees = agrees;
+    /// Makes the monitor agree with every guidance frame whose bytes are in `passes`, whatever it knows.
+    pub fn blind_monitor(&mut self, passes: fn(&[u8; 8]) -> bool) {
+        self.injected.monitor_passes = passes;
+    }
+
+    /// Makes the last lane preview look fresh for ever.
+    pub fn keep_lane_fresh(&mut self) {
+        self.injected.lane_never_ages = true;
     }
 
     fn flip(&mut self, region: Region, bit: usize) -> usize {

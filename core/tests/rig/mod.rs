@@ -18,6 +18,16 @@ use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torqu
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;
 
+/// What the ECU last accepted, and when, us.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Heard {
+    pub(crate) driver: Option<(f64, u64)>,
+    pub(crate) engage: Option<(bool, u64)>,
+    pub(crate) speeds: Option<u64>,
+    /// Age of a preview that its sender vouches for, us.
+    pub(crate) lane: Option<(u64, u64)>,
+}
+
 #[derive(Clone)]
 /// Bench state; public fields are what a test turns.
 pub(crate) struct Rig {
@@ -44,9 +54,7 @@ pub(crate) struct Rig {
     pub(crate) applied: f64,
     /// The last telemetry.
     pub(crate) telemetry: Option<Telemetry>,
-    /// What the ECU last accepted of the driver's torque and of the request, and when.
-    pub(crate) heard_driver: Option<(f64, u64)>,
-    pub(crate) heard_engage: Option<(bool, u64)>,
+    pub(crate) heard: Heard,
     /// Rejections by the ECU since they were last taken.
     pub(crate) rejects: Vec<Reject>,
 }
@@ -76,8 +84,7 @@ impl Rig {
             silent: [false; 4],
             applied: 0.0,
             telemetry: None,
-            heard_driver: None,
-            heard_engage: None,
+            heard: Heard::default(),
             rejects: Vec::new(),
         }
     }
@@ -150,9 +157,12 @@ impl Rig {
             let word = u64::from_le_bytes(bytes);
             // Bits 12..29 signed, 2^-12 N.m; bit 12: layouts written a second time.
             let driver = (word << 34).cast_signed() >> 46;
+            let heard = &mut self.heard;
             match frame.id() {
-                0x110 => self.heard_driver = Some((driver as f64 / 4096.0, self.t_us)),
-                0x130 => self.heard_engage = Some((word >> 12 & 1 == 1, self.t_us)),
+                0x100 if word >> 55 & 1 == 1 => heard.lane = Some(((word >> 46 & 0x1FF) * 100, self.t_us)),
+                0x110 => heard.driver = Some((driver as f64 / 4096.0, self.t_us)),
+                0x120 => heard.speeds = Some(self.t_us),
+                0x130 => heard.engage = Some((word >> 12 & 1 == 1, self.t_us)),
                 _ => {}
             }
         }

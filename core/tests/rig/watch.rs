@@ -1,10 +1,20 @@
 //! What must hold in every step, whatever comes in. Computed from what was sent and what came out, in f64.
 
-use super::Rig;
+use super::{Heard, Rig};
 use haptic_core::bus::messages::{Guidance, Message};
 use haptic_core::ecu::Step;
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
+use std::collections::VecDeque;
 
+/// The resolution of the torque on the bus, N.m.
+const BUS_LSB: f64 = 1.0 / 4096.0;
+/// An output may be trusted that is so old, us, and what the ECU's own history may add: 5 ms between two outputs that
+/// it keeps, and late steps.
+const OLDEST_TRUSTED_US: u64 = 250_000;
+const KEPT_APART_US: u64 = 25_000;
+/// A frame may have come so long before the step that took it, us.
+const LATEST_STEP_US: u64 = 13_000;
 /// The resolution inside the core, for the roundings of its bounds, N.m.
 const LSB: f64 = 1.0 / 16_777_216.0;
 
@@ -20,6 +30,10 @@ pub(crate) struct Watch {
     was_low: bool,
     anchor: f64,
     anchor_t_us: u64,
+    /// Time and magnitude of the outputs of the last while, without the probe.
+    outputs: VecDeque<(u64, f64)>,
+    /// Where the handover's line begins, and when.
+    line: (f64, u64),
     pub(crate) steps: u64,
     pub(crate) by_mode: [u64; 7],
     pub(crate) by_limit: [u64; 8],
@@ -36,6 +50,8 @@ impl Watch {
             was_low: false,
             anchor: 0.0,
             anchor_t_us: 0,
+            outputs: VecDeque::new(),
+            line: (0.0, 0),
             steps: 0,
             by_mode: [0; 7],
             by_limit: [0; 8],
@@ -81,14 +97,32 @@ impl Watch {
             "window: {}",
             context()
         );
-        if let Some((driver, _)) = rig.heard_driver.filter(|(_, t)| rig.t_us - t <= 30_000) {
+        // In the frame in which the torque was positive, the most that the driver leaves.
+        let mut left = f64::INFINITY;
+        if let Some((driver, _)) = rig.heard.driver.filter(|(_, t)| rig.t_us - t <= 30_000) {
             let bound = |toward: f64| (self.limit + 3.0 * (toward + 0.8)).clamp(0.0, self.limit) + 8.0 * LSB;
             assert!(
                 torque <= bound(driver) && torque >= -bound(-driver),
                 "driver {driver}: {}",
                 context()
             );
+            left = if self.torque < 0.0 {
+                bound(-driver)
+            } else {
+                bound(driver)
+            };
         }
+        let same_way = if self.torque < 0.0 { -torque } else { torque };
+        let (fallen, most) = (self.torque.abs() - same_way, 8.0 * dt_s + 2.0 * LSB);
+        assert!(
+            fallen <= most
+                // Across zero it grows from there.
+                || (self.torque.abs() <= most && -same_way <= 4.0 * dt_s + 2.0 * LSB)
+                || same_way >= left - BUS_LSB - 8.0 * LSB
+                || mode == Mode::Fault,
+            "reduction: {}",
+            context()
+        );
         let has_torque = matches!(mode, Mode::Active | Mode::Fade | Mode::Handover);
         assert!(has_torque || torque == 0.0, "mode: {}", context());
         assert!(
@@ -96,10 +130,34 @@ impl Watch {
             "ending: {}",
             context()
         );
+        if mode == Mode::Active {
+            assert!(
+                self.is_fresh(&rig.heard, rig.t_us),
+                "age: {:?}, {}",
+                rig.heard,
+                context()
+            );
+        }
+        let line = if mode == Mode::Handover && self.mode != Mode::Handover {
+            let trusted = self.trusted(&rig.heard, rig.t_us, step.command.faults);
+            (trusted.min(self.torque.abs()), self.t_us)
+        } else {
+            self.line
+        };
+        if mode == Mode::Handover {
+            let passed_s = (rig.t_us - line.1) as f64 * 1e-6;
+            let most = line.0 * (1.0 - passed_s / 2.0).max(0.0);
+            assert!(
+                torque.abs() <= most + LSB || fallen >= 8.0 * dt_s - BUS_LSB - LSB,
+                "line {line:?}, {most} N.m: {}",
+                context()
+            );
+        }
         let latched = matches!(self.mode, Mode::Fault | Mode::Locked);
         assert!(!latched || mode == self.mode, "latch: {}", context());
         let request = rig
-            .heard_engage
+            .heard
+            .engage
             .filter(|(_, t)| rig.t_us - t <= 30_000)
             .map(|(high, _)| high);
         if mode == Mode::Active && self.mode != Mode::Active {
@@ -142,9 +200,51 @@ impl Watch {
         if rig.t_us - self.anchor_t_us >= 250_000 {
             (self.anchor, self.anchor_t_us) = (torque, rig.t_us);
         }
-        (self.torque, self.t_us, self.mode) = (torque, rig.t_us, mode);
+        (self.torque, self.t_us, self.mode, self.line) = (torque, rig.t_us, mode, line);
+        let probe = step.command.probe.map_or(0.0, |probe| probe.nm());
+        self.outputs.push_back((rig.t_us, (torque - probe).abs()));
+        let oldest = rig.t_us.saturating_sub(OLDEST_TRUSTED_US + KEPT_APART_US);
+        while self.outputs.front().is_some_and(|(t, _)| *t < oldest) {
+            self.outputs.pop_front();
+        }
         self.steps += 1;
         self.by_mode[mode as usize] += 1;
         self.by_limit[step.command.limit as usize] += 1;
+    }
+
+    /// Whether no input was true longer ago than 30 ms.
+    fn is_fresh(&self, heard: &Heard, t_us: u64) -> bool {
+        let lane = heard.lane.is_some_and(|(age, t)| t_us - t + age <= 30_000);
+        let others = [heard.driver.map(|d| d.1), heard.engage.map(|e| e.1), heard.speeds];
+        lane && others.iter().all(|t| t.is_some_and(|t| t_us - t <= 30_000))
+    }
+
+    /// The largest output that may be trusted: of before the silence that the faults tell of, or of 250 ms ago.
+    fn trusted(&self, heard: &Heard, t_us: u64, faults: FaultSet) -> f64 {
+        let silences = [
+            (Fault::LaneTimeout, heard.lane.map(|l| l.1)),
+            (Fault::ColumnTimeout, heard.driver.map(|d| d.1)),
+            (Fault::SpeedTimeout, heard.speeds),
+            (Fault::CommandTimeout, heard.engage.map(|e| e.1)),
+        ];
+        let silence = silences
+            .iter()
+            .filter(|(fault, _)| faults.contains(*fault))
+            .map(|(_, heard_at)| t_us - heard_at.unwrap_or(t_us));
+        let implausible = faults.intersects(FaultSet::IMPLAUSIBLE);
+        let suspect = silence
+            .max()
+            .filter(|_| !implausible)
+            .unwrap_or(OLDEST_TRUSTED_US)
+            .min(OLDEST_TRUSTED_US);
+        let youngest = (t_us + LATEST_STEP_US).saturating_sub(suspect);
+        // A bench that was guiding before it was watched has outputs that are not known.
+        let known = self.outputs.front().is_some_and(|(t, _)| t_us - t >= suspect);
+        let outputs = self.outputs.iter().filter(|(t, _)| *t <= youngest);
+        if known {
+            outputs.map(|(_, torque)| *torque).fold(0.0, f64::max)
+        } else {
+            f64::INFINITY
+        }
     }
 }

@@ -320,7 +320,7 @@ fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Resul
     if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
         return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
     }
-    if status.limit > 7 || status.mode > LOCKED || status.reset > 5 || status.spare != 0 {
+    if status.limit > 7 || status.mode > LOCKED || status.reset > 6 || status.spare != 0 {
         return Err(format!("frame: a code that does not exist in {status:?}"));
     }
     match before {

@@ -331,7 +331,7 @@ impl<'a> Seat<'a> {
                     let torque_nm = self.dice.random_range(-5.0..5.0);
                     self.ecu.force_law(Some(Torque::from_nm(torque_nm)));
                 }
-                Inside::MonitorAgrees if since == 0 => self.ecu.hold_monitor(true),
+                Inside::MonitorAgrees if since == 0 => self.ecu.blind_monitor(|_| true),
                 Inside::BrownOut if since == 0 => {
                     let boot = Boot {
                         reset: ResetCause::BrownOut,

@@ -39,14 +39,14 @@ pub(super) const ROWS: &[Row] = &[
         "one bit of gains, limits or margins flips",
         &[inside(Inside::Flip(Region::Config))],
     )
-    .stops(100)
+    .stops(10)
     .q(),
     row(
         "flip-monitor",
         "one bit of the monitor's limits flips",
         &[inside(Inside::Flip(Region::Monitor))],
     )
-    .stops(100)
+    .stops(10)
     .q(),
     row(
         "parameters-bad",
