@@ -19,8 +19,8 @@
 //! pages of the second. A word whose programming lost power reads as an error that no code of correction mends:
 //! the chip then raises the non-maskable interrupt, and what was read fails its CRC.
 //!
-//! Two mirrored torque signals that do not add up to the supply mean a broken or missing sensor: the board then
-//! has no column, and one on the bus may speak.
+//! The column's sensors are read with the feature `nucleo-g474re-sensors` alone, since pins that float read anything.
+//! Without it the column is on the bus.
 
 use core::future::Future;
 use core::pin::pin;
@@ -47,25 +47,15 @@ use embedded_can::{Error, ErrorKind};
 use embedded_hal_nb::nb;
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, ResetCause};
-use haptic_core::quantity::{Instant, Radians, Torque};
+use haptic_core::quantity::{Instant, Torque};
 use rtt_target::{ChannelMode, UpChannel, rtt_init};
 
 use super::{Board, WATCHDOG};
-use crate::{reset, stack};
+use crate::{analogue, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 170_000_000;
 const TICK_HZ: u32 = 1000;
 const BITRATE: u32 = 500_000;
-
-/// Converters: 12 bits over 3.3 V; zero is in the middle.
-const MID: i32 = 2048;
-const COUNTS_PER_V: f32 = 4096.0 / 3.3;
-/// Motor demand and motor torque, counts a N.m.
-const MOTOR: f32 = 0.3 * COUNTS_PER_V;
-/// Driver torque, counts a N.m, and wheel angle, counts a rad.
-const SENSOR: f32 = 0.15 * COUNTS_PER_V;
-/// The two driver torque signals may miss their sum by 0.1 V.
-const SUM_TOLERANCE: i32 = 124;
 
 bind_interrupts!(struct Interrupts {
     FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
@@ -114,6 +104,7 @@ impl Board for NucleoG474re {
     type Flash = Bank2Region<'static, flash::Blocking>;
 
     const NAME: &'static str = "nucleo-g474re";
+    const HAS_COLUMN: bool = cfg!(feature = "nucleo-g474re-sensors");
 
     fn start() -> Self {
         cortex_m::interrupt::disable();
@@ -124,7 +115,7 @@ impl Board for NucleoG474re {
         let p = embassy_stm32::init(clocks());
         let motor_enable = Output::new(p.PB5, Level::Low, Speed::Low);
         let mut motor = DacChannel::new_blocking(p.DAC1, p.PA4);
-        motor.set(Value::Bit12Right(MID as u16));
+        motor.set(Value::Bit12Right(analogue::MID));
         rtt_init! { up: { 0: { size: 1024, mode: ChannelMode::NoBlockSkip, name: "defmt" } } };
         let mut clock = Timer::new(p.TIM2);
         clock.set_tick_freq(Hertz(1_000_000));
@@ -217,10 +208,10 @@ impl Board for NucleoG474re {
         }
     }
 
-    fn set_torque(&mut self, torque: Torque) {
-        let demand = MID + (torque.to_f32() * MOTOR) as i32;
-        self.motor.set(Value::Bit12Right(demand.clamp(0, 4095) as u16));
-        self.motor_enable.set_high();
+    fn set_torque(&mut self, torque: Option<Torque>) {
+        let demand = analogue::demand(torque.unwrap_or(Torque::ZERO));
+        self.motor.set(Value::Bit12Right(demand));
+        self.motor_enable.set_level(torque.is_some().into());
     }
 
     fn column(&mut self) -> Option<Column> {
@@ -228,13 +219,8 @@ impl Board for NucleoG474re {
         let counts = self
             .sensors
             .each_mut()
-            .map(|sensor| i32::from(adc.blocking_read(sensor, SampleTime::CYCLES47_5)) - MID);
-        let [torque, mirrored, angle, motor] = counts;
-        ((torque + mirrored).abs() <= SUM_TOLERANCE).then(|| Column {
-            driver_torque: Torque::from_nm(f64::from((torque - mirrored) as f32 / (2.0 * SENSOR))),
-            wheel_angle: Radians::from_rad(f64::from(angle as f32 / SENSOR)),
-            motor_torque: Torque::from_nm(f64::from(motor as f32 / MOTOR)),
-        })
+            .map(|sensor| adc.blocking_read(sensor, SampleTime::CYCLES47_5));
+        analogue::column(counts)
     }
 
     fn zero_torque() {
