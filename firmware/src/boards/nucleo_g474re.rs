@@ -29,19 +29,18 @@ use core::task::{Context, Poll, Waker};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, Peripherals, SCB, SYST};
 use cortex_m_rt::exception;
-use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, SampleTime};
+use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::can::enums::BusError;
 use embassy_stm32::can::{self, CanConfigurator};
 use embassy_stm32::dac::{DacChannel, Value};
 use embassy_stm32::flash::{self, Bank2Region, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::peripherals::{ADC1, FDCAN1, IWDG, PB5};
+use embassy_stm32::peripherals::{ADC1, FDCAN1, IWDG, PA0, PA1, PB5, PC0, PC1};
 use embassy_stm32::rcc::{self, mux};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, pac};
+use embassy_stm32::{Peri, bind_interrupts, pac};
 use embedded_can::nb::Can;
 use embedded_can::{Error, ErrorKind};
 use embedded_hal_nb::nb;
@@ -67,11 +66,16 @@ pub struct NucleoG474re {
     can: FdCan,
     led: Output<'static>,
     flash: Bank2Region<'static, flash::Blocking>,
-    motor: DacChannel<'static, Blocking>,
     motor_enable: Output<'static>,
     adc: Adc<'static, ADC1>,
-    /// Driver torque 1 and 2, wheel angle, motor torque.
-    sensors: [AnyAdcChannel<'static, ADC1>; 4],
+    /// Driver torque 1 and 2, wheel angle, motor torque. By name: the HAL's nameless channels bring a panic along, for
+    /// those that do not exist.
+    sensors: (
+        Peri<'static, PA0>,
+        Peri<'static, PA1>,
+        Peri<'static, PC1>,
+        Peri<'static, PC0>,
+    ),
     watchdog: Option<IndependentWatchdog<'static, IWDG>>,
     systick: SYST,
 }
@@ -113,9 +117,13 @@ impl Board for NucleoG474re {
         cortex.DCB.enable_trace();
         cortex.DWT.enable_cycle_counter();
         let p = embassy_stm32::init(clocks());
+        // The watchdog stands still with a core that a debugger halts.
+        pac::DBGMCU.apb1lfzr().modify(|w| w.set_iwdg(true));
         let motor_enable = Output::new(p.PB5, Level::Low, Speed::Low);
         let mut motor = DacChannel::new_blocking(p.DAC1, p.PA4);
         motor.set(Value::Bit12Right(analogue::MID));
+        // Dropping it would switch the channel off.
+        core::mem::forget(motor);
         rtt_init! { up: { 0: { size: 1024, mode: ChannelMode::NoBlockSkip, name: "defmt" } } };
         let mut clock = Timer::new(p.TIM2);
         clock.set_tick_freq(Hertz(1_000_000));
@@ -128,15 +136,9 @@ impl Board for NucleoG474re {
             can: FdCan(can.into_normal_mode()),
             led: Output::new(p.PA5, Level::Low, Speed::Low),
             flash: Flash::new_blocking(p.FLASH).into_blocking_regions().bank2_region,
-            motor,
             motor_enable,
             adc: Adc::new(p.ADC1, Default::default()),
-            sensors: [
-                p.PA0.degrade_adc(),
-                p.PA1.degrade_adc(),
-                p.PC1.degrade_adc(),
-                p.PC0.degrade_adc(),
-            ],
+            sensors: (p.PA0, p.PA1, p.PC1, p.PC0),
             watchdog: Some(IndependentWatchdog::new(p.IWDG, WATCHDOG.us())),
             systick: cortex.SYST,
         }
@@ -210,16 +212,20 @@ impl Board for NucleoG474re {
 
     fn set_torque(&mut self, torque: Option<Torque>) {
         let demand = analogue::demand(torque.unwrap_or(Torque::ZERO));
-        self.motor.set(Value::Bit12Right(demand));
+        // By register: the HAL looks at each call, with a panic behind, whether the channel exists.
+        pac::DAC1.dhr12r(0).write(|w| w.set_dhr(demand));
         self.motor_enable.set_level(torque.is_some().into());
     }
 
     fn column(&mut self) -> Option<Column> {
-        let adc = &mut self.adc;
-        let counts = self
-            .sensors
-            .each_mut()
-            .map(|sensor| adc.blocking_read(sensor, SampleTime::CYCLES47_5));
+        const SAMPLE: SampleTime = SampleTime::CYCLES47_5;
+        let Self { adc, sensors, .. } = self;
+        let counts = [
+            adc.blocking_read(&mut sensors.0, SAMPLE),
+            adc.blocking_read(&mut sensors.1, SAMPLE),
+            adc.blocking_read(&mut sensors.2, SAMPLE),
+            adc.blocking_read(&mut sensors.3, SAMPLE),
+        ];
         analogue::column(counts)
     }
 
@@ -238,8 +244,8 @@ impl Board for NucleoG474re {
     }
 }
 
-/// A word of the flash cannot be corrected: whoever read it has a CRC to tell by. Nothing else raises this interrupt
-/// here but a lost crystal, which no program can do without.
+/// A word of the flash cannot be corrected: whoever read it has a CRC to tell by. Nothing else is told to raise this
+/// interrupt here. A lost crystal is not: nobody watches it but the watchdog, which has a clock of its own.
 #[exception]
 unsafe fn NonMaskableInt() {
     if pac::FLASH.eccr().read().eccd() {
