@@ -84,7 +84,7 @@ pub struct Ecu {
     vitals: Guarded<Vitals>,
     receivers: Receivers,
     history: History,
-    boot: Boot,
+    reset: ResetCause,
     warned_at: Option<u32>,
     advice: Advice,
     #[cfg(feature = "fault-injection")]
@@ -145,7 +145,7 @@ impl Ecu {
             vitals: Guarded::new(Vitals::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: History::new(now),
-            boot,
+            reset: boot.reset,
             warned_at: None,
             advice: Advice::new(setup.reliance),
             #[cfg(feature = "fault-injection")]
@@ -259,7 +259,7 @@ impl Ecu {
             mode: command.mode,
             warning: command.warning,
             faults: command.faults,
-            reset: self.boot.reset,
+            reset: self.reset,
         }
         .encode(steps as u8)
     }

@@ -36,8 +36,8 @@ compile_error!(
     "no board is chosen: build haptic-firmware with --features mps2-an386, mps2-an500, nucleo-g474re or sam-e54-xpro"
 );
 
-/// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; an
-/// actuator on the bus gives up after 30 ms.
+/// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; what
+/// becomes of the torque meanwhile is in `docs/safety.md`, board by board.
 pub const WATCHDOG: Micros = Micros::from_ms(16);
 
 /// What the images need of a board.
