@@ -23,7 +23,7 @@ const CORE: Arrows = &[
     ("envelope", &["quantity", "vital"]),
     ("faults", &["quantity"]),
     ("law", &["quantity", "vital"]),
-    ("lockstep", &["bus", "ecu", "params", "quantity", "stored"]),
+    ("lockstep", &["bus", "ecu", "faults", "params", "quantity", "stored"]),
     // Nothing of the rest but the way memory is guarded.
     ("monitor", &["vital"]),
     ("params", &["envelope", "law", "monitor", "plausibility", "probe", "quantity", "reliance", "vital"]),

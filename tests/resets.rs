@@ -1,6 +1,7 @@
 //! What becomes of a product that breaks: the image `broken` in QEMU hangs, panics, faults or outgrows its stack half
-//! a second after power-up. Each must reset it, by the watchdog or by its own handler, and the next start must say
-//! why on the bus; one that breaks after every start must lock. The guard of the stack and the watchdog are shown on
+//! a second after power-up, or its monitor withdraws the permission. Each must reset it, by the watchdog or by its own
+//! handler, and the next start must say why on the bus; one that breaks after every start must lock, and what the
+//! monitor forbade must stay forbidden. The guard of the stack and the watchdog are shown on
 //! a second core too (Cortex-M7).
 //!
 //! The torque frames are taken apart by hand, from `core/haptic.dbc`.
@@ -12,7 +13,9 @@ use machine::Machine;
 /// The reference board, and the same with another core.
 const M4F: &str = "mps2-an386";
 const M7: &str = "mps2-an500";
-/// A value of `Guidance_Mode`.
+/// Values of `Guidance_Mode`.
+const STANDBY: u64 = 1;
+const FAULT: u64 = 5;
 const LOCKED: u64 = 6;
 /// Values of `Guidance_Reset`.
 const POWER_ON: u64 = 0;
@@ -23,11 +26,12 @@ const STACK_OVERFLOW: u64 = 4;
 /// The step that breaks (`firmware/src/bin/broken.rs`).
 const BREAKS_AT: usize = 500;
 
-/// The reset cause and the mode of a torque frame.
+/// What a torque frame says beside its counter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Status {
     cause: u64,
     mode: u64,
+    monitor_disagreed: bool,
 }
 
 /// The next torque frame's status.
@@ -37,6 +41,7 @@ fn status(machine: &mut Machine) -> Status {
             return Status {
                 cause: (word >> 52) & 0x7,
                 mode: (word >> 32) & 0xF,
+                monitor_disagreed: (word >> 46) & 1 != 0,
             };
         }
     }
@@ -90,6 +95,36 @@ fn a_fault_resets_and_says_so() {
 #[test]
 fn a_stack_that_outgrows_its_budget_resets_and_says_so() {
     comes_back(M4F, "overflow", STACK_OVERFLOW);
+}
+
+/// Without permission nobody feeds the watchdog; and the start after it is no power-up, so that the fault is still there.
+#[test]
+fn a_veto_of_the_monitor_lasts_beyond_the_reset_that_it_causes() {
+    let mut machine = Machine::start(M4F, "broken", "veto");
+    let first = status(&mut machine);
+    let standby = |cause| Status {
+        cause,
+        mode: STANDBY,
+        monitor_disagreed: false,
+    };
+    let fault = |cause| Status {
+        cause,
+        mode: FAULT,
+        monitor_disagreed: true,
+    };
+    assert_eq!(first, standby(POWER_ON));
+    let (mut next, _) = next_other(&mut machine, first);
+    // The last frames before the reset may have been lost with the channel, or not.
+    if next == fault(POWER_ON) {
+        let (after, frames) = next_other(&mut machine, next);
+        // The watchdog's 16 ms.
+        assert!(frames <= 16, "{frames} steps without permission");
+        next = after;
+    }
+    assert_eq!(next, fault(WATCHDOG));
+    for _ in 0..3 * BREAKS_AT {
+        assert_eq!(status(&mut machine), fault(WATCHDOG));
+    }
 }
 
 #[test]

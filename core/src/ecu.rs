@@ -29,6 +29,8 @@ pub struct Boot {
     pub reset: ResetCause,
     /// Resets within the last 10 s, this one included, power-up not.
     pub recent_resets: u8,
+    /// Class C faults since power-up: a reset does not end them. Others are ignored.
+    pub latched: FaultSet,
 }
 
 /// So many resets within 10 s lock the ECU.
@@ -82,7 +84,7 @@ pub struct Ecu {
     vitals: Guarded<Vitals>,
     receivers: Receivers,
     history: History,
-    boot: Boot,
+    reset: ResetCause,
     warned_at: Option<u32>,
     advice: Advice,
     #[cfg(feature = "fault-injection")]
@@ -99,7 +101,7 @@ impl Ecu {
     /// An ECU at power-up or after a reset. Without a good set of parameters it locks.
     #[must_use]
     pub fn new(setup: Option<&Setup>, boot: Boot, now: Instant) -> Self {
-        let mut faults = FaultSet::NONE;
+        let mut faults = boot.latched.common(FaultSet::CRITICAL);
         faults.insert_if(setup.is_none(), Fault::Parameters);
         faults.insert_if(boot.recent_resets >= RESETS_TO_LOCK, Fault::ResetLoop);
         let state = ControllerState::new(now);
@@ -143,7 +145,7 @@ impl Ecu {
             vitals: Guarded::new(Vitals::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: History::new(now),
-            boot,
+            reset: boot.reset,
             warned_at: None,
             advice: Advice::new(setup.reliance),
             #[cfg(feature = "fault-injection")]
@@ -261,7 +263,7 @@ impl Ecu {
             mode: command.mode,
             warning: command.warning,
             faults: command.faults,
-            reset: self.boot.reset,
+            reset: self.reset,
         }
         .encode(steps as u8)
     }

@@ -11,6 +11,7 @@
 use crate::bus::Frame;
 use crate::bus::messages::ResetCause;
 use crate::ecu::{Boot, Ecu};
+use crate::faults::FaultSet;
 use crate::params::{ParamError, Params, Setup};
 use crate::quantity::Instant;
 use crate::stored::{VALUES, from_values, values};
@@ -91,7 +92,8 @@ impl Start {
     /// Identifier.
     const ID: u16 = 0x7EF;
 
-    /// Byte 0: state, 1: reset cause, 2: recent resets; 4..7: clock, us, little-endian.
+    /// Byte 0: state, 1: reset cause, 2: recent resets, 3: latched faults of class C, from their first bit on;
+    /// 4..7: clock, us, little-endian.
     #[must_use]
     pub fn encode(self) -> Frame {
         let (code, boot) = match self.state {
@@ -100,20 +102,22 @@ impl Start {
             StartState::Engaged => (2, Boot::default()),
         };
         let [a, b, c, d] = self.at.us().to_le_bytes();
-        let data = [code, boot.reset as u8, boot.recent_resets, 0, a, b, c, d];
+        let [_, latched] = boot.latched.bits().to_le_bytes();
+        let data = [code, boot.reset as u8, boot.recent_resets, latched, a, b, c, d];
         Frame::full(Self::ID, data)
     }
 
     /// The start, if this is such a frame and says one.
     #[must_use]
     pub fn decode(frame: &Frame) -> Option<Self> {
-        let [code, reset, recent_resets, _, a, b, c, d] = frame.full_data()?;
+        let [code, reset, recent_resets, latched, a, b, c, d] = frame.full_data()?;
         if frame.id() != Self::ID {
             return None;
         }
         let boot = Boot {
             reset: ResetCause::from_code(i64::from(reset))?,
             recent_resets,
+            latched: FaultSet::from_bits(u16::from_le_bytes([0, latched])),
         };
         Some(Self {
             state: match code {

@@ -45,6 +45,18 @@ macro_rules! quantity {
                 self.0.to_bits() as f32 * (1.0 / ONE as f32)
             }
 
+            /// So many times itself, saturating: from counts of a converter, itself being one of them.
+            #[must_use]
+            pub const fn times(self, count: i32) -> Self {
+                Self::from_wide((self.bits() as i64).saturating_mul(count as i64))
+            }
+
+            /// How many times it holds `part`, which is above zero; toward zero. To counts of a converter.
+            #[must_use]
+            pub fn count_of(self, part: Self) -> i32 {
+                self.bits().saturating_div(part.bits().max(1))
+            }
+
             pub(crate) const fn from_bits(bits: i32) -> Self {
                 Self(I8F24::from_bits(bits))
             }

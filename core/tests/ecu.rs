@@ -533,6 +533,7 @@ fn no_parameters_or_a_reset_loop_lock() {
         let boot = Boot {
             reset: ResetCause::Watchdog,
             recent_resets,
+            ..Boot::default()
         };
         let mut rig = Rig::new(good.then_some(&Setup::PAPER), boot);
         rig.curve(1.0);
@@ -554,6 +555,7 @@ fn no_parameters_or_a_reset_loop_lock() {
     let boot = Boot {
         reset: ResetCause::BrownOut,
         recent_resets: 2,
+        ..Boot::default()
     };
     let mut rig = Rig::new(Some(&Setup::PAPER), boot);
     let step = rig.tick();
@@ -562,6 +564,33 @@ fn no_parameters_or_a_reset_loop_lock() {
         read::<Guidance>(&step.guidance).unwrap().reset,
         ResetCause::BrownOut
     );
+}
+
+/// Class C lasts until power-up, and a reset is none; what an input did before it is over.
+#[test]
+fn a_latched_fault_outlives_a_reset() {
+    let mut latched = FaultSet::NONE;
+    latched.insert(Fault::Monitor);
+    latched.insert(Fault::LaneInvalid);
+    let boot = Boot {
+        reset: ResetCause::Watchdog,
+        recent_resets: 1,
+        latched,
+    };
+    let mut rig = Rig::new(Some(&Setup::PAPER), boot);
+    rig.curve(1.0);
+    let first = rig.tick();
+    assert_eq!(first.command.mode, Mode::Fault);
+    assert!(first.permitted && first.command.warning && warns(&first));
+    assert!(!first.command.faults.contains(Fault::LaneInvalid));
+    rig.run(600);
+    rig.engage = true;
+    let last = rig.run(600);
+    assert_eq!(
+        (last.command.mode, last.command.torque),
+        (Mode::Fault, Torque::ZERO)
+    );
+    assert!(last.command.faults.contains(Fault::Monitor) && last.permitted);
 }
 
 #[test]

@@ -65,7 +65,10 @@ fn starts() {
     let boot = Boot {
         reset: ResetCause::Watchdog,
         recent_resets: 2,
+        ..Boot::default()
     };
+    let mut latched = boot;
+    latched.latched.insert(Fault::Monitor);
     for (state, bytes, mode) in [
         (StartState::Boot(boot), [0, 1, 2, 0, 1, 2, 3, 4], Mode::Standby),
         (
@@ -73,6 +76,8 @@ fn starts() {
             [1, 1, 2, 0, 1, 2, 3, 4],
             Mode::Locked,
         ),
+        // The monitor's bit is 9: the second of those of class C.
+        (StartState::Boot(latched), [0, 1, 2, 2, 1, 2, 3, 4], Mode::Fault),
         // Engaged without any input hands over in its first step.
         (StartState::Engaged, [2, 0, 0, 0, 1, 2, 3, 4], Mode::Handover),
     ] {

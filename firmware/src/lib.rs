@@ -5,11 +5,13 @@
 //! - `boards`: the [`boards::Board`] trait and one file per board; a feature of the same name chooses it.
 //! - `log`: defmt over the board's log port.
 //! - `product`: the product's loop. [`reset`]: why the processor started. `stack`: its guard and its budget.
+//! - [`analogue`]: a motor stage and the column's sensors, in counts of converters.
 //! - [`storage`]: parameters in flash, [`nor`]: a model of a flash.
 //! - `host`: words from the machine that runs QEMU.
 //!
 //! Images (`src/bin`): `steering-ecu`, the product; `lockstep`, the same controller driven tick by tick by a
-//! simulator; `broken`, the product with a flaw; `power-loss`, which cuts its own parameter writes; `gate`, which links only if the controller cannot panic.
+//! simulator; `broken`, the product with a flaw; `power-loss`, which cuts its own parameter writes; `gate`, which links
+//! only if the controller cannot panic.
 //!
 //! The program is one loop with interrupts masked: a tick or a byte makes its interrupt pending, which wakes
 //! the core from `wfi` and runs no handler. So nothing is shared, nothing is preempted, and the longest turn
@@ -17,6 +19,7 @@
 
 #![cfg_attr(target_os = "none", no_std)]
 
+pub mod analogue;
 #[cfg(any(not(target_os = "none"), feature = "semihosting"))]
 pub mod nor;
 #[cfg(any(target_os = "none", test))]

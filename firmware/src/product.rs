@@ -2,7 +2,8 @@
 //!
 //! What is broken does not steer: a panic or a fault brings the torque to zero and resets the processor with
 //! the cause on record; a loop that hangs, or that the monitor does not permit, loses the watchdog. The
-//! controller comes up in Standby, says why on the bus, and locks after three resets within 10 s.
+//! controller comes up in Standby, or in the Fault that it had latched, says why on the bus, and locks after three
+//! resets within 10 s.
 //!
 //! Its parameters are the newest good set of the flash. Without any it has those built into the image, unless both
 //! copies are damaged: then it locks. A set that comes over the bus is stored at the restart that it causes: the
@@ -10,15 +11,16 @@
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
-use haptic_core::bus::messages::{Message, ParameterStatus, ResetCause};
+use haptic_core::bus::messages::{Column, Message, ParameterStatus, ResetCause};
 use haptic_core::download::Download;
-use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::ecu::{Boot, Ecu, Step};
+use haptic_core::faults::FaultSet;
 use haptic_core::modes::Mode;
 use haptic_core::params::Setup;
 
 use crate::boards::{Board, ThisBoard};
 use crate::storage::{self, Found};
-use crate::{reset, stack};
+use crate::{analogue, reset, stack};
 
 /// Steps between two lines of the log: one second.
 const STEPS_PER_REPORT: u32 = 1000;
@@ -54,7 +56,7 @@ impl Service {
 
 /// Runs the product. `disturb` is called before each step with its number: the product has nothing to say there,
 /// the image that breaks itself has.
-pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) -> ! {
+pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot, u32)) -> ! {
     stack::paint();
     let mut board = ThisBoard::start();
     let boot = reset::boot(board.reset_source());
@@ -79,6 +81,10 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
         board.sleep();
         while let Ok(frame) = board.can().receive() {
             counts.received = counts.received.wrapping_add(1);
+            // Two senders under one counter would pass each other's frames off.
+            if ThisBoard::HAS_COLUMN && frame.id() == Column::ID {
+                continue;
+            }
             let start = ThisBoard::cycles();
             if ecu.receive(&frame, ThisBoard::now()).is_err() {
                 counts.rejected = counts.rejected.wrapping_add(1);
@@ -91,7 +97,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(Boot, u32)) ->
             }
         }
         if board.tick() {
-            disturb(boot, counts.steps);
+            disturb(ecu, boot, counts.steps);
             step(&mut board, ecu, &mut service, &mut counts);
         }
     }
@@ -125,8 +131,13 @@ fn setup(found: &Found) -> Option<Setup> {
     }
 }
 
-fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
-    if let Some(column) = board.column() {
+/// The torque path, from the board's sensors to its motor stage. A function of its own, which the gate follows on
+/// every board (`cargo xtask boards`): no panic and no float in it.
+#[inline(never)]
+fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
+    if ThisBoard::HAS_COLUMN
+        && let Some(column) = board.column()
+    {
         // By the codec, as from the bus: what judges a sample there judges it here.
         let frame = column.encode(counts.steps as u8);
         if ecu.receive(&frame, ThisBoard::now()).is_err() {
@@ -140,10 +151,18 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
         .wrapping_add(counts.receiving);
     counts.receiving = 0;
     counts.worst_cycles = counts.worst_cycles.max(cycles);
-    board.set_torque(step.command.torque);
+    board.set_torque(analogue::drive(&step));
     if step.permitted {
         board.feed_watchdog();
     }
+    if step.command.faults.intersects(FaultSet::CRITICAL) {
+        reset::latch(step.command.faults.common(FaultSet::CRITICAL));
+    }
+    step
+}
+
+fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mut Counts) {
+    let step = control(board, ecu, counts);
     // A frame that finds no room is lost; the next follows in a millisecond, and the receiver's time-out
     // judges a bus that stays closed.
     for frame in core::iter::once(&step.guidance).chain(&step.others) {
@@ -162,9 +181,10 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
-    let guiding = matches!(step.command.mode, Mode::Active | Mode::Fade | Mode::Handover);
     // A light that fails is no reason to stop.
-    let _ = board.status().set_state(guiding.into());
+    let _ = board
+        .status()
+        .set_state(step.command.mode.may_have_torque().into());
     counts.steps = counts.steps.wrapping_add(1);
     if counts.steps == STEPS_TO_SETTLE {
         reset::settled();

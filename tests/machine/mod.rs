@@ -107,10 +107,15 @@ pub(crate) fn image(board: &str, bin: &str) -> PathBuf {
     static BUILDS: Mutex<()> = Mutex::new(());
     let _one_at_a_time = BUILDS.lock();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    // The one image that is not made of what a product has.
+    let features = match bin {
+        "broken" => format!("{board},broken"),
+        _ => board.to_owned(),
+    };
     let output = Command::new(cargo)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .args(["build", "--release", "-p", "haptic-firmware", "--bin", bin])
-        .args(["--target", "thumbv7em-none-eabihf", "--features", board])
+        .args(["--target", "thumbv7em-none-eabihf", "--features", &features])
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::inherit())
         .output()

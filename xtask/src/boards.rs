@@ -4,12 +4,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 
-use crate::code::Code;
+use crate::code::{CONTROLLER, Code, PRODUCT};
 use crate::golden::{self, Figure};
-use crate::image::{self, M4F};
+use crate::image::{self, Image, M4F};
 use crate::size;
 use crate::tool::{self, Usage, cargo, run};
 
@@ -29,33 +30,37 @@ pub(crate) enum Board {
     Mps2An386,
     /// QEMU, Cortex-M7.
     Mps2An500,
-    /// ST NUCLEO-G474RE.
+    /// ST NUCLEO-G474RE, the column's sensors on the bus.
     NucleoG474re,
+    /// ST NUCLEO-G474RE, the column's sensors wired to it.
+    NucleoG474reSensors,
     /// Microchip SAM E54 Xplained Pro.
     SamE54Xpro,
 }
 
 impl Board {
-    const fn feature(self) -> &'static str {
+    /// The feature, which is also QEMU's name of its machines.
+    pub(crate) const fn feature(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2-an386",
             Self::Mps2An500 => "mps2-an500",
             Self::NucleoG474re => "nucleo-g474re",
+            Self::NucleoG474reSensors => "nucleo-g474re-sensors",
             Self::SamE54Xpro => "sam-e54-xpro",
         }
     }
 
     /// probe-rs's name of the chip; None where QEMU is the board.
-    const fn chip(self) -> Option<&'static str> {
+    pub(crate) const fn chip(self) -> Option<&'static str> {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => None,
-            Self::NucleoG474re => Some("STM32G474RETx"),
+            Self::NucleoG474re | Self::NucleoG474reSensors => Some("STM32G474RETx"),
             Self::SamE54Xpro => Some("ATSAME54P20A"),
         }
     }
 
-    fn build(self, bin: &str) -> Result<PathBuf> {
-        image::elf_of(&mut image::build_command(bin, M4F, self.feature()))
+    pub(crate) fn build(self, image: Image) -> Result<PathBuf> {
+        image::elf_of(&mut image::build_command(image.bin(), M4F, self.feature()))
     }
 }
 
@@ -64,9 +69,9 @@ impl Board {
 pub(crate) struct Options {
     /// The board.
     pub(crate) board: Board,
-    /// The image: steering-ecu or lockstep.
+    /// The image.
     #[arg(long, default_value = "steering-ecu")]
-    pub(crate) image: String,
+    pub(crate) image: Image,
 }
 
 /// Which board is compared, and how it is reached.
@@ -75,8 +80,8 @@ pub(crate) struct Hil {
     /// The board.
     board: Board,
     /// The way to a real board's bus: a CAN interface (can0), the serial port of an SLCAN adapter
-    /// (/dev/ttyACM0), or tcp:HOST:PORT.
-    #[arg(long, value_name = "IFACE")]
+    /// (/dev/ttyUSB0; not that of the debug probe), or tcp:HOST:PORT.
+    #[arg(long, value_name = "IFACE", value_parser = NonEmptyStringValueParser::new())]
     can: Option<String>,
     /// The lockstep image is on the board already.
     #[arg(long)]
@@ -96,9 +101,10 @@ pub(crate) fn check(bless: bool) -> Result<()> {
             .args(["--target", M4F, "--features", name])
             .args(["--", "-D", "warnings"]))
         .with_context(|| name.to_owned())?;
-        for bin in ["lockstep", "steering-ecu"] {
-            let built = of_image(&board.build(bin)?).with_context(|| format!("{name}, {bin}"))?;
-            if bin == "steering-ecu" {
+        for (image, roots) in [(Image::Lockstep, CONTROLLER), (Image::SteeringEcu, PRODUCT)] {
+            let built =
+                of_image(&board.build(image)?, roots).with_context(|| format!("{name}, {}", image.bin()))?;
+            if image == Image::SteeringEcu {
                 figures.extend(built.into_iter().map(|figure| figure.of(name)));
             }
         }
@@ -135,7 +141,7 @@ fn figure(name: &str, unit: &'static str, value: u64, tolerance_percent: u64) ->
 }
 
 /// What an image takes, and that its torque path is clean.
-fn of_image(elf: &Path) -> Result<Vec<Figure>> {
+fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
     let size = size::of(elf)?;
     let code = Code::of(elf)?;
     let frame = code.largest_frame();
@@ -143,7 +149,7 @@ fn of_image(elf: &Path) -> Result<Vec<Figure>> {
         frame <= GUARD,
         "a frame of {frame} B could step over the guard of {GUARD} B below the stack"
     );
-    let path = code.torque_path()?;
+    let path = code.torque_path(roots)?;
     println!(
         "{}: no panic and no float in the {} functions of the torque path",
         elf.display(),
@@ -212,7 +218,7 @@ fn in_qemu(board: Board) -> Result<Vec<Figure>> {
 /// What a step costs a board.
 pub(crate) fn bench(board: Board) -> Result<()> {
     if board.chip().is_some() {
-        return run_on(board, "steering-ecu");
+        return run_on(board, Image::SteeringEcu);
     }
     for figure in in_qemu(board)? {
         println!("{:<30}{:>10} {}", figure.name, figure.value, figure.unit);
@@ -229,13 +235,19 @@ pub(crate) fn hil(options: &Hil) -> Result<()> {
         (None, Some(_)) => {
             let board = options.board.feature();
             let message = format!(
-                "{board} needs a way to its bus: --can can0, --can /dev/ttyACM0 or --can tcp:HOST:PORT"
+                "{board} needs a way to its bus: --can can0, --can /dev/ttyUSB0 or --can tcp:HOST:PORT"
             );
             return Err(Usage(message).into());
         }
-        (Some(adapter), chip) => {
-            if chip.is_some() && !options.no_flash {
-                flash(options.board, "lockstep")?;
+        (Some(_), None) => {
+            let board = options.board.feature();
+            let message =
+                format!("{board} is a machine of QEMU, which has its own way to the bus: leave out --can");
+            return Err(Usage(message).into());
+        }
+        (Some(adapter), Some(_)) => {
+            if !options.no_flash {
+                flash(options.board, Image::Lockstep)?;
             }
             pil.args(["--can", adapter])
         }
@@ -250,9 +262,9 @@ pub(crate) fn hil(options: &Hil) -> Result<()> {
 }
 
 /// Writes an image to a board and starts it.
-pub(crate) fn flash(board: Board, bin: &str) -> Result<()> {
+pub(crate) fn flash(board: Board, image: Image) -> Result<()> {
     let chip = chip(board)?;
-    let elf = board.build(bin)?;
+    let elf = board.build(image)?;
     run(tool::command("probe-rs")
         .args(["download", "--verify", "--chip", chip])
         .arg(elf))?;
@@ -260,9 +272,9 @@ pub(crate) fn flash(board: Board, bin: &str) -> Result<()> {
 }
 
 /// Writes an image to a board, starts it and prints its log until interrupted.
-pub(crate) fn run_on(board: Board, bin: &str) -> Result<()> {
+pub(crate) fn run_on(board: Board, image: Image) -> Result<()> {
     let chip = chip(board)?;
-    let elf = board.build(bin)?;
+    let elf = board.build(image)?;
     run(tool::command("probe-rs").args(["run", "--chip", chip]).arg(elf))
 }
 
@@ -270,8 +282,8 @@ pub(crate) fn run_on(board: Board, bin: &str) -> Result<()> {
 fn chip(board: Board) -> Result<&'static str> {
     let Some(chip) = board.chip() else {
         let message = format!(
-            "{} is a machine of QEMU, with nothing to flash: cargo xtask qemu",
-            board.feature()
+            "{board} is a machine of QEMU, with nothing to flash: cargo xtask qemu --board {board}",
+            board = board.feature()
         );
         return Err(Usage(message).into());
     };

@@ -1,8 +1,8 @@
 //! The machine code of an image: its functions, what they call, the stack they take, and whether they compute in
 //! floating point. Read from llvm-objdump, of the very image that goes onto a board.
 //!
-//! [`Code::torque_path`] follows the calls from `Ecu::receive` and `Ecu::step`. What it cannot follow, a call through
-//! a pointer or a recursion, is an error: nothing there can hide.
+//! [`Code::torque_path`] follows the calls from the functions where the torque path begins ([`CONTROLLER`],
+//! [`PRODUCT`]). What it cannot follow, a call through a pointer or a recursion, is an error: nothing there can hide.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,11 +11,13 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::tool;
 
-/// Where the torque path begins.
-const ROOTS: [&str; 2] = [
+/// Where the controller's torque path begins.
+pub(crate) const CONTROLLER: [&str; 2] = [
     "haptic_core::ecu::Ecu::receive::",
     "haptic_core::ecu::Ecu::step::",
 ];
+/// Where the product's begins: the same with the board's sensors, its motor stage, its clock and its watchdog.
+pub(crate) const PRODUCT: [&str; 2] = [CONTROLLER[0], "haptic_firmware::product::control::"];
 
 /// A function.
 #[derive(Debug, Default)]
@@ -84,14 +86,14 @@ impl Code {
         self.0.values().map(|function| function.step).max().unwrap_or(0)
     }
 
-    /// Follows the torque path.
+    /// Follows the torque path from functions whose names begin so.
     ///
     /// # Errors
     /// A panic or a floating-point operation on it, or what cannot be followed.
-    pub(crate) fn torque_path(&self) -> Result<TorquePath> {
+    pub(crate) fn torque_path(&self, roots: [&str; 2]) -> Result<TorquePath> {
         let mut depths = BTreeMap::new();
         let mut deepest = 0;
-        for root in ROOTS {
+        for root in roots {
             let (address, _) = self
                 .0
                 .iter()
@@ -311,7 +313,7 @@ mod tests {
 ";
 
     fn path(text: &str) -> Result<TorquePath> {
-        Code::read(text).torque_path()
+        Code::read(text).torque_path(CONTROLLER)
     }
 
     #[test]

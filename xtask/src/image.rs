@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
 
 use crate::tool::cargo;
 
@@ -14,6 +15,24 @@ pub(crate) const M3: &str = "thumbv7m-none-eabi";
 /// The reference board.
 pub(crate) const BOARD: &str = "mps2-an386";
 
+/// What goes onto a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Image {
+    /// The product.
+    SteeringEcu,
+    /// The same controller, driven tick by tick by a simulator.
+    Lockstep,
+}
+
+impl Image {
+    pub(crate) const fn bin(self) -> &'static str {
+        match self {
+            Self::SteeringEcu => "steering-ecu",
+            Self::Lockstep => "lockstep",
+        }
+    }
+}
+
 /// The command that builds `bin` of the firmware in release mode.
 pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command {
     let mut command = cargo();
@@ -22,11 +41,6 @@ pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command 
         .args(["--target", target, "--features", features])
         .arg("--message-format=json-render-diagnostics");
     command
-}
-
-/// Builds an image for the reference board and returns its ELF.
-pub(crate) fn build(bin: &str) -> Result<PathBuf> {
-    elf_of(&mut build_command(bin, M4F, BOARD))
 }
 
 /// Runs a build command, whose messages the user sees, and returns its ELF.

@@ -92,8 +92,8 @@ fn main() -> ExitCode {
         Command::Coverage => evidence::coverage(),
         Command::Mutants => evidence::mutants(),
         Command::Boards { bless } => boards::check(bless),
-        Command::Flash(options) => boards::flash(options.board, &options.image),
-        Command::Run(options) => boards::run_on(options.board, &options.image),
+        Command::Flash(options) => boards::flash(options.board, options.image),
+        Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
         Command::Bench {
             what: Some(Bench::Speed),

@@ -5,6 +5,7 @@ use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitCode, Stdio};
+use std::str::FromStr;
 use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
@@ -12,19 +13,28 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use defmt_decoder::{DecodeError, StreamDecoder, Table};
 
-use crate::{image, tool};
+use crate::boards::Board;
+use crate::image::Image;
+use crate::tool::{self, Usage};
 
 /// Exit code of a run that was stopped by its time-out, as that of timeout(1).
 const TIMED_OUT: u8 = 124;
+/// Seconds of a run without a bus, unless the user says otherwise.
+const TIMEOUT_S: u64 = 60;
+/// 2^5 ns an instruction: 31 million a second, near the board's 25 MHz.
+const BOARD_SPEED: u8 = 5;
 /// How often the machine is looked at while its log is silent.
 const GLANCE: Duration = Duration::from_millis(20);
 
 /// Options of `cargo xtask qemu`.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// The image to build and run: steering-ecu or lockstep.
+    /// The image to build and run.
     #[arg(default_value = "steering-ecu")]
-    image: String,
+    image: Image,
+    /// The machine.
+    #[arg(long, default_value = "mps2-an386")]
+    board: Board,
     /// Run this ELF instead of building one (cargo's runner does).
     #[arg(long)]
     elf: Option<PathBuf>,
@@ -32,13 +42,50 @@ pub(crate) struct Options {
     /// `tcp:127.0.0.1:3333,server,nowait`. With `stdio` the run ends with the input.
     #[arg(long, default_value = "null")]
     can: String,
-    /// Let the clock count instructions, 2^SHIFT ns each: work of the host is then no time of the target. 5 is about
-    /// the board's speed; a smaller one gives whoever is on the bus more time to answer.
-    #[arg(long, value_name = "SHIFT", value_parser = clap::value_parser!(u8).range(0..=10))]
-    icount: Option<u8>,
-    /// Stop after this many seconds, with exit code 124.
-    #[arg(long, default_value_t = 60)]
-    timeout: u64,
+    /// The machine's clock: `off`, the host's; or SHIFT, 0 to 10: it counts instructions, 2^SHIFT ns each. Then a busy
+    /// host makes the machine slower and never late; on the host's clock the watchdog fires whenever the host pauses
+    /// for 16 ms. 5 is about the board's speed, and the default of steering-ecu; a smaller one gives whoever is on the
+    /// bus more time to answer. lockstep takes its time from the bus: off.
+    #[arg(long, value_name = "SHIFT|off")]
+    icount: Option<Clock>,
+    /// Stop after this many seconds, with exit code 124. Default: 60 with `--can null`; else the run lasts until
+    /// Ctrl-C.
+    #[arg(long, value_name = "SECONDS")]
+    timeout: Option<u64>,
+}
+
+/// What the machine's time is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Clock {
+    Host,
+    /// 2^n ns an instruction.
+    Instructions(u8),
+}
+
+impl FromStr for Clock {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse()) {
+            ("off", _) => Ok(Self::Host),
+            (_, Ok(shift @ 0..=10)) => Ok(Self::Instructions(shift)),
+            _ => Err("neither a number from 0 to 10 nor off".to_owned()),
+        }
+    }
+}
+
+impl Options {
+    fn clock(&self) -> Clock {
+        self.icount.unwrap_or(match self.image {
+            Image::SteeringEcu => Clock::Instructions(BOARD_SPEED),
+            Image::Lockstep => Clock::Host,
+        })
+    }
+
+    fn timeout(&self) -> Option<Duration> {
+        let default = (self.can == "null").then_some(TIMEOUT_S);
+        self.timeout.or(default).map(Duration::from_secs)
+    }
 }
 
 /// What the threads around QEMU see.
@@ -59,10 +106,14 @@ impl Drop for Machine {
 }
 
 pub(crate) fn run(options: &Options) -> Result<ExitCode> {
+    if options.board.chip().is_some() {
+        let board = options.board.feature();
+        return Err(Usage(format!("{board} is no machine of QEMU: cargo xtask run {board}")).into());
+    }
     tool::ensure(&[("qemu-system-arm", "qemu-system-arm")])?;
     let elf = match &options.elf {
         Some(elf) => elf.clone(),
-        None => image::build(&options.image)?,
+        None => options.board.build(options.image)?,
     };
     let table = table(&elf)?;
     let mut log = Log {
@@ -71,7 +122,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
     };
     let (events, seen) = channel();
     let mut machine = start(&elf, options, &events)?;
-    let deadline = Instant::now() + Duration::from_secs(options.timeout);
+    let start = Instant::now();
     let code = loop {
         match seen.recv_timeout(GLANCE) {
             Ok(Event::Log(bytes)) => log.print(&bytes)?,
@@ -85,8 +136,8 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
                 }
             }
         }
-        if Instant::now() > deadline {
-            eprintln!("stopped after {} s", options.timeout);
+        if let Some(timeout) = options.timeout().filter(|timeout| start.elapsed() > *timeout) {
+            eprintln!("stopped after {} s (--timeout)", timeout.as_secs());
             break ExitCode::from(TIMED_OUT);
         }
     };
@@ -103,7 +154,8 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
     let log = TcpListener::bind("127.0.0.1:0").context("a port for the log")?;
     let mut command = Command::new("qemu-system-arm");
     command
-        .args(["-machine", image::BOARD, "-display", "none", "-monitor", "none"])
+        .args(["-machine", options.board.feature()])
+        .args(["-display", "none", "-monitor", "none"])
         .args(["-serial", &options.can])
         .args(["-serial", &format!("tcp:{}", log.local_addr()?)])
         // For the lock-step image, which takes its channel from here.
@@ -118,7 +170,7 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
         } else {
             Stdio::null()
         });
-    if let Some(shift) = options.icount {
+    if let Clock::Instructions(shift) = options.clock() {
         command.args(["-icount", &format!("shift={shift}")]);
     }
     let mut child = command.spawn().context("qemu-system-arm does not start")?;
@@ -158,7 +210,7 @@ fn forward_log(from: TcpListener, events: Sender<Event>) {
 pub(crate) fn print_log(file: &Path, elf: Option<PathBuf>) -> Result<()> {
     let elf = match elf {
         Some(elf) => elf,
-        None => image::build("lockstep")?,
+        None => Board::Mps2An386.build(Image::Lockstep)?,
     };
     let table = table(&elf)?;
     let mut log = Log {

@@ -1,5 +1,6 @@
 //! The product with a flaw, to show what becomes of it: half a second after power-up, and in one case after every
-//! start, the loop hangs, panics, faults, or outgrows its stack. QEMU's semihosting argument says which.
+//! start, the loop hangs, panics, faults, or outgrows its stack; or a bit of the monitor flips, which then permits nothing
+//! any more. QEMU's semihosting argument says which.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -13,6 +14,7 @@ mod target {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use haptic_core::bus::messages::ResetCause;
     use haptic_core::ecu::Ecu;
+    use haptic_core::ecu::injection::Region;
     use haptic_firmware::{host, product};
 
     /// The step that breaks.
@@ -28,11 +30,12 @@ mod target {
             Some("panic") => Flaw::Panic,
             Some("fault") => Flaw::Fault,
             Some("overflow") => Flaw::Overflow,
+            Some("veto") => Flaw::Veto,
             _ => Flaw::HangAlways,
         };
-        product::run(ECU, move |boot, step| {
+        product::run(ECU, move |ecu, boot, step| {
             if step == AT && (boot.reset == ResetCause::PowerOn || flaw == Flaw::HangAlways) {
-                break_down(flaw);
+                break_down(flaw, ecu);
             }
         })
     }
@@ -44,9 +47,10 @@ mod target {
         Panic,
         Fault,
         Overflow,
+        Veto,
     }
 
-    fn break_down(flaw: Flaw) {
+    fn break_down(flaw: Flaw, ecu: &mut Ecu) {
         match flaw {
             Flaw::Hang | Flaw::HangAlways => loop {
                 cortex_m::asm::nop();
@@ -54,6 +58,7 @@ mod target {
             Flaw::Panic => panic!("on purpose"),
             Flaw::Fault => cortex_m::asm::udf(),
             Flaw::Overflow => drop(deeper(0)),
+            Flaw::Veto => ecu.flip_bit(Region::Monitor, 0),
         }
     }
 

@@ -17,7 +17,7 @@ mod target {
     fn main() -> ! {
         // A static and not on the stack, so that its size shows in the image's RAM.
         static mut ECU: Option<Ecu> = None;
-        product::run(ECU, |_, _| {})
+        product::run(ECU, |_, _, _| {})
     }
 
     #[panic_handler]

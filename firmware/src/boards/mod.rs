@@ -36,8 +36,8 @@ compile_error!(
     "no board is chosen: build haptic-firmware with --features mps2-an386, mps2-an500, nucleo-g474re or sam-e54-xpro"
 );
 
-/// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; an
-/// actuator on the bus gives up after 30 ms.
+/// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; what
+/// becomes of the torque meanwhile is in `docs/safety.md`, board by board.
 pub const WATCHDOG: Micros = Micros::from_ms(16);
 
 /// What the images need of a board.
@@ -51,6 +51,9 @@ pub trait Board: Sized {
 
     /// The feature that chooses the board.
     const NAME: &'static str;
+
+    /// Whether the column's sensors are wired to the board. Its frames on the bus are then ignored.
+    const HAS_COLUMN: bool = false;
 
     /// Takes the hardware, masks interrupts, starts the clocks and guards the stack ([`crate::stack`]). The torque
     /// is zero. To be called once, first.
@@ -89,10 +92,11 @@ pub trait Board: Sized {
     /// Feeds the watchdog. Only a step that the monitor permits may.
     fn feed_watchdog(&mut self);
 
-    /// Sets the motor stage that is wired to the board. Without one, the actuator on the bus obeys the frames.
-    fn set_torque(&mut self, _torque: Torque) {}
+    /// Sets the motor stage that is wired to the board; `None` switches it off. Without one, the actuator on the bus
+    /// obeys the frames.
+    fn set_torque(&mut self, _torque: Option<Torque>) {}
 
-    /// The column's sensors that are wired to the board; `None` where they are on the bus, or disagree.
+    /// Reads the column's sensors that are wired to the board; `None` when they disagree ([`Board::HAS_COLUMN`]).
     fn column(&mut self) -> Option<Column> {
         None
     }

@@ -7,8 +7,7 @@
 //! - CMSDK watchdog: a non-maskable interrupt after half its time, the reset after all of it.
 //!
 //! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART, timer and watchdog. The actuator
-//! sits on the bus and takes 30 ms without a frame as zero torque (`bus::messages::TIMEOUT`), so zero torque
-//! here is a silent bus.
+//! sits on the bus and takes silence as zero torque, so zero torque here is a silent bus (`docs/safety.md`: how soon).
 
 use core::convert::Infallible;
 use core::mem::MaybeUninit;
@@ -262,7 +261,7 @@ impl WatchdogBlock {
     }
 }
 
-/// The watchdog is half through: no torque while it lasts.
+/// The watchdog is half through: silence, also from a loop that hangs with a frame in its hands.
 #[exception]
 unsafe fn NonMaskableInt() {
     Mps2::zero_torque();

@@ -19,8 +19,8 @@
 //! pages of the second. A word whose programming lost power reads as an error that no code of correction mends:
 //! the chip then raises the non-maskable interrupt, and what was read fails its CRC.
 //!
-//! Two mirrored torque signals that do not add up to the supply mean a broken or missing sensor: the board then
-//! has no column, and one on the bus may speak.
+//! The column's sensors are read with the feature `nucleo-g474re-sensors` alone, since pins that float read anything.
+//! Without it the column is on the bus.
 
 use core::future::Future;
 use core::pin::pin;
@@ -29,43 +29,32 @@ use core::task::{Context, Poll, Waker};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, Peripherals, SCB, SYST};
 use cortex_m_rt::exception;
-use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, SampleTime};
+use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::can::enums::BusError;
 use embassy_stm32::can::{self, CanConfigurator};
 use embassy_stm32::dac::{DacChannel, Value};
 use embassy_stm32::flash::{self, Bank2Region, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::peripherals::{ADC1, FDCAN1, IWDG, PB5};
+use embassy_stm32::peripherals::{ADC1, FDCAN1, IWDG, PA0, PA1, PB5, PC0, PC1};
 use embassy_stm32::rcc::{self, mux};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, pac};
+use embassy_stm32::{Peri, bind_interrupts, pac};
 use embedded_can::nb::Can;
 use embedded_can::{Error, ErrorKind};
 use embedded_hal_nb::nb;
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, ResetCause};
-use haptic_core::quantity::{Instant, Radians, Torque};
+use haptic_core::quantity::{Instant, Torque};
 use rtt_target::{ChannelMode, UpChannel, rtt_init};
 
 use super::{Board, WATCHDOG};
-use crate::{reset, stack};
+use crate::{analogue, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 170_000_000;
 const TICK_HZ: u32 = 1000;
 const BITRATE: u32 = 500_000;
-
-/// Converters: 12 bits over 3.3 V; zero is in the middle.
-const MID: i32 = 2048;
-const COUNTS_PER_V: f32 = 4096.0 / 3.3;
-/// Motor demand and motor torque, counts a N.m.
-const MOTOR: f32 = 0.3 * COUNTS_PER_V;
-/// Driver torque, counts a N.m, and wheel angle, counts a rad.
-const SENSOR: f32 = 0.15 * COUNTS_PER_V;
-/// The two driver torque signals may miss their sum by 0.1 V.
-const SUM_TOLERANCE: i32 = 124;
 
 bind_interrupts!(struct Interrupts {
     FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
@@ -77,11 +66,16 @@ pub struct NucleoG474re {
     can: FdCan,
     led: Output<'static>,
     flash: Bank2Region<'static, flash::Blocking>,
-    motor: DacChannel<'static, Blocking>,
     motor_enable: Output<'static>,
     adc: Adc<'static, ADC1>,
-    /// Driver torque 1 and 2, wheel angle, motor torque.
-    sensors: [AnyAdcChannel<'static, ADC1>; 4],
+    /// Driver torque 1 and 2, wheel angle, motor torque. By name: the HAL's nameless channels bring a panic along, for
+    /// those that do not exist.
+    sensors: (
+        Peri<'static, PA0>,
+        Peri<'static, PA1>,
+        Peri<'static, PC1>,
+        Peri<'static, PC0>,
+    ),
     watchdog: Option<IndependentWatchdog<'static, IWDG>>,
     systick: SYST,
 }
@@ -114,6 +108,7 @@ impl Board for NucleoG474re {
     type Flash = Bank2Region<'static, flash::Blocking>;
 
     const NAME: &'static str = "nucleo-g474re";
+    const HAS_COLUMN: bool = cfg!(feature = "nucleo-g474re-sensors");
 
     fn start() -> Self {
         cortex_m::interrupt::disable();
@@ -122,9 +117,13 @@ impl Board for NucleoG474re {
         cortex.DCB.enable_trace();
         cortex.DWT.enable_cycle_counter();
         let p = embassy_stm32::init(clocks());
+        // The watchdog stands still with a core that a debugger halts.
+        pac::DBGMCU.apb1lfzr().modify(|w| w.set_iwdg(true));
         let motor_enable = Output::new(p.PB5, Level::Low, Speed::Low);
         let mut motor = DacChannel::new_blocking(p.DAC1, p.PA4);
-        motor.set(Value::Bit12Right(MID as u16));
+        motor.set(Value::Bit12Right(analogue::MID));
+        // Dropping it would switch the channel off.
+        core::mem::forget(motor);
         rtt_init! { up: { 0: { size: 1024, mode: ChannelMode::NoBlockSkip, name: "defmt" } } };
         let mut clock = Timer::new(p.TIM2);
         clock.set_tick_freq(Hertz(1_000_000));
@@ -137,15 +136,9 @@ impl Board for NucleoG474re {
             can: FdCan(can.into_normal_mode()),
             led: Output::new(p.PA5, Level::Low, Speed::Low),
             flash: Flash::new_blocking(p.FLASH).into_blocking_regions().bank2_region,
-            motor,
             motor_enable,
             adc: Adc::new(p.ADC1, Default::default()),
-            sensors: [
-                p.PA0.degrade_adc(),
-                p.PA1.degrade_adc(),
-                p.PC1.degrade_adc(),
-                p.PC0.degrade_adc(),
-            ],
+            sensors: (p.PA0, p.PA1, p.PC1, p.PC0),
             watchdog: Some(IndependentWatchdog::new(p.IWDG, WATCHDOG.us())),
             systick: cortex.SYST,
         }
@@ -217,24 +210,23 @@ impl Board for NucleoG474re {
         }
     }
 
-    fn set_torque(&mut self, torque: Torque) {
-        let demand = MID + (torque.to_f32() * MOTOR) as i32;
-        self.motor.set(Value::Bit12Right(demand.clamp(0, 4095) as u16));
-        self.motor_enable.set_high();
+    fn set_torque(&mut self, torque: Option<Torque>) {
+        let demand = analogue::demand(torque.unwrap_or(Torque::ZERO));
+        // By register: the HAL looks at each call, with a panic behind, whether the channel exists.
+        pac::DAC1.dhr12r(0).write(|w| w.set_dhr(demand));
+        self.motor_enable.set_level(torque.is_some().into());
     }
 
     fn column(&mut self) -> Option<Column> {
-        let adc = &mut self.adc;
-        let counts = self
-            .sensors
-            .each_mut()
-            .map(|sensor| i32::from(adc.blocking_read(sensor, SampleTime::CYCLES47_5)) - MID);
-        let [torque, mirrored, angle, motor] = counts;
-        ((torque + mirrored).abs() <= SUM_TOLERANCE).then(|| Column {
-            driver_torque: Torque::from_nm(f64::from((torque - mirrored) as f32 / (2.0 * SENSOR))),
-            wheel_angle: Radians::from_rad(f64::from(angle as f32 / SENSOR)),
-            motor_torque: Torque::from_nm(f64::from(motor as f32 / MOTOR)),
-        })
+        const SAMPLE: SampleTime = SampleTime::CYCLES47_5;
+        let Self { adc, sensors, .. } = self;
+        let counts = [
+            adc.blocking_read(&mut sensors.0, SAMPLE),
+            adc.blocking_read(&mut sensors.1, SAMPLE),
+            adc.blocking_read(&mut sensors.2, SAMPLE),
+            adc.blocking_read(&mut sensors.3, SAMPLE),
+        ];
+        analogue::column(counts)
     }
 
     fn zero_torque() {
@@ -252,8 +244,8 @@ impl Board for NucleoG474re {
     }
 }
 
-/// A word of the flash cannot be corrected: whoever read it has a CRC to tell by. Nothing else raises this interrupt
-/// here but a lost crystal, which no program can do without.
+/// A word of the flash cannot be corrected: whoever read it has a CRC to tell by. Nothing else is told to raise this
+/// interrupt here. A lost crystal is not: nobody watches it but the watchdog, which has a clock of its own.
 #[exception]
 unsafe fn NonMaskableInt() {
     if pac::FLASH.eccr().read().eccd() {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use host_sim::input::InputError;
 use host_sim::pil::PilError;
 use host_sim::pil::parameters::Product;
@@ -17,9 +18,9 @@ pub(super) struct Arguments {
     /// says what it has
     #[arg(value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
-    /// The way to the bus: a CAN interface (can0), the serial port of an SLCAN adapter (/dev/ttyACM0), or
+    /// The way to the bus: a CAN interface (can0), the serial port of an SLCAN adapter (/dev/ttyUSB0), or
     /// tcp:HOST:PORT
-    #[arg(long, value_name = "IFACE")]
+    #[arg(long, value_name = "IFACE", value_parser = NonEmptyStringValueParser::new())]
     can: String,
     /// Print the result as one JSON object
     #[arg(long)]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use host_sim::input::InputError;
 use host_sim::pil::{Channel, Machine, PilError, Target};
 use host_sim::scenario::Scenario;
@@ -27,8 +28,9 @@ pub(super) struct Arguments {
     #[arg(long)]
     count: bool,
     /// A board that runs the lockstep image, in QEMU's place: a CAN interface (can0), the serial port of an SLCAN
-    /// adapter (/dev/ttyACM0), or tcp:HOST:PORT
-    #[arg(long, value_name = "IFACE", conflicts_with_all = ["channel", "machine", "count"])]
+    /// adapter (/dev/ttyUSB0), or tcp:HOST:PORT
+    #[arg(long, value_name = "IFACE", conflicts_with_all = ["channel", "machine", "count"],
+          value_parser = NonEmptyStringValueParser::new())]
     can: Option<String>,
     /// Print the results as one JSON object
     #[arg(long)]

@@ -336,6 +336,7 @@ impl<'a> Seat<'a> {
                     let boot = Boot {
                         reset: ResetCause::BrownOut,
                         recent_resets: 1,
+                        ..Boot::default()
                     };
                     self.ecu = Ecu::new(Some(&self.setup), boot, Instant::from_us(now_us));
                     self.guard.reset(now_us);

@@ -60,8 +60,8 @@ impl Answers {
     pub(super) fn gone(&mut self, what: &str) -> PilError {
         let Some(qemu) = &mut self.qemu else {
             return PilError::Failed(format!(
-                "the board {what} after {} steps: does it run the lockstep image, is the bus terminated, and do \
-                 adapter and board both run at 500 kbit/s?",
+                "the board {what} after {} steps: is this the adapter's port and not the debug probe's, does the \
+                 board run the lockstep image, is the bus terminated, and do adapter and board both run at 500 kbit/s?",
                 self.steps
             ));
         };

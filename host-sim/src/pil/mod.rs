@@ -89,7 +89,7 @@ pub enum Target {
         count: bool,
     },
     /// A board that runs the image, on a bus behind a CAN adapter: a network interface (`can0`, SocketCAN), a serial
-    /// port (`/dev/ttyACM0`, SLCAN), or `tcp:HOST:PORT` (SLCAN). Frames go and come one tick at a time.
+    /// port (`/dev/ttyUSB0`, SLCAN), or `tcp:HOST:PORT` (SLCAN). Frames go and come one tick at a time.
     Board(String),
 }
 
