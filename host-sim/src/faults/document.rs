@@ -37,7 +37,6 @@ fn reaction(row: &Row) -> String {
         Expect::Uncut => "goes on, not cut".into(),
         Expect::MayHandOver => "goes on, or hands over once it looks impossible".into(),
         Expect::OnlyRules => "whatever the rules of every cycle allow".into(),
-        Expect::MayStop => "goes on, or zero and latched".into(),
         Expect::HandsOverOrStops => within("hands over, or zero and latched,"),
         Expect::Reaches { mode, .. } => within(match mode {
             super::guard::ACTIVE => "engages from zero",

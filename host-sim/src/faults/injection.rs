@@ -103,7 +103,9 @@ pub(super) enum Inside {
     Flip(Region),
     /// The law asks for 5 N.m, away from what it should ask for.
     LawForced,
-    /// The law asks for a new random torque every 20 ms.
+    /// The law asks for 5 N.m to the left, but in one of 16 ms for none.
+    LawInterrupted,
+    /// The law asks for a new random torque every 200 ms.
     LawRandom,
     /// The monitor agrees with everything.
     MonitorAgrees,

@@ -26,7 +26,7 @@ use crate::scenario::Scenario;
 /// Code of the limit that acts for the driver's sake.
 const DRIVER_OVERRIDE: u64 = 5;
 /// A new random law every so many ms.
-const LAW_HELD_MS: i64 = 20;
+const LAW_HELD_MS: i64 = 200;
 /// A hand taps five times a second, 40 ms each.
 const TAP_EVERY_MS: i64 = 200;
 const TAP_MS: i64 = 40;
@@ -326,6 +326,10 @@ impl<'a> Seat<'a> {
                 Inside::LawForced if since == 0 => {
                     let away = if self.commanded_nm > 0.0 { -5.0 } else { 5.0 };
                     self.ecu.force_law(Some(Torque::from_nm(away)));
+                }
+                Inside::LawInterrupted => {
+                    let torque_nm = if since % 16 == 0 { 0.0 } else { 5.0 };
+                    self.ecu.force_law(Some(Torque::from_nm(torque_nm)));
                 }
                 Inside::LawRandom if since % LAW_HELD_MS == 0 => {
                     let torque_nm = self.dice.random_range(-5.0..5.0);

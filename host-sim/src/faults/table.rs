@@ -85,8 +85,6 @@ pub enum Expect {
     Uncut,
     /// Guidance goes on until the fault can be seen, and may then hand over.
     MayHandOver,
-    /// Guidance goes on, or stops for good.
-    MayStop,
     /// Nothing but the rules of every cycle.
     OnlyRules,
     /// Hands over or stops for good.
@@ -207,7 +205,7 @@ impl Row {
     pub fn deadline_ms(&self) -> Option<u32> {
         let asked = !matches!(
             self.expect,
-            Expect::GoesOn { .. } | Expect::Uncut | Expect::MayHandOver | Expect::MayStop | Expect::OnlyRules
+            Expect::GoesOn { .. } | Expect::Uncut | Expect::MayHandOver | Expect::OnlyRules
         );
         asked.then_some(self.deadline_ms)
     }
@@ -317,14 +315,6 @@ impl Row {
     const fn only_rules(self) -> Self {
         Self {
             expect: Expect::OnlyRules,
-            ..self
-        }
-    }
-
-    const fn may_stop(self) -> Self {
-        Self {
-            class: Class::C,
-            expect: Expect::MayStop,
             ..self
         }
     }

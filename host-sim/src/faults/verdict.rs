@@ -72,7 +72,6 @@ fn reaction(row: &Row, onset: u32, record: &Record) -> Result<Option<u32>, Broke
             too_early(row, record, at).map(|()| at)
         }
         Expect::OnlyRules => Ok(None),
-        Expect::MayStop => only(&[FAULT]),
         Expect::Reaches { mode, fading } => {
             let locked_at_once = record
                 .modes

@@ -79,11 +79,17 @@ pub(super) const ROWS: &[Row] = &[
     )
     .stops(500),
     row(
+        "law-interrupted",
+        "the law asks for 5 N.m to the left, but in one of 16 ms for none",
+        &[inside(Inside::LawInterrupted)],
+    )
+    .stops(500),
+    row(
         "law-random",
-        "the law asks for a random torque every 20 ms",
+        "the law asks for a random torque every 200 ms",
         &[inside(Inside::LawRandom)],
     )
-    .may_stop(),
+    .stops(2000),
     row(
         "monitor-agrees",
         "the monitor agrees with everything: self-test within 1 s",
