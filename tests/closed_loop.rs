@@ -167,7 +167,7 @@ fn a_run_that_leaves_its_lane_for_good_is_flagged_and_finite() {
                 s.wheel_angle_rad,
             ];
             assert!(values.iter().all(|v| v.is_finite()), "{s:?}");
-            assert!(s.lateral_error_m.abs() <= 3.6, "stopped at a lane width: {s:?}");
+            assert!(s.lateral_error_m.abs() <= 10.0, "stopped far off the road: {s:?}");
         }
     }
 }
