@@ -47,10 +47,8 @@ pub trait Message: Copy {
     fn decode(state: &mut ReceiverState, frame: &Frame) -> Result<Self, Reject> {
         let data = frame.full_data().ok_or(Reject::Length)?;
         let signals = Self::unpack(u64::from_le_bytes(data));
-        if signals.is_none() && !state.is_trusted() {
-            // Trust is for clean frames in a row, and this is none, whoever sent it.
-            *state = ReceiverState::NEW;
-        } else {
+        // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
+        if signals.is_some() || state.is_trusted() {
             state.accept(&Self::PROTECTION, &data, Self::MAX_DELTA)?;
         }
         signals.ok_or(Reject::Range)
