@@ -302,20 +302,20 @@ impl Ecu {
         frames
     }
 
-    /// The self-test: each turn the monitor must refuse what only one of its rules refuses.
+    /// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are
+    /// damaged refuses everything.
     fn monitor_refuses_nonsense(&self, turn: u32) -> bool {
-        let Some(monitor) = self.monitor.get() else {
-            return true;
-        };
-        let (mut state, guidance) = monitor.nonsense(turn);
-        let evidence = Evidence {
-            lane: None,
-            column: None,
-            demand: None,
-            guidance: &guidance,
-            elapsed_us: 1000,
-        };
-        !self.permits(&mut state, &evidence)
+        self.monitor.get().is_none_or(|monitor| {
+            let (mut state, guidance) = monitor.nonsense(turn);
+            let evidence = Evidence {
+                lane: None,
+                column: None,
+                demand: None,
+                guidance: &guidance,
+                elapsed_us: 1000,
+            };
+            !self.permits(&mut state, &evidence)
+        })
     }
 
     /// Asks the monitor. One whose limits are damaged permits nothing.
