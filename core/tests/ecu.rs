@@ -7,6 +7,8 @@ mod rig;
 
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use haptic_core::bus::{Frame, Reject};
+use haptic_core::controller::Command;
+use haptic_core::ecu::injection::Region;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::envelope::LimitReason;
 use haptic_core::faults::{Fault, FaultSet};
@@ -127,13 +129,16 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
 
 #[test]
 fn a_handover_starts_from_the_torque_before_the_silence() {
-    // The law asks for more and more while the lane is silent; the torque of before is what is trusted.
-    let mut rig = Rig::active_in_curve(1.0);
-    while !rig.ticks.is_multiple_of(8) {
+    // The law asks for more and more, also while the lane is silent; the torque of just before is what is trusted.
+    let mut rig = Rig::active_in_curve(0.4);
+    let mut torque = 0.4;
+    while torque < 1.0 || !rig.ticks.is_multiple_of(8) {
+        torque += 0.0024;
+        rig.curve(torque);
         rig.tick();
     }
     let trusted = rig.applied;
-    rig.curve(1.2);
+    rig.curve(torque + 0.2);
     rig.tick();
     rig.silent[LANE] = true;
     rig.run(30);
@@ -145,7 +150,7 @@ fn a_handover_starts_from_the_torque_before_the_silence() {
         let got = rig.tick().command.torque.nm();
         let ramp = trusted * (1.0 - f64::from(k) / 2000.0);
         // At most 5 ms of history lie between two remembered outputs.
-        assert!(k < 100 || (got - ramp).abs() <= 0.01, "{k}: {got}, not {ramp}");
+        assert!(k < 100 || (got - ramp).abs() <= 0.02, "{k}: {got}, not {ramp}");
     }
 }
 
@@ -353,7 +358,11 @@ fn a_disengagement_fades_at_4_nm_per_s() {
     let (_, first) = rig.run_until(11, |step| step.command.mode == Mode::Fade);
     let mut torque = first.command.torque.nm();
     for k in 2..=374 {
-        let next = rig.tick().command.torque.nm();
+        let Command {
+            torque: next, limit, ..
+        } = rig.tick().command;
+        let next = next.nm();
+        assert_eq!(limit, LimitReason::Mode);
         assert!(
             (torque - next - 0.004).abs() <= BUS_LSB,
             "{k}: {torque} to {next}"
@@ -376,17 +385,15 @@ fn a_fade_lasts_until_the_torque_is_zero_even_where_steps_are_late() {
     let mut rig = Rig::active_in_curve(1.5);
     rig.engage = false;
     rig.run_until(11, |step| step.command.mode == Mode::Fade);
-    let (mut before, mut steps) = (rig.applied, 0);
-    loop {
-        let step = rig.tick_after(if steps % 2 == 0 { 10_000 } else { 1_000 });
-        steps += 1;
-        assert!(before - rig.applied <= 0.016, "{before} to {}", rig.applied);
-        before = rig.applied;
-        if step.command.mode == Mode::Standby {
-            break;
-        }
-        assert_eq!(step.command.mode, Mode::Fade);
-    }
+    let mut before = rig.applied;
+    let steps = (0..500)
+        .find(|k| {
+            let step = rig.tick_after(if k % 2 == 0 { 10_000 } else { 1_000 });
+            assert!(before - rig.applied <= 0.016, "{before} to {}", rig.applied);
+            before = rig.applied;
+            step.command.mode == Mode::Standby
+        })
+        .unwrap();
     // 1.5 N.m at 12 mN.m a step; the ramp itself ends after 68.
     assert!((120..=135).contains(&steps), "{steps}");
 }
@@ -429,7 +436,7 @@ fn late_and_early_steps() {
         }
         rig.tick().command
     };
-    let fault = |command: &haptic_core::controller::Command| command.faults.contains(Fault::Deadline);
+    let fault = |command: &Command| command.faults.contains(Fault::Deadline);
     for tolerated in [
         &[2_500, 2_500][..],
         &[2_501, 1_000, 2_501],
@@ -517,6 +524,49 @@ fn where_a_limit_acts_no_more_counts_as_probe_than_was_applied() {
                 assert!(!upward || left == 0.0 || probe > 0.0);
             }
         }
+    }
+}
+
+#[test]
+fn damaged_memory_is_reported_for_good() {
+    for region in Region::ALL {
+        let mut rig = Rig::active_in_curve(1.0);
+        rig.ecu.flip_bit(region, 40);
+        for _ in 0..100 {
+            let command = rig.tick().command;
+            assert_eq!((command.mode, command.torque), (Mode::Fault, Torque::ZERO));
+            assert!(
+                command.faults.contains(Fault::Memory),
+                "{region:?}: {:?}",
+                command.faults
+            );
+        }
+    }
+}
+
+/// Engages on a straight, a wrap of the microsecond clock after guidance ended in a curve: with what the law remembered,
+/// the metres between would be a movement within milliseconds.
+#[test]
+fn what_was_before_a_wrap_of_the_clock_is_forgotten() {
+    let mut rig = Rig::active_in_curve(-1.5);
+    rig.engage = false;
+    rig.run_until(11, |step| step.command.mode == Mode::Fade);
+    let again = rig.t_us + (1 << 32) + 5_000;
+    rig.run(500);
+    rig.curve(0.0);
+    while rig.t_us < again {
+        // As late as a step may be, but for the last second.
+        rig.tick_after(if rig.t_us + 1_000_000 < again {
+            2_400
+        } else {
+            1_000
+        });
+    }
+    rig.engage = true;
+    rig.run_until(11, |step| step.command.mode == Mode::Active);
+    for _ in 0..100 {
+        rig.tick();
+        assert!(rig.applied.abs() < 0.001, "{} N.m", rig.applied);
     }
 }
 
@@ -657,13 +707,15 @@ fn the_monitor_hears_that_the_host_asks_for_the_probe() {
 fn a_law_that_lies_with_interruptions_meets_the_monitor_too() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::active_in_curve(0.0);
-        let mut ms = 0;
-        while rig.tick().command.mode == Mode::Active {
-            ms += 1;
-            let lie = if ms % 16 == 0 { 0.0 } else { sign * 5.0 };
-            rig.ecu.force_law(Some(Torque::from_nm(lie)));
-            assert!(rig.applied.abs() < 0.4, "{} N.m after {ms} ms", rig.applied);
-        }
+        let ms = (1..1000)
+            .find(|ms| {
+                let lie = if ms % 16 == 0 { 0.0 } else { sign * 5.0 };
+                rig.ecu.force_law(Some(Torque::from_nm(lie)));
+                let mode = rig.tick().command.mode;
+                assert!(rig.applied.abs() < 0.4, "{} N.m after {ms} ms", rig.applied);
+                mode == Mode::Fault
+            })
+            .unwrap();
         // 0.3 N.m of band at 15*4 - 8 mN.m in 16 ms, and 20 ms of patience.
         assert!((90..=125).contains(&ms), "{ms}");
     }
