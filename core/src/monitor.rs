@@ -219,7 +219,8 @@ impl Monitor {
         state.torque_mnm = torque.saturating_sub(grown);
         // The least count that is cut to so many mN.m again.
         let count = torque.saturating_mul(4096) / 1000 + 1;
-        let word = u64::from(count.cast_unsigned()) << 12 | u64::from(mode.cast_unsigned()) << 32;
+        let [count, mode] = [count, mode].map(|field| u64::from(field.cast_unsigned()));
+        let word = (count << 12).saturating_add(mode << 32);
         (state, word.to_le_bytes())
     }
 }

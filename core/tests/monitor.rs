@@ -366,6 +366,10 @@ fn each_rule_is_tried_by_itself() {
                 bench.show(lane, column, guidance, 1000)
             };
             assert!(!show(None, None, nonsense), "{turn}");
+            if turn % 6 == 1 {
+                // In the band and below every limit: only growth is wrong with it.
+                assert!(!show(None, None, guidance(counts(50).0, ACTIVE)));
+            }
             let remedied = match turn % 6 {
                 0 => show(None, None, guidance((limit_nm * 4096.0) as i64, FADE)),
                 // As much growth as 4 N.m/s allow.
