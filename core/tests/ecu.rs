@@ -646,17 +646,21 @@ fn a_monitor_stuck_at_ok_is_found_within_a_second() {
     let mut rig = Rig::active_in_curve(1.0);
     rig.ecu.blind_monitor(|_| true);
     let (ms, step) = rig.run_until(1000, |step| step.command.mode == Mode::Fault);
-    assert!(ms <= 512 && step.command.faults.contains(Fault::SelfTest), "{ms}");
+    assert!(step.command.faults.contains(Fault::SelfTest));
+    // Step 2561 is the first after 2100 to be one more than a multiple of 512.
+    assert_eq!(ms, 2562 - 2100);
     assert_eq!(step.command.torque, Torque::ZERO);
 }
 
 #[test]
 fn a_monitor_with_one_dead_rule_is_found_when_its_turn_comes() {
-    // What each passes, no drive at 1 N.m shows: 5 N.m and more, a torque in Standby, less than 0.5 N.m in Active.
-    let dead: [fn(&[u8; 8]) -> bool; 3] = [
+    // What each passes, no drive at 1 N.m shows: 5 N.m and more, a torque in Standby, less than 0.5 N.m in Active, and
+    // of those only what is away from the lane.
+    let dead: [fn(&[u8; 8]) -> bool; 4] = [
         |bytes| u64::from_le_bytes(*bytes) >> 12 & 0xFFFF > 5 * 4096,
         |bytes| bytes[4] & 0x0F == 1 && u64::from_le_bytes(*bytes) >> 12 & 0xFFFF != 0,
         |bytes| bytes[4] & 0x0F == 2 && u64::from_le_bytes(*bytes) >> 12 & 0xFFFF < 2048,
+        |bytes| bytes[4] & 0x0F == 2 && (1024..2048).contains(&(u64::from_le_bytes(*bytes) >> 12 & 0xFFFF)),
     ];
     for passes in dead {
         let mut rig = Rig::active_in_curve(1.0);
@@ -780,6 +784,31 @@ fn the_history_goes_round_with_counts_and_ages() {
     for (age, least) in ages.iter().zip([4, 7, 4, 7]) {
         assert!((least..=least + 1).contains(age), "{ages:?}");
     }
+}
+
+#[test]
+fn warnings_and_lines_of_the_history_are_counted_and_half_a_turn_apart() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.silent[LANE] = true;
+    let counter = |step: &Step, id: u16| {
+        let mut frames = step.others.iter().filter(|frame| frame.id() == id);
+        frames.next().map(|frame| frame.data()[1] & 0x0F)
+    };
+    let (_, first) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    let mut warnings = vec![counter(&first, Warning::ID)];
+    let mut lines = 0;
+    for _ in 0..400 {
+        let step = rig.tick();
+        warnings.extend(warns(&step).then(|| counter(&step, Warning::ID)));
+        if let Some(counter) = counter(&step, FaultRecord::ID) {
+            // Steps count from zero.
+            assert_eq!((rig.ticks - 1) % 100, 50);
+            lines += 1;
+            assert_eq!(u64::from(counter), (rig.ticks - 1) / 100 % 16);
+        }
+    }
+    assert_eq!(warnings, [Some(0), Some(1), Some(2), Some(3), Some(4)]);
+    assert_eq!(lines, 4);
 }
 
 #[test]

@@ -66,6 +66,24 @@ fn every_flip_ends_in_fault_within_a_step() {
     println!("{flips} flips");
 }
 
+/// Two flips do not hide each other, unless they hit the same bit of both copies.
+#[test]
+fn two_flips_end_in_fault_too() {
+    let standby = Rig::paper();
+    let words = standby.ecu.vital_bits(Region::Monitor) / 32;
+    for (i, j) in (0..words).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        let mut rig = standby.clone();
+        rig.ecu.flip_bit(Region::Monitor, 32 * i);
+        rig.ecu.flip_bit(Region::Monitor, 32 * j);
+        let expected = if i - j == words / 2 {
+            Mode::Standby
+        } else {
+            Mode::Fault
+        };
+        assert_eq!(rig.tick().command.mode, expected, "words {i} and {j}");
+    }
+}
+
 #[test]
 fn a_flip_before_a_frame_arrives_is_found_too() {
     let mut rig = Rig::active_in_curve(1.0);

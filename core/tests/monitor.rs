@@ -361,6 +361,16 @@ fn each_rule_is_tried_by_itself() {
         let monitor = monitor(limit_nm);
         for turn in 0..2 * RULES {
             let (state, nonsense) = monitor.nonsense(turn);
+            let limit_mnm = (limit_nm * 1e3) as i64;
+            let (mnm, mode) = [
+                (limit_mnm + 20, FADE),
+                (100, ACTIVE),
+                (100, STANDBY),
+                (100, ACTIVE),
+                (100, ACTIVE),
+                (400, ACTIVE),
+            ][turn as usize % 6];
+            assert_eq!(nonsense, guidance(counts(mnm).0, mode));
             let show = |lane: Option<[u8; 8]>, column: Option<[u8; 8]>, guidance: [u8; 8]| {
                 let mut bench = Bench { monitor, state };
                 bench.show(lane, column, guidance, 1000)

@@ -9,12 +9,17 @@ use serde_json::Value;
 use crate::tool::{self, cargo, run};
 
 /// What decides or guards a torque, with the tests that must notice a defect in it.
-const MUTATED: [(&str, &[&str]); 5] = [
+const MUTATED: [(&str, &[&str]); 10] = [
     ("envelope.rs", &["envelope"]),
     ("modes.rs", &["modes"]),
     ("bus/e2e.rs", &["e2e"]),
     ("monitor.rs", &["monitor", "probe"]),
     ("plausibility.rs", &["plausibility"]),
+    ("controller.rs", &["ecu", "probe"]),
+    ("ecu.rs", &["ecu", "memory", "probe"]),
+    ("ecu/receivers.rs", &["ecu", "memory"]),
+    ("ramp.rs", &["ramp", "ecu"]),
+    ("vital.rs", &["memory"]),
 ];
 
 /// Line and region coverage of `core/` by its own tests; less than all of it is an error.
