@@ -19,7 +19,7 @@ use super::senders::{Readings, Senders};
 use super::table::Row;
 use super::wire::{Arrival, Bus};
 use haptic_sim::ecu_events::EcuEvents;
-use haptic_sim::guidance::{Applied, Guidance, View};
+use haptic_sim::guidance::{Actuation, Guidance, Observation};
 use haptic_sim::models::sensors;
 use haptic_sim::scenario::Scenario;
 
@@ -139,7 +139,7 @@ impl<'a> Seat<'a> {
             ecu,
             setup: Setup::new(&params).expect("a checked scenario"),
             guard: Guard::new(is_engaged(row.start), clock_base_us),
-            residual: Residual::new(&scenario.vehicle, scenario.speed_mps()),
+            residual: Residual::new(&scenario.vehicle(), scenario.speed_mps()),
             side: if dice.random_bool(0.5) { 1.0 } else { -1.0 },
             dice,
             clock_base_us,
@@ -220,7 +220,7 @@ impl<'a> Seat<'a> {
         }
     }
 
-    fn tell(&mut self, view: &View) {
+    fn tell(&mut self, view: &Observation) {
         let (step, acts) = (view.step, self.acts(view.step));
         let since_s = acts.then(|| self.since(step) as f64 * 1e-3);
         let readings = self
@@ -275,7 +275,7 @@ impl<'a> Seat<'a> {
         received
     }
 
-    fn watch_contradictions(&mut self, view: &View, readings: &Readings) {
+    fn watch_contradictions(&mut self, view: &Observation, readings: &Readings) {
         let time_s = f64::from(view.step) * 1e-3;
         self.residual.at(time_s);
         if let Some(speeds) = readings.speeds_mps {
@@ -378,15 +378,53 @@ impl<'a> Seat<'a> {
     }
 }
 
+impl Seat<'_> {
+    /// Torque of a hand on the wheel, N.m, beside that of the driver's arm.
+    pub(super) fn hand_torque_nm(&self, step: u32, arm_torque_nm: f64) -> f64 {
+        let since = self.since(step);
+        let against = if self.commanded_nm == 0.0 {
+            -self.side
+        } else {
+            -self.commanded_nm.signum()
+        };
+        let hand = self.row.injections.iter().find_map(|injection| match injection {
+            Injection::Hand(hand) => Some(*hand),
+            _ => None,
+        });
+        match hand {
+            Some(Hand::Jerk {
+                peak_nm,
+                ms,
+                before_ms,
+            }) => {
+                let phase = (since + i64::from(before_ms)) as f64 / f64::from(ms);
+                if (0.0..1.0).contains(&phase) {
+                    self.side * peak_nm * (std::f64::consts::PI * phase).sin()
+                } else {
+                    0.0
+                }
+            }
+            // The hand makes the driver torque what it says, whatever the arm does.
+            Some(Hand::Opposes { torque_nm, ms }) if (0..i64::from(ms)).contains(&since) => {
+                against * torque_nm - arm_torque_nm
+            }
+            Some(Hand::Taps { torque_nm }) if since >= 0 && since % TAP_EVERY_MS < TAP_MS => {
+                against * torque_nm - arm_torque_nm
+            }
+            _ => 0.0,
+        }
+    }
+}
+
 impl Guidance for Seat<'_> {
     fn looks_at_road(&self, step: u32) -> bool {
         sensors::camera_looks(step)
     }
 
-    fn step(&mut self, view: &View) -> Applied {
+    fn step(&mut self, view: &Observation) -> Actuation {
         let step = view.step;
         if step >= self.end {
-            return Applied::default();
+            return Actuation::default();
         }
         self.record.steps = step;
         let (ticks, count) = self.ticks(step);
@@ -420,44 +458,9 @@ impl Guidance for Seat<'_> {
             self.stuck_nm = self.commanded_nm;
         }
         self.delivered_nm = self.motor(step);
-        Applied {
+        Actuation {
             torque_nm: self.delivered_nm,
             limited: false,
-        }
-    }
-
-    fn hand_torque_nm(&mut self, step: u32, arm_torque_nm: f64) -> f64 {
-        let since = self.since(step);
-        let against = if self.commanded_nm == 0.0 {
-            -self.side
-        } else {
-            -self.commanded_nm.signum()
-        };
-        let hand = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Hand(hand) => Some(*hand),
-            _ => None,
-        });
-        match hand {
-            Some(Hand::Jerk {
-                peak_nm,
-                ms,
-                before_ms,
-            }) => {
-                let phase = (since + i64::from(before_ms)) as f64 / f64::from(ms);
-                if (0.0..1.0).contains(&phase) {
-                    self.side * peak_nm * (std::f64::consts::PI * phase).sin()
-                } else {
-                    0.0
-                }
-            }
-            // The hand makes the driver torque what it says, whatever the arm does.
-            Some(Hand::Opposes { torque_nm, ms }) if (0..i64::from(ms)).contains(&since) => {
-                against * torque_nm - arm_torque_nm
-            }
-            Some(Hand::Taps { torque_nm }) if since >= 0 && since % TAP_EVERY_MS < TAP_MS => {
-                against * torque_nm - arm_torque_nm
-            }
-            _ => 0.0,
         }
     }
 }

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::injection::{Change, Injection, Signal, Wish};
 use super::wire::MESSAGES;
-use haptic_sim::guidance::View;
+use haptic_sim::guidance::Observation;
 use haptic_sim::models::sensors;
 
 const COLUMN_PERIOD_MS: u32 = 2;
@@ -52,7 +52,7 @@ impl Senders {
     /// What is read in this step, with what is wrong with it; `since_s` the onset if the injections act.
     pub(super) fn read(
         &mut self,
-        view: &View,
+        view: &Observation,
         injections: &[Injection],
         since_s: Option<f64>,
         noise: &mut Xoshiro256PlusPlus,
@@ -114,7 +114,7 @@ impl Senders {
     /// The frames of this step, in order of sending.
     pub(super) fn send(
         &mut self,
-        view: &View,
+        view: &Observation,
         readings: &Readings,
         requested: bool,
         injections: &[Injection],

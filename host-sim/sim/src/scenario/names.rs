@@ -5,7 +5,7 @@
 
 use haptic_core::params::ParamError;
 
-use crate::input::in_range;
+use crate::input::RangeError;
 
 /// Name in the controller, name in the file, unit.
 const NAMES: [(&str, &str, &str); 22] = [
@@ -46,10 +46,14 @@ const NAMES: [(&str, &str, &str); 22] = [
 ];
 
 /// A refusal by the controller's parameters: the file's field or formula, its value and its range.
-pub(super) fn in_words_of_the_file(error: &ParamError) -> String {
+pub(super) fn in_words_of_the_file(error: &ParamError) -> RangeError {
     let known = NAMES.iter().find(|(name, ..)| *name == error.name);
     let (field, unit) = known.map_or((error.name, ""), |&(_, field, unit)| (field, unit));
-    in_range(field, error.value, error.min..=error.max, unit)
-        .err()
-        .unwrap_or_else(|| format!("{field} is refused"))
+    RangeError {
+        field: field.into(),
+        value: error.value,
+        min: error.min,
+        max: error.max,
+        unit,
+    }
 }
