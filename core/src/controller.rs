@@ -9,7 +9,7 @@ use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
 use crate::injection::{Injection, NoInjection};
 use crate::law::{LaneSample, LawState};
-use crate::modes::{Event, Mode};
+use crate::modes::{Event, Events, Mode};
 use crate::plausibility::{PlausibilityState, speeds_agree};
 use crate::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TorqueRate, product};
@@ -447,22 +447,16 @@ impl<I: Injection> Step<'_, I> {
         } else {
             Micros::from_us(0)
         };
-        let raised = |event: &&Event| match event {
-            Event::BootPassed => true,
-            Event::Engage => rising && v.ready >= READY,
-            // Late steps carry the ramp further than the reduction limit lets the torque follow.
-            Event::Faded => v.ramp.is_done() && self.applied == Torque::ZERO,
-            Event::Disengage => request == Some(false) || fast_enough == Some(false),
-            Event::InputLost => !inputs_ok,
-            Event::BootRejected => faults.intersects(FaultSet::LOCKING),
-            Event::Critical => faults.intersects(FaultSet::CRITICAL),
-        };
-        let change = Event::ALL
-            .iter()
-            .rev()
-            .filter(raised)
-            .map(|event| mode.after(*event));
-        change.into_iter().find(|next| *next != mode).unwrap_or(mode)
+        let mut raised = Events::of(Event::BootPassed);
+        raised.insert_if(rising && v.ready >= READY, Event::Engage);
+        // Late steps carry the ramp further than the reduction limit lets the torque follow.
+        raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
+        let is_over = request == Some(false) || fast_enough == Some(false);
+        raised.insert_if(is_over, Event::Disengage);
+        raised.insert_if(!inputs_ok, Event::InputLost);
+        raised.insert_if(faults.intersects(FaultSet::LOCKING), Event::BootRejected);
+        raised.insert_if(faults.intersects(FaultSet::CRITICAL), Event::Critical);
+        mode.after_all(raised)
     }
 
     fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {

@@ -174,13 +174,15 @@ impl Ecu {
             _ => self.begin_anew(now),
         };
         let steps = v.steps;
+        // One whose limits are damaged permits nothing.
+        let monitor = self.monitor.get();
         let mut faults = FaultSet::from_bits(v.faults);
         faults.insert_if(!self.receivers.actuator.obeys(v.applied), Fault::Actuator);
         faults.insert_if(
-            steps % SELF_TEST == 1 && !self.monitor_passes_self_test(steps / SELF_TEST, injection),
+            steps % SELF_TEST == 1 && !passes_self_test(monitor, steps / SELF_TEST, injection),
             Fault::SelfTest,
         );
-        faults.insert_if(self.monitor.get().is_none(), Fault::Memory);
+        faults.insert_if(monitor.is_none(), Fault::Memory);
         inputs.faults = inputs.faults.union(faults);
         let applied = v.applied;
         let mut command = self
@@ -198,7 +200,7 @@ impl Ecu {
             guidance: guidance.bytes(),
             elapsed_us: now.since(v.last_step).us(),
         };
-        let permitted = self.permits(&mut v.monitor, &evidence, injection);
+        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
         if !permitted {
             faults.insert(Fault::Monitor);
             command = Command {
@@ -305,40 +307,36 @@ impl Ecu {
         frames
     }
 
-    /// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are
-    /// damaged refuses everything.
-    fn monitor_passes_self_test<I: Injection>(&self, turn: u32, injection: &I) -> bool {
-        self.monitor.get().is_none_or(|monitor| {
-            let (mut state, guidance) = monitor.self_test_vector(turn);
-            let evidence = Evidence {
-                lane: None,
-                column: None,
-                demand: None,
-                guidance: &guidance,
-                elapsed_us: 1000,
-            };
-            !self.permits(&mut state, &evidence, injection)
-        })
-    }
-
-    /// Asks the monitor. One whose limits are damaged permits nothing.
-    fn permits<I: Injection>(
-        &self,
-        state: &mut MonitorState,
-        evidence: &Evidence<'_>,
-        injection: &I,
-    ) -> bool {
-        if injection.monitor_passes(evidence.guidance) {
-            return true;
-        }
-        self.monitor
-            .get()
-            .is_some_and(|monitor| monitor.step(state, evidence))
-    }
-
     /// The configuration in use, if its copies agree.
     #[must_use]
     pub fn config(&self) -> Option<Config> {
         self.controller.config()
     }
+}
+
+/// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are damaged
+/// refuses everything.
+fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injection: &I) -> bool {
+    monitor.is_none_or(|monitor| {
+        let (mut state, guidance) = monitor.self_test_vector(turn);
+        let evidence = Evidence {
+            lane: None,
+            column: None,
+            demand: None,
+            guidance: &guidance,
+            elapsed_us: 1000,
+        };
+        !permits(Some(monitor), &mut state, &evidence, injection)
+    })
+}
+
+/// Asks the monitor. One whose limits are damaged permits nothing.
+fn permits<I: Injection>(
+    monitor: Option<&Monitor>,
+    state: &mut MonitorState,
+    evidence: &Evidence<'_>,
+    injection: &I,
+) -> bool {
+    injection.monitor_passes(evidence.guidance)
+        || monitor.is_some_and(|monitor| monitor.step(state, evidence))
 }
