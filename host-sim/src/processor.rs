@@ -3,8 +3,8 @@
 
 use std::ops::ControlFlow;
 
-use haptic_core::lockstep::{Start, StartState};
 use haptic_core::quantity::Instant;
+use haptic_lockstep::{Start, StartState};
 
 use haptic_sim::guidance::OverBus;
 use haptic_sim::scenario::{Condition, Scenario, Sensors};

@@ -3,9 +3,10 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
+use haptic_core::config::Setup;
+use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::lockstep;
-use haptic_core::params::{Params, Setup};
+use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Torque};
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -71,7 +72,7 @@ pub(super) struct Seat<'a> {
     end: u32,
     senders: Senders,
     bus: Bus,
-    ecu: Ecu,
+    ecu: InjectedEcu,
     setup: Setup,
     guard: Guard,
     residual: Residual,
@@ -87,7 +88,7 @@ pub(super) struct Seat<'a> {
     /// What has arrived and was not yet received: a step that is lost or late leaves it to the next.
     arrivals: Vec<Arrival>,
     record: Record,
-    start: (Params, lockstep::Start),
+    start: (Params, haptic_lockstep::Start),
     trace: Option<Trace>,
 }
 
@@ -95,7 +96,7 @@ pub(super) struct Seat<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Trace {
     pub(super) params: Params,
-    pub(super) start: lockstep::Start,
+    pub(super) start: haptic_lockstep::Start,
     pub(super) ticks: Vec<Tick>,
 }
 
@@ -128,7 +129,7 @@ impl<'a> Seat<'a> {
         };
         let now = Instant::from_us(clock_base_us);
         let (params, start) = come_up(row.start, scenario, now, &mut dice);
-        let ecu = start.ecu(&params).expect("a checked scenario");
+        let ecu = InjectedEcu::new(start.ecu(&params).expect("a checked scenario"));
         Self {
             row,
             onset,
@@ -320,7 +321,7 @@ impl<'a> Seat<'a> {
             };
             match inside {
                 Inside::Flip(region) if since == 0 => {
-                    let bit = self.dice.random_range(0..self.ecu.vital_bits(*region));
+                    let bit = self.dice.random_range(0..self.ecu.redundant_bits(*region));
                     self.ecu.flip_bit(*region, bit);
                 }
                 Inside::LawForced if since == 0 => {
@@ -342,7 +343,7 @@ impl<'a> Seat<'a> {
                         recent_resets: 1,
                         ..Boot::default()
                     };
-                    self.ecu = Ecu::new(Some(&self.setup), boot, Instant::from_us(now_us));
+                    self.ecu = InjectedEcu::new(Ecu::new(Some(&self.setup), boot, Instant::from_us(now_us)));
                     self.guard.reset(now_us);
                 }
                 _ => {}
@@ -434,7 +435,7 @@ impl Guidance for Seat<'_> {
             let now = Instant::from_us(now_us);
             let frames = self.receive(step, now_us);
             let out = self.ecu.step(now);
-            let advice = self.ecu.advise();
+            let background = self.ecu.background_step();
             if let Some(trace) = &mut self.trace {
                 trace.ticks.push(Tick {
                     step,
@@ -442,7 +443,7 @@ impl Guidance for Seat<'_> {
                     frames,
                     answer: std::iter::once(out.guidance)
                         .chain(out.others.iter().copied())
-                        .chain(advice)
+                        .chain(background)
                         .collect(),
                 });
             }

@@ -5,7 +5,7 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -145,7 +145,7 @@ impl Senders {
         }
         if let Some(speeds_mps) = readings.speeds_mps {
             let message = Vehicle {
-                speeds: speeds_mps.map(Speed::from_mps),
+                speeds: speeds_mps.map(Speed::from_m_per_s),
             };
             frames.push(message.encode(count(2)));
         }
@@ -153,7 +153,7 @@ impl Senders {
             let counter = count(3);
             let message = Demand {
                 engage: self.wish(requested, injections, acts),
-                authority: Gain::ONE,
+                authority: Ratio::ONE,
                 probe: self.probe,
             };
             frames.push(message.encode(counter));

@@ -10,7 +10,7 @@
 //! Terms: *after 10 s*, 10 s after the start of a session; *deviation*, the standard deviation that the ECU
 //! itself reports; *coverage*, the share of truths within 1.96 deviations of the estimate.
 //!
-//! Not here: the estimator (`haptic_core::reliance`), options and tables (the command line).
+//! Not here: the estimator (`haptic_core::estimator`), options and tables (the command line).
 
 mod readings;
 

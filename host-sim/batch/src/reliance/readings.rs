@@ -39,7 +39,7 @@ impl Readings {
             self.readings.push(Reading {
                 time_s: f64::from(outcome.observation.step) * STEP_S,
                 probing: telemetry.probe.is_some(),
-                estimate: telemetry.reliance.map(|r| [r.k_hg.si(), r.deviation.si()]),
+                estimate: telemetry.k_hg.map(|r| [r.k_hg.si(), r.deviation.si()]),
             });
         }
         let probing = self.readings.last().is_some_and(|last| last.probing);

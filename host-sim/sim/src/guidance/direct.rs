@@ -1,11 +1,11 @@
 //! The shipping controller without its bus: full resolution every step, so that what is seen is the law and
 //! the envelope alone.
 
+use haptic_core::config::Setup;
 use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Request};
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
-use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Speed, Torque};
 
 use super::{Actuation, Guidance, Observation, is_limited};
 
@@ -46,11 +46,11 @@ impl Guidance for Direct {
                 driver_torque: Torque::from_nm(observation.driver_torque_nm),
                 wheel_angle: Radians::from_rad(observation.wheel_angle_rad),
             }),
-            speeds: Input::New([Speed::from_mps(observation.speed_mps); 2]),
+            speeds: Input::New([Speed::from_m_per_s(observation.speed_mps); 2]),
             request: Input::New(Request {
-                engage: observation.request.engage.into(),
-                authority: Gain::from_si(observation.request.authority),
-                probe: observation.request.probe.into(),
+                engage: observation.request.engage,
+                authority: Ratio::from_si(observation.request.authority),
+                probe: observation.request.probe,
             }),
             faults: FaultSet::NONE,
         };

@@ -9,9 +9,9 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
     Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Vehicle,
 };
+use haptic_core::config::Setup;
 use haptic_core::ecu::Ecu;
-use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 use heapless::Vec;
 
 use super::{Actuation, Guidance, Observation, is_limited};
@@ -78,12 +78,12 @@ impl OverBus {
         if observation.step.is_multiple_of(HOST_PERIOD_STEPS) {
             let counter = (observation.step / HOST_PERIOD_STEPS) as u8;
             let vehicle = Vehicle {
-                speeds: [Speed::from_mps(observation.speed_mps); 2],
+                speeds: [Speed::from_m_per_s(observation.speed_mps); 2],
             };
             let _ = self.sent.push(vehicle.encode(counter));
             let demand = Demand {
                 engage: observation.request.engage,
-                authority: Gain::from_si(observation.request.authority),
+                authority: Ratio::from_si(observation.request.authority),
                 probe: observation.request.probe,
             };
             let _ = self.sent.push(demand.encode(counter));
@@ -109,7 +109,7 @@ impl Guidance for OverBus {
         // MAX_ANSWERS has a place for each.
         let _ = self.answers.push(step.guidance);
         let _ = self.answers.extend_from_slice(&step.others);
-        self.answers.extend(self.ecu.advise());
+        self.answers.extend(self.ecu.background_step());
         if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &step.guidance) {
             self.applied = Actuation {
                 torque_nm: guidance.torque.nm(),

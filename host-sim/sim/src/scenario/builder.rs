@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use haptic_core::params::Setup;
+use haptic_core::config::Setup;
 
 use super::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, SPEED_KMH, Scenario,

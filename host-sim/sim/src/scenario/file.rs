@@ -80,7 +80,7 @@ pub(super) fn parse(
                 torque_limit_nm: g.torque_limit_nm,
                 wind_up_nm_per_s: g.wind_up_nm_per_s,
                 reduction_nm_per_s: g.reduction_nm_per_s,
-                least_speed_mps: g.least_speed_mps,
+                least_speed_m_per_s: g.least_speed_m_per_s,
                 probe_amplitude_nm: g.probe_amplitude_nm,
                 probe_frequency_hz: g.probe_frequency_hz,
                 // What the controller takes for granted, whatever the driver is.
@@ -201,7 +201,8 @@ struct GuidanceFile {
     torque_limit_nm: f64,
     wind_up_nm_per_s: f64,
     reduction_nm_per_s: f64,
-    least_speed_mps: f64,
+    #[serde(alias = "least_speed_mps")]
+    least_speed_m_per_s: f64,
     probe: bool,
     probe_amplitude_nm: f64,
     probe_frequency_hz: f64,
@@ -227,7 +228,7 @@ impl Default for GuidanceFile {
             torque_limit_nm: c.torque_limit_nm,
             wind_up_nm_per_s: c.wind_up_nm_per_s,
             reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_mps: c.least_speed_mps,
+            least_speed_m_per_s: c.least_speed_m_per_s,
             probe,
             probe_amplitude_nm: c.probe_amplitude_nm,
             probe_frequency_hz: c.probe_frequency_hz,

@@ -13,7 +13,8 @@ mod tests;
 
 use std::fmt;
 
-use haptic_core::params::{Params, Setup, VehicleParams};
+use haptic_core::config::Setup;
+use haptic_core::params::{Params, VehicleParams};
 use serde::{Deserialize, Serialize};
 
 pub use builder::{ScenarioBuilder, ScenarioError};
@@ -437,10 +438,10 @@ impl Values {
         } = self.vehicle;
         let l = l_f + l_r;
         VehicleParams {
-            curvature_gain_1pm: k_t / l,
-            stability_factor_s2pm2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
-            aligning_gain_nms2pm: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            column_damping_nms: b_s,
+            curvature_gain_per_m: k_t / l,
+            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
+            aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
+            column_damping_nm_s: b_s,
             far_time_s,
         }
     }
