@@ -1,7 +1,7 @@
 //! `host-sim handover`.
 
 use clap::Args;
-use haptic_batch::handover::{ROWS, Results, Row, study};
+use haptic_batch::handover::{HandoverResults, HandoverRow, ROWS, study};
 
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
@@ -22,14 +22,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&readable(&results))?;
     }
-    Ok(if results.rows.iter().any(Row::is_broken) {
+    Ok(if results.rows.iter().any(HandoverRow::is_broken) {
         Outcome::Failed
     } else {
         Outcome::Good
     })
 }
 
-fn readable(results: &Results) -> String {
+fn readable(results: &HandoverResults) -> String {
     let headings = [
         "km/h",
         "t_p/s",

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::reliance::{NEAR, Plan, Results, SETTLING_S, study};
+use haptic_batch::reliance::{NEAR, Plan, RelianceResults, SETTLING_S, study};
 
 use super::output::Output;
 use super::participants::Participants;
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     Ok(Outcome::Good)
 }
 
-fn readable(results: &Results) -> String {
+fn readable(results: &RelianceResults) -> String {
     let times = || results.pooled.iter().map(|a| format!("{} s", a.after_s));
     let head = ["participant", "K_hg", "estimate"].map(String::from).into_iter();
     let head = head

@@ -55,7 +55,7 @@ fn readable(single: &SingleRun) -> String {
         let value = number((definition.value)(&record.metrics), 4);
         lines.push(vec![definition.label.into(), value, definition.unit.into()]);
     }
-    if let Some([k_hg, deviation]) = results.reliance {
+    if let Some([k_hg, deviation]) = results.k_hg {
         let line = [
             "K_hg, as the ECU reads it",
             &format!("{k_hg:.3}"),

@@ -16,12 +16,12 @@ use haptic_core::modes::Mode;
 use haptic_core::params::Params;
 
 use super::adapter::{self, Adapter};
-use super::answers::pump;
 use super::link::{self, Decoder};
+use super::responses::pump;
 use super::{Channel, PilError};
 
 /// Longest wait for a status, which comes every second, and a start takes less than another.
-const PATIENCE: Duration = Duration::from_secs(5);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Statuses after a set was sent: its storing and the start take less than these seconds.
 const STATUSES: usize = 5;
 /// A port that is silent for so long may belong to an ECU that speaks SLCAN itself and has just started anew.
@@ -74,11 +74,11 @@ impl Product {
     /// Why it is not in use.
     pub fn store(&mut self, params: &Params) -> Result<ParameterStatus, PilError> {
         let frames = frames(params);
-        // The bus rounds to f32, which may be too far at the end of a range: the ECU's own judgement, before it is asked.
-        let mut judge = Download::NEW;
+        // The bus rounds to f32, which may be too far at the end of a range: the ECU's own receiver decides, before the ECU is asked.
+        let mut receiver = Download::NEW;
         if !frames
             .iter()
-            .any(|frame| judge.receive(frame, Mode::Standby).is_some())
+            .any(|frame| receiver.receive(frame, Mode::Standby).is_some())
         {
             let message = "a parameter is at the end of its range, and beyond it as the bus's 32-bit number";
             return Err(PilError::Failed(message.into()));
@@ -105,7 +105,7 @@ impl Product {
 
     /// The next status, and the mode of the last torque frame before it.
     fn status_and_mode(&mut self) -> Result<(ParameterStatus, Mode), PilError> {
-        let until = Instant::now() + PATIENCE;
+        let until = Instant::now() + REPLY_TIMEOUT;
         let mut mode = None;
         while Instant::now() < until {
             let Some(frame) = self.frame()? else {
@@ -132,7 +132,7 @@ impl Product {
         Err(PilError::Failed(format!(
             "no ECU told of its parameters for {} s: does it run steering-ecu, is the bus terminated, and do adapter \
              and ECU both run at 500 kbit/s?",
-            PATIENCE.as_secs()
+            REPLY_TIMEOUT.as_secs()
         )))
     }
 

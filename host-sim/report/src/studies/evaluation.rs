@@ -12,7 +12,7 @@ use crate::plot::lateral_error::{DriverPanel, figure};
 use crate::plot::{Figure, Marker};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::RunRecord;
-use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, Results};
+use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
 use haptic_sim::models::road::PAPER_COURSE;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
 
@@ -151,7 +151,7 @@ fn label(condition: Condition) -> &'static str {
     }
 }
 
-fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Report {
+fn report(results: &EvaluationResults, [nominal, failure, handover]: [Figure; 3]) -> Report {
     let course = if results.course == PAPER_COURSE {
         "The course is this project's own: the paper prints no numbers for its own. "
     } else {
@@ -222,7 +222,7 @@ fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Repor
     }
 }
 
-fn claims_section(results: &Results) -> Section {
+fn claims_section(results: &EvaluationResults) -> Section {
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
         [claim.claim.as_str(), holds, &claim.evidence]
@@ -239,7 +239,7 @@ fn claims_section(results: &Results) -> Section {
     }
 }
 
-fn table(results: &Results, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
+fn table(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
     let keys = |r: &RunRecord| {
         let ended = if r.diverged {
             format!("diverged at {:.0} m", r.end_m)

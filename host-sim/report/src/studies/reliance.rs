@@ -6,7 +6,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Report, Section, Table, write_json};
 use crate::plot::{Axis, Figure, Line, Panel};
-use haptic_batch::reliance::{Example, NEAR, REMNANT, Reading, Results, SETTLING_S};
+use haptic_batch::reliance::{Example, NEAR, REMNANT, Reading, RelianceResults, SETTLING_S};
 
 /// Most examples in the figure.
 const EXAMPLES: usize = 4;
@@ -52,7 +52,7 @@ pub(super) fn panel(
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
+pub fn write(results: &RelianceResults, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(results);
     write_figure(directory, "reliance", &figure)?;
     write_json(&directory.join("results.json"), results)?;
@@ -60,7 +60,7 @@ pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
 }
 
 /// Changing drives, spread over the participants.
-fn figure(results: &Results) -> Figure {
+fn figure(results: &RelianceResults) -> Figure {
     let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
     Figure {
         title: String::new(),
@@ -80,7 +80,7 @@ fn figure(results: &Results) -> Figure {
     }
 }
 
-fn report(results: &Results, figure: Figure) -> Report {
+fn report(results: &RelianceResults, figure: Figure) -> Report {
     let number = |value: f64, decimals: usize| Cell::Text(format!("{value:.decimals$}"));
     let pooled = results.pooled.iter().map(|a| {
         vec![
