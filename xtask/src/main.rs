@@ -49,9 +49,14 @@ enum Command {
     },
     /// Line and region coverage of the core by its tests: all of it, or exit code 1.
     Coverage,
-    /// A defect in every expression of envelope, modes, E2E, monitor and plausibility (needs cargo-mutants); prints
+    /// A defect in every expression of what decides or guards a torque (needs cargo-mutants); prints
     /// those that no test notices.
-    Mutants,
+    Mutants {
+        /// Only in lines that differ from this commit, branch or tag, for minutes instead of hours; then a survivor is an
+        /// error.
+        #[arg(long, value_name = "BASE")]
+        in_diff: Option<String>,
+    },
     /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
     /// instructions against xtask/golden.json.
     Boards {
@@ -90,7 +95,7 @@ fn main() -> ExitCode {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
-        Command::Mutants => evidence::mutants(),
+        Command::Mutants { in_diff } => evidence::mutants(in_diff.as_deref()),
         Command::Boards { bless } => boards::check(bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
