@@ -252,6 +252,12 @@ impl Scenario {
         Ok(scenario)
     }
 
+    /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit.
+    pub fn to_toml(&self) -> String {
+        // Only a map whose keys are no strings cannot be written, and there is none.
+        file::write(self).unwrap_or_default()
+    }
+
     /// Whether the scenario can be simulated.
     ///
     /// # Errors
