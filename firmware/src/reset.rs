@@ -79,7 +79,7 @@ impl Record {
             latched,
             ..
         } = self.whole().unwrap_or(Self::NONE);
-        Self::new(announced, recent, latched | u32::from(faults.bits()))
+        Self::new(announced, recent, latched | faults.bits())
     }
 
     /// Without the resets of late.
@@ -111,7 +111,7 @@ impl Record {
                 ResetCause::NewParameters => recent,
                 _ => recent.saturating_add(1),
             },
-            latched: FaultSet::from_bits(record.latched as u16),
+            latched: FaultSet::from_bits(record.latched),
         }
     }
 }
@@ -150,7 +150,7 @@ mod on_target {
     /// How the controller comes up. To be called once.
     pub fn boot(hardware: Hardware) -> Boot {
         let boot = read().boot(hardware);
-        let latched = u32::from(boot.latched.bits());
+        let latched = boot.latched.bits();
         write(Record::new(0, u32::from(boot.recent_resets), latched));
         boot
     }

@@ -14,6 +14,7 @@
 //! and files are written by `document`, NOT here.
 
 mod draw;
+mod frame;
 mod polyline;
 mod raster;
 mod style;

@@ -13,9 +13,9 @@ use crate::plot::{Axis, Figure, Marker, Panel, Series};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::RunRecord;
 use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, Results};
-use haptic_sim::closed_loop::Run;
 use haptic_sim::models::road::PAPER_COURSE;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+use haptic_sim::simulation::Run;
 
 /// Metrics of the short table; the report's second table has all of them.
 const IN_SHORT: [&str; 7] = [
@@ -45,7 +45,9 @@ pub fn write(evaluation: &Evaluation, series: SeriesFormat, directory: &Path) ->
     for (scenario, run) in &evaluation.runs {
         let name = format!(
             "t_p_{}_{}_failure_{}",
-            scenario.driver.t_p, scenario.condition, scenario.failure.kind
+            scenario.driver().t_p,
+            scenario.condition(),
+            scenario.failure().kind
         );
         write_trace(&directory.join("runs"), &name, &run.trace, series)?;
     }
@@ -61,7 +63,7 @@ pub fn stamped(evaluation: &Evaluation) -> Stamped<'_, Results> {
 /// One of the runs stands for all: they differ in t_p, condition and kind of failure alone.
 fn provenance(evaluation: &Evaluation) -> Provenance {
     let mut runs = evaluation.runs.iter();
-    let one = runs.find(|(s, _)| s.condition == Condition::Mid && s.failure.kind == FailureKind::Torque);
+    let one = runs.find(|(s, _)| s.condition() == Condition::Mid && s.failure().kind == FailureKind::Torque);
     Provenance::of(one.map(|(scenario, _)| scenario.to_toml()))
 }
 
@@ -73,7 +75,7 @@ pub fn table(results: &Results) -> Table {
 }
 
 fn nominal_figure(evaluation: &Evaluation) -> Figure {
-    let shown = |s: &Scenario| s.failure.kind == FailureKind::None;
+    let shown = |s: &Scenario| s.failure().kind == FailureKind::None;
     panels(
         evaluation,
         "Lateral error by reliance on the guidance",
@@ -87,7 +89,7 @@ fn failure_figure(evaluation: &Evaluation) -> Figure {
         "Lateral error when the guidance fails at {} s",
         evaluation.results.failure_time_s
     );
-    let shown = |s: &Scenario| s.failure.kind == FailureKind::Torque || s.condition == Condition::Manual;
+    let shown = |s: &Scenario| s.failure().kind == FailureKind::Torque || s.condition() == Condition::Manual;
     let mut figure = panels(evaluation, &title, &[("", &shown)]);
     figure.markers.extend(failure_marker(evaluation));
     figure
@@ -99,7 +101,7 @@ fn handover_figure(evaluation: &Evaluation) -> Figure {
         "Lateral error: guidance torque lost, and input lost and handed over, at {} s",
         evaluation.results.failure_time_s
     );
-    let fails = |kind| move |s: &Scenario| s.failure.kind == kind || s.condition == Condition::Manual;
+    let fails = |kind| move |s: &Scenario| s.failure().kind == kind || s.condition() == Condition::Manual;
     let (lost, handed_over) = (fails(FailureKind::Torque), fails(FailureKind::Input));
     let mut figure = panels(
         evaluation,
@@ -115,9 +117,9 @@ fn failure_marker(evaluation: &Evaluation) -> Option<Marker> {
     let failed = evaluation
         .runs
         .iter()
-        .find(|(s, _)| s.failure.kind == FailureKind::Torque);
+        .find(|(s, _)| s.failure().kind == FailureKind::Torque);
     let place = failed.and_then(|(scenario, run)| {
-        let time_s = scenario.failure.at_s()?;
+        let time_s = scenario.failure().at_s()?;
         run.trace.samples.iter().find(|sample| sample.time_s >= time_s)
     });
     let [from, to] = evaluation.results.window_m;
@@ -141,7 +143,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
             let runs = evaluation
                 .runs
                 .iter()
-                .filter(|(s, _)| s.driver.t_p == *t_p && shown(s));
+                .filter(|(s, _)| s.driver().t_p == *t_p && shown(s));
             // A condition has the same style in all figures.
             let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
             let path = |run: &Run| {
@@ -155,13 +157,13 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
                 title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
                 y: Axis::of("Lateral error (m)"),
                 series: runs
-                    .map(|(s, run)| Series::line(label(s.condition), style(s.condition), path(run)))
+                    .map(|(s, run)| Series::line(label(s.condition()), style(s.condition()), path(run)))
                     .collect(),
             });
         }
     }
     let [from, to] = evaluation.results.window_m;
-    let course = evaluation.runs.first().map(|(scenario, _)| &scenario.course);
+    let course = evaluation.runs.first().map(|(scenario, _)| scenario.course());
     let bands = course.map(curves::bands).unwrap_or_default().into_iter();
     Figure {
         title: title.into(),
