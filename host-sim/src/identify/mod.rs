@@ -11,10 +11,12 @@
 
 mod bus_trace;
 mod diagnostics;
+mod lane;
 mod log;
 mod noise_model;
 mod options;
 mod paper;
+mod prepare;
 mod result;
 mod search;
 mod signals;
@@ -24,7 +26,9 @@ pub use bus_trace::open_recording;
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use log::{COLUMNS, DriveLog, LogError};
 pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};
+pub use lane::LaneNoise;
 pub use options::{FixError, Options};
+pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use result::{
     Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start,

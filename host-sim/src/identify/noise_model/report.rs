@@ -6,11 +6,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{COUNT, K_HG, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA, VARIATION_WIDTHS};
+use super::{CORE, COUNT, K_HG, LINEAR, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA, VARIATION_WIDTHS};
 use crate::identify::diagnostics;
 use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
 use crate::identify::paper::TABLE_4;
+use crate::identify::prepare::Prepared;
 use crate::identify::result::{
     Combination, Correlation, Identification, Parameter, Parameters, Remnant, Start, Traces,
 };
@@ -26,18 +27,19 @@ const TRIMMED_SHARE: f64 = 0.01;
 impl Problem<'_> {
     pub(super) fn report(
         &self,
-        log: &DriveLog,
+        prepared: &Prepared,
         options: &Options,
         optimum: &Optimum,
         starts: Vec<Start>,
     ) -> Identification {
+        let log = &prepared.log;
         let p = &optimum.point;
         // A disturbance on its bound (no sensor noise, say) is taken as known: only the driver's own bounds may
         // have held the estimate back.
         let known =
             |i: usize| !self.is_free(i) || ([RHO, THETA].contains(&i) && self.bounds[i].touches(p[i]));
-        let free: Vec<usize> = (0..COUNT).filter(|&i| !known(i)).collect();
-        let rows = self.signals.len() - self.first_row;
+        let free: Vec<usize> = (0..self.size()).filter(|&i| !known(i)).collect();
+        let rows = self.row_count();
         let variance = 2.0 * optimum.quadratic.loss / rows.saturating_sub(free.len()).max(1) as f64;
         let error_variance = variance.max(SMALLEST_ERROR_NM.powi(2));
         let errors = covariance(&optimum.quadratic.hessian, &free) * error_variance;
@@ -135,7 +137,7 @@ impl Problem<'_> {
             .filter(|&i| self.bounds[i].touches(optimum.point[i]))
             .collect();
         let pull = if held.is_empty() {
-            DVector::zeros(COUNT)
+            DVector::zeros(errors.nrows())
         } else {
             -(errors * &optimum.quadratic.gradient) / variance
         };
@@ -239,10 +241,11 @@ impl Problem<'_> {
 
     /// Traces for plots, and the one-step prediction.
     fn traces(&self, log: &DriveLog, p: &[f64]) -> (Traces, Vec<f64>) {
-        let mut disturbance = Vec::with_capacity(self.signals.len() - self.first_row);
-        self.rows(p, |n, _| disturbance.push(n));
-        let residual = self.filter(p, &disturbance);
-        let measured = &log.driver_torque_nm[self.first_row..];
+        let mut disturbance = Vec::with_capacity(self.row_count());
+        self.rows::<LINEAR>(p, |_, n, _| disturbance.push(n));
+        let mut residual = Vec::with_capacity(self.row_count());
+        self.errors::<CORE>(p, |row| residual.push(row.error));
+        let measured = self.used(&log.driver_torque_nm);
         let without = |part: &[f64]| {
             measured
                 .iter()
@@ -251,8 +254,8 @@ impl Problem<'_> {
                 .collect::<Vec<f64>>()
         };
         let traces = Traces {
-            time_s: (self.first_row..log.len()).map(|k| log.time_s(k)).collect(),
-            measured_nm: measured.to_vec(),
+            time_s: self.stretches.iter().cloned().flatten().map(|k| log.time_s(k)).collect(),
+            measured_nm: measured.clone(),
             simulated_nm: without(&disturbance),
             residual_nm: residual,
         };
@@ -260,22 +263,25 @@ impl Problem<'_> {
         (traces, predicted)
     }
 
-    fn filtered(&self, p: &[f64], u: &[f64]) -> Vec<f64> {
-        self.filter(p, &u[self.first_row..])
+    /// The rows of `u` that the loss is taken over.
+    fn used(&self, u: &[f64]) -> Vec<f64> {
+        self.stretches.iter().flat_map(|s| u[s.clone()].iter().copied()).collect()
     }
 
-    /// `(1 - rho/q)/(1 - theta/q)` applied to `u`, begun as in [`Problem::sums`].
-    fn filter(&self, p: &[f64], u: &[f64]) -> Vec<f64> {
+    /// `(1 - rho/q)/(1 - theta/q)` applied to `u` over each stretch, begun as in [`Problem::errors`].
+    fn filtered(&self, p: &[f64], u: &[f64]) -> Vec<f64> {
         let (rho, theta) = (p[RHO], p[THETA]);
-        let mut last = u[0];
-        let mut out = (1.0 - rho) / (1.0 - theta) * last;
-        u.iter()
-            .map(|&x| {
+        let mut all = Vec::with_capacity(self.row_count());
+        for stretch in &self.stretches {
+            let mut last = u[stretch.start];
+            let mut out = (1.0 - rho) / (1.0 - theta) * last;
+            all.extend(u[stretch.clone()].iter().map(|&x| {
                 out = theta * out + x - rho * last;
                 last = x;
                 out
-            })
-            .collect()
+            }));
+        }
+        all
     }
 }
 
