@@ -9,6 +9,7 @@
 //!
 //! What is not here: driving (the models do that), sets of drives (the studies), and the command line.
 
+mod balance;
 mod bus_trace;
 mod diagnostics;
 mod lane;
@@ -21,7 +22,9 @@ mod result;
 mod search;
 mod signals;
 mod tracking;
+mod verdict;
 
+pub use balance::Balance;
 pub use bus_trace::open_recording;
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use log::{COLUMNS, DriveLog, LogError};
@@ -36,4 +39,5 @@ pub use result::{
 };
 pub use search::Termination;
 pub use signals::Muscle;
+pub use verdict::Refutation;
 pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, track};

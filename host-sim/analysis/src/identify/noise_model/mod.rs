@@ -19,6 +19,7 @@
 //! Jacobian; the gradient is exact. What is not here: reading logs, the search itself, and the verdict on where it
 //! ended ([`report`]).
 
+mod evidence;
 mod report;
 
 use std::ops::Range;

@@ -87,6 +87,9 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
             for (b, e) in bad[c].iter_mut().zip(&s.error_sd) {
                 *b &= e * USUAL_GAINS[c] > LARGEST_BRIDGED_NM;
             }
+            for (b, &burst) in bad[c].iter_mut().zip(&s.bursts) {
+                *b |= burst;
+            }
         }
     }
     let mut lane_noise = [LaneNoise::default(); 2];

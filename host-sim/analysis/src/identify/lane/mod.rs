@@ -22,6 +22,11 @@ use trend::{Filter, Likelihood, likelihood};
 /// Innovations beyond so many standard deviations are outliers.
 const GATE: f64 = 5.0;
 
+/// So many outliers within so long are a burst, and bursts that follow each other within so long are one, s.
+const BURST: usize = 4;
+const BURST_S: f64 = 0.25;
+const BURSTS_APART_S: f64 = 10.0;
+
 /// Noise below these, m and rad, is left in the signals: it is lost beside the driver's remnant.
 const NEGLIGIBLE: [f64; 2] = [2e-5, 2e-6];
 
@@ -46,6 +51,8 @@ pub struct LaneNoise {
 pub(crate) struct Smoothed {
     pub signal: Vec<f64>,
     pub error_sd: Vec<f64>,
+    /// Rows in bursts of outliers: whatever the signal was there, it was not the lane.
+    pub bursts: Vec<bool>,
     pub noise: LaneNoise,
 }
 
@@ -113,6 +120,7 @@ pub(crate) fn smooth(
         return Smoothed {
             signal: signal.to_vec(),
             error_sd: vec![0.0; signal.len()],
+            bursts: vec![false; signal.len()],
             noise: LaneNoise {
                 noise_sd: white,
                 ..LaneNoise::default()
@@ -121,22 +129,21 @@ pub(crate) fn smooth(
     }
     let answers = answers(wheel_angle, dt, integrals);
     let mut weight = weight.to_vec();
-    let mut outliers = 0;
+    let mut outliers = Vec::new();
     let mut ratio = 1.0;
     let mut found: Option<(Filter, Likelihood)> = None;
     for round in 0..3 {
         let (best, filter, fit) = best_ratio(signal, &answers, dt, &weight, floor, (round > 0).then_some(ratio));
         ratio = best;
-        let mut new = 0;
-        for (w, v) in weight.iter_mut().zip(&fit.innovations) {
+        let before = outliers.len();
+        for (k, (w, v)) in weight.iter_mut().zip(&fit.innovations).enumerate() {
             if *w > 0.0 && v.abs() > GATE {
                 *w = 0.0;
-                new += 1;
+                outliers.push(k);
             }
         }
-        outliers += new;
         found = Some((filter, fit));
-        if new == 0 {
+        if outliers.len() == before {
             break;
         }
     }
@@ -158,13 +165,29 @@ pub(crate) fn smooth(
             .map(|k| if keep(k) { signal[k] } else { course[k] + motion[k] })
             .collect(),
         error_sd,
+        bursts: bursts(&mut outliers, signal.len(), dt),
         noise: LaneNoise {
             noise_sd: fit.noise_variance.sqrt(),
             left_sd: left,
-            outliers,
+            outliers: outliers.len(),
             smoothed: true,
         },
     }
+}
+
+/// Rows between the first and the last outlier of a burst: at least [`BURST`] within [`BURST_S`]. Bursts that are near
+/// each other are where something else began and where it ended.
+fn bursts(outliers: &mut [usize], rows: usize, dt: f64) -> Vec<bool> {
+    outliers.sort_unstable();
+    let mut out = vec![false; rows];
+    let (span, apart) = ((BURST_S / dt) as usize, (BURSTS_APART_S / dt) as usize);
+    let mut last: Option<usize> = None;
+    for w in outliers.windows(BURST).filter(|w| w[BURST - 1] - w[0] <= span) {
+        let from = last.filter(|&l| w[0] <= l + apart).unwrap_or(w[0]);
+        out[from..=w[BURST - 1]].fill(true);
+        last = Some(w[BURST - 1]);
+    }
+    out
 }
 
 /// The ratio of the largest likelihood: by whole decades from `near` or over all, then by a parabola through the best
