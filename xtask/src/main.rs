@@ -13,6 +13,7 @@ mod golden;
 mod identify;
 mod image;
 mod qemu;
+mod seal;
 mod size;
 mod speed;
 mod tool;
@@ -65,6 +66,11 @@ enum Command {
     Run(boards::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
+    /// Writes an image's CRC-32 into its ELF, which the product looks for at every start. `flash` and `run` do it too.
+    Seal {
+        /// The ELF of steering-ecu, changed in place.
+        elf: PathBuf,
+    },
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -111,6 +117,7 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };
     match result {
