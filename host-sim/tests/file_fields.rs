@@ -4,8 +4,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use host_sim::models::road::Course;
-use host_sim::scenario::Scenario;
+use haptic_sim::input::InputError;
+use haptic_sim::models::road::Course;
+use haptic_sim::scenario::Scenario;
 
 /// A row of a table.
 #[derive(Debug, Clone)]
@@ -88,7 +89,7 @@ fn scenario_text(row: &Row, value: &str) -> String {
 }
 
 fn scenario(text: &str) -> Result<Scenario, String> {
-    Scenario::from_toml("s", text, Path::new("")).map_err(|e| e.to_string())
+    Scenario::from_toml("s", text, |name| Err(InputError::new(name, "not there"))).map_err(|e| e.to_string())
 }
 
 /// The fields that the code knows of a table, as its refusal of an unknown one lists them. Spellings with and

@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use host_sim::identify::{Identification, Options, open_recording};
-use host_sim::input::in_range;
-use host_sim::models::road::Course;
-use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
-use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
+use haptic_analysis::identify::{Identification, Options, open_recording};
+use haptic_batch::identify::{IdentifiedDrive, Method, identify};
+use haptic_sim::input::in_range;
+use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
 use super::table::{self, number};
@@ -66,9 +65,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, note.map(String::from));
     if let Some(path) = &arguments.course {
-        drive.drive_again(Course::open(path)?, arguments.speed, &options)?;
+        drive.drive_again(haptic_batch::files::open_course(path)?, arguments.speed, &options)?;
     }
-    output.finish(|place| drive.write(place))?;
+    output.finish(|place| haptic_report::studies::identify::write(&drive, place))?;
     if arguments.json {
         print_json(&drive.results)?;
     } else {
