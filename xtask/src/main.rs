@@ -4,6 +4,7 @@
 
 mod bench;
 mod boards;
+mod by_hand;
 mod callgrind;
 mod ci;
 mod code;
@@ -50,9 +51,13 @@ enum Command {
     },
     /// Line and region coverage of the core by its tests: all of it, or exit code 1.
     Coverage,
-    /// A defect in every expression of envelope, modes, E2E, monitor and plausibility (needs cargo-mutants); prints
-    /// those that no test notices.
-    Mutants,
+    /// A defect in every expression of what decides or guards a torque (needs cargo-mutants); prints those that no test
+    /// notices.
+    Mutants {
+        /// Instead, the defects made by hand of core/tests/mutants.toml: exit code 1 if one is not noticed.
+        #[arg(long)]
+        by_hand: bool,
+    },
     /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
     /// instructions against xtask/golden.json.
     Boards {
@@ -96,7 +101,8 @@ fn main() -> ExitCode {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
-        Command::Mutants => evidence::mutants(),
+        Command::Mutants { by_hand: true } => by_hand::run(),
+        Command::Mutants { by_hand: false } => evidence::mutants(),
         Command::Boards { bless } => boards::check(bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
