@@ -4,21 +4,22 @@
 //! Above 500 lines because the order of the step is its meaning: inputs, modes, torque, limit and feedback share
 //! one state that no other file may touch, and are read in one go. A block that can stand alone has its own file.
 
+use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
+use crate::injection::{Injection, NoInjection};
 use crate::law::{LaneSample, LawState};
-use crate::modes::{Event, Mode};
-use crate::params::Config;
+use crate::modes::{Event, Events, Mode};
 use crate::plausibility::{PlausibilityState, speeds_agree};
 use crate::probe::ProbeState;
-use crate::quantity::{Gain, Instant, Micros, Radians, Speed, Torque, product};
-use crate::ramp::{HANDOVER, HISTORY, History, Ramp, lesser};
-use crate::vital::{Guarded, vital};
+use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TorqueRate, product};
+use crate::ramp::{HANDOVER, HISTORY, History, Ramp, smaller_of_same_sign};
+use crate::redundant::{Redundant, words};
 
 /// Inputs must be valid for this long in Standby before a request can engage.
 pub const READY: Micros = Micros::from_ms(500);
-/// A planned fade, N.m/s.
-const FADE_RATE: Torque = Torque::from_nm(4.0);
+/// A planned fade.
+const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
 /// A step that comes later than this after the last one missed its deadline.
 const LATE: Micros = Micros::from_us(2_500);
 /// A step that comes this late is a fault by itself: the world has moved on by half a camera period.
@@ -42,6 +43,15 @@ pub enum Input<T> {
 }
 
 impl<T: Copy> Input<T> {
+    /// The same of another value.
+    pub(crate) fn map<U>(self, change: impl FnOnce(T) -> U) -> Input<U> {
+        match self {
+            Self::Lost => Input::Lost,
+            Self::Held(value) => Input::Held(change(value)),
+            Self::New(value) => Input::New(change(value)),
+        }
+    }
+
     /// The value, new or held.
     #[must_use]
     pub const fn value(&self) -> Option<T> {
@@ -52,7 +62,7 @@ impl<T: Copy> Input<T> {
     }
 }
 
-vital! {
+words! {
     /// Driver torque and wheel angle.
     #[derive(Default)]
     pub struct Column {
@@ -63,16 +73,15 @@ vital! {
     }
 }
 
-vital! {
-    /// The host's wish.
-    pub struct Request {
-        /// 1: guidance is wanted. A rising edge engages, a low level ends.
-        pub engage: u32,
-        /// Share of the law's torque to apply, 0 to 1; saturates there.
-        pub authority: Gain,
-        /// 1: the probe is wanted on top of it.
-        pub probe: u32,
-    }
+/// What the host requests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Request {
+    /// Guidance is wanted. A rising edge engages, a low level ends.
+    pub engage: bool,
+    /// Share of the law's torque to apply, 0 to 1; saturates there.
+    pub authority: Ratio,
+    /// The probe is wanted on top of it.
+    pub probe: bool,
 }
 
 /// What the controller reads every millisecond.
@@ -84,7 +93,7 @@ pub struct Inputs {
     pub column: Input<Column>,
     /// Two sources of the vehicle's speed.
     pub speeds: Input<[Speed; 2]>,
-    /// The host's wish.
+    /// What the host requests.
     pub request: Input<Request>,
     /// Faults found outside: on the bus, by the monitor, at the output.
     pub faults: FaultSet,
@@ -107,9 +116,9 @@ pub struct Command {
     pub warning: bool,
 }
 
-vital! {
+words! {
     /// Everything that a flipped bit must not change unseen.
-    pub(crate) struct Vitals {
+    pub(crate) struct Memory {
         /// A [`Mode`] code.
         mode: u32,
         /// 1 while the last request was high.
@@ -117,7 +126,7 @@ vital! {
         /// How long the inputs have been valid in Standby.
         ready: Micros,
         /// Time since each input was last new: how far back its loss reaches.
-        silence: Silence,
+        age: Ages,
         /// [`Fault`] bits of inputs that were implausible when last new.
         implausible: u32,
         last_step: Instant,
@@ -136,8 +145,8 @@ vital! {
     }
 }
 
-vital! {
-    struct Silence {
+words! {
+    struct Ages {
         lane: Micros,
         column: Micros,
         speeds: Micros,
@@ -145,7 +154,7 @@ vital! {
     }
 }
 
-impl Vitals {
+impl Memory {
     const fn new(mode: Mode, now: Instant) -> Self {
         const NONE: Micros = Micros::from_us(0);
         Self {
@@ -153,7 +162,7 @@ impl Vitals {
             // A request that is high from the start is no rising edge.
             requested: 1,
             ready: NONE,
-            silence: Silence {
+            age: Ages {
                 lane: NONE,
                 column: NONE,
                 speeds: NONE,
@@ -174,18 +183,15 @@ impl Vitals {
     }
 
     fn faults(&self) -> FaultSet {
-        FaultSet::from_bits((self.implausible | self.latched) as u16)
+        FaultSet::from_bits(self.implausible | self.latched)
     }
 }
 
 /// What the controller remembers from step to step.
 #[derive(Debug, Clone)]
 pub struct ControllerState {
-    pub(crate) vitals: Guarded<Vitals>,
+    pub(crate) memory: Redundant<Memory>,
     history: History,
-    /// What the law is made to ask for (see `ecu::injection`).
-    #[cfg(feature = "fault-injection")]
-    pub(crate) forced_law: Option<Torque>,
 }
 
 impl ControllerState {
@@ -203,22 +209,20 @@ impl ControllerState {
 
     fn with(mode: Mode, now: Instant) -> Self {
         Self {
-            vitals: Guarded::new(Vitals::new(mode, now)),
+            memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),
-            #[cfg(feature = "fault-injection")]
-            forced_law: None,
         }
     }
 
-    /// The copies of a vital state differ: nothing of it can be used, and it stays so.
+    /// The copies of a redundant state differ: nothing of it can be used, and it stays so.
     fn lose_memory(&mut self, now: Instant) -> Command {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
-        let vitals = Vitals {
-            latched: u32::from(faults.bits()),
-            ..Vitals::new(Mode::Fault, now)
+        let memory = Memory {
+            latched: faults.bits(),
+            ..Memory::new(Mode::Fault, now)
         };
-        self.vitals.set(vitals);
+        self.memory.set(memory);
         Command {
             torque: Torque::ZERO,
             probe: None,
@@ -233,7 +237,7 @@ impl ControllerState {
 /// The whole control law with its limits; immutable.
 #[derive(Debug, Clone, Copy)]
 pub struct Controller {
-    pub(crate) config: Guarded<Config>,
+    pub(crate) config: Redundant<Config>,
 }
 
 impl Controller {
@@ -241,7 +245,7 @@ impl Controller {
     #[must_use]
     pub fn new(config: Config) -> Self {
         Self {
-            config: Guarded::new(config),
+            config: Redundant::new(config),
         }
     }
 
@@ -260,24 +264,33 @@ impl Controller {
         applied: Torque,
         inputs: &Inputs,
     ) -> Command {
+        self.step_with(state, now, applied, inputs, &NoInjection)
+    }
+
+    #[inline]
+    pub(crate) fn step_with<I: Injection>(
+        &self,
+        state: &mut ControllerState,
+        now: Instant,
+        applied: Torque,
+        inputs: &Inputs,
+        injection: &I,
+    ) -> Command {
         let Some(config) = self.config.get() else {
             return state.lose_memory(now);
         };
-        #[cfg(feature = "fault-injection")]
-        let forced_law = state.forced_law;
         let history = &mut state.history;
-        let command = state.vitals.change(|vitals| {
+        let command = state.memory.change(|memory| {
             let step = Step {
                 config,
                 now,
                 applied,
                 inputs,
-                elapsed: now.since(vitals.last_step),
-                #[cfg(feature = "fault-injection")]
-                forced_law,
+                elapsed: now.since(memory.last_step),
+                injection,
             };
-            vitals.last_step = now;
-            step.run(vitals, history)
+            memory.last_step = now;
+            step.run(memory, history)
         });
         let Some(command) = command else {
             return state.lose_memory(now);
@@ -288,23 +301,22 @@ impl Controller {
 }
 
 /// One step, with what it must not change.
-struct Step<'a> {
+struct Step<'a, I> {
     config: &'a Config,
     now: Instant,
     applied: Torque,
     inputs: &'a Inputs,
     elapsed: Micros,
-    #[cfg(feature = "fault-injection")]
-    forced_law: Option<Torque>,
+    injection: &'a I,
 }
 
-impl Step<'_> {
-    fn run(&self, v: &mut Vitals, history: &mut History) -> Command {
+impl<I: Injection> Step<'_, I> {
+    fn run(&self, v: &mut Memory, history: &mut History) -> Command {
         let lost = self.look(v);
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
-        v.latched |= u32::from(faults.common(FaultSet::CRITICAL).bits());
+        v.latched |= faults.common(FaultSet::CRITICAL).bits();
 
         let before = Mode::from_code(v.mode).unwrap_or(Mode::Fault);
         let mode = self.next_mode(v, before, faults);
@@ -325,7 +337,7 @@ impl Step<'_> {
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
-    fn look(&self, v: &mut Vitals) -> FaultSet {
+    fn look(&self, v: &mut Memory) -> FaultSet {
         let Inputs {
             lane,
             column,
@@ -335,9 +347,9 @@ impl Step<'_> {
         } = self.inputs;
         let checks = &self.config.plausibility;
         let mut lost = FaultSet::NONE;
-        let mut implausible = FaultSet::from_bits(v.implausible as u16);
+        let mut implausible = FaultSet::from_bits(v.implausible);
 
-        v.silence.speeds = self.silence(speeds, v.silence.speeds);
+        v.age.speeds = self.age(speeds, v.age.speeds);
         if let Input::New([a, b]) = speeds {
             let agree = speeds_agree(*a, *b);
             implausible.set(!agree, Fault::SpeedImplausible);
@@ -350,7 +362,7 @@ impl Step<'_> {
             v.plausibility.forget_lane();
             v.plausibility.forget_column();
         }
-        v.silence.column = self.silence(column, v.silence.column);
+        v.age.column = self.age(column, v.age.column);
         match column {
             Input::New(c) => {
                 let plausible = checks.column(
@@ -368,7 +380,7 @@ impl Step<'_> {
                 implausible.set(false, Fault::ColumnImplausible);
             }
         }
-        v.silence.lane = self.silence(lane, v.silence.lane);
+        v.age.lane = self.age(lane, v.age.lane);
         match lane {
             Input::New(sample) => {
                 let plausible = checks.lane(&mut v.plausibility, *sample);
@@ -380,17 +392,17 @@ impl Step<'_> {
                 implausible.set(false, Fault::LaneImplausible);
             }
         }
-        v.silence.request = self.silence(request, v.silence.request);
+        v.age.request = self.age(request, v.age.request);
 
         lost.insert_if(lane.value().is_none(), Fault::LaneTimeout);
         lost.insert_if(column.value().is_none(), Fault::ColumnTimeout);
         lost.insert_if(speeds.value().is_none(), Fault::SpeedTimeout);
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
-        v.implausible = u32::from(implausible.bits());
+        v.implausible = implausible.bits();
         lost
     }
 
-    fn silence<T>(&self, input: &Input<T>, so_far: Micros) -> Micros {
+    fn age<T>(&self, input: &Input<T>, so_far: Micros) -> Micros {
         match input {
             Input::New(_) => Micros::from_us(0),
             _ => Micros::from_us(so_far.us().saturating_add(self.elapsed.us())),
@@ -407,7 +419,7 @@ impl Step<'_> {
     }
 
     /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
-    fn keep_time(&self, v: &mut Vitals) -> (u32, u32) {
+    fn keep_time(&self, v: &mut Memory) -> (u32, u32) {
         v.late = match self.elapsed {
             e if e > LOST_TIME => LATE_STEPS.saturating_add(1),
             e if e > LATE => v.late.saturating_add(1),
@@ -422,9 +434,9 @@ impl Step<'_> {
     }
 
     /// The most urgent event that changes the mode decides.
-    fn next_mode(&self, v: &mut Vitals, mode: Mode, faults: FaultSet) -> Mode {
+    fn next_mode(&self, v: &mut Memory, mode: Mode, faults: FaultSet) -> Mode {
         let inputs_ok = !faults.intersects(FaultSet::INPUT);
-        let request = self.inputs.request.value().map(|r| r.engage != 0);
+        let request = self.inputs.request.value().map(|r| r.engage);
         let fast_enough = self.is_fast_enough();
         let rising = request == Some(true) && v.requested == 0;
         if let Some(high) = request {
@@ -435,25 +447,19 @@ impl Step<'_> {
         } else {
             Micros::from_us(0)
         };
-        let raised = |event: &&Event| match event {
-            Event::BootPassed => true,
-            Event::Engage => rising && v.ready >= READY,
-            // Late steps carry the ramp further than the reduction limit lets the torque follow.
-            Event::Faded => v.ramp.is_done() && self.applied == Torque::ZERO,
-            Event::Disengage => request == Some(false) || fast_enough == Some(false),
-            Event::InputLost => !inputs_ok,
-            Event::BootRejected => faults.intersects(FaultSet::LOCKING),
-            Event::Critical => faults.intersects(FaultSet::CRITICAL),
-        };
-        let change = Event::ALL
-            .iter()
-            .rev()
-            .filter(raised)
-            .map(|event| mode.after(*event));
-        change.into_iter().find(|next| *next != mode).unwrap_or(mode)
+        let mut raised = Events::of(Event::BootPassed);
+        raised.insert_if(rising && v.ready >= READY, Event::Engage);
+        // Late steps carry the ramp further than the reduction limit lets the torque follow.
+        raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
+        let is_over = request == Some(false) || fast_enough == Some(false);
+        raised.insert_if(is_over, Event::Disengage);
+        raised.insert_if(!inputs_ok, Event::InputLost);
+        raised.insert_if(faults.intersects(FaultSet::LOCKING), Event::BootRejected);
+        raised.insert_if(faults.intersects(FaultSet::CRITICAL), Event::Critical);
+        mode.after_all(raised)
     }
 
-    fn enter(&self, v: &mut Vitals, mode: Mode, faults: FaultSet, history: &History) {
+    fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
         v.mode = mode as u32;
         v.probe = ProbeState::SILENT;
         match mode {
@@ -464,7 +470,8 @@ impl Step<'_> {
                 let suspect = self.suspect_since(v, faults);
                 // Half a wave of the probe must not stand in the wheel for two seconds, and what the other half
                 // took away does not come back.
-                let applied = lesser(self.applied, without(self.applied, Some(v.probe_applied)));
+                let applied =
+                    smaller_of_same_sign(self.applied, without(self.applied, Some(v.probe_applied)));
                 v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), HANDOVER);
             }
             _ => {}
@@ -472,10 +479,10 @@ impl Step<'_> {
     }
 
     /// How long ago the earliest sample came that must not be trusted.
-    fn suspect_since(&self, v: &Vitals, faults: FaultSet) -> Micros {
-        let silent = |fault, silence| {
+    fn suspect_since(&self, v: &Memory, faults: FaultSet) -> Micros {
+        let lost_for = |fault, age| {
             if faults.contains(fault) {
-                silence
+                age
             } else {
                 Micros::from_us(0)
             }
@@ -483,14 +490,14 @@ impl Step<'_> {
         if faults.intersects(FaultSet::IMPLAUSIBLE) {
             return HISTORY;
         }
-        silent(Fault::LaneTimeout, v.silence.lane)
-            .max(silent(Fault::ColumnTimeout, v.silence.column))
-            .max(silent(Fault::SpeedTimeout, v.silence.speeds))
-            .max(silent(Fault::CommandTimeout, v.silence.request))
+        lost_for(Fault::LaneTimeout, v.age.lane)
+            .max(lost_for(Fault::ColumnTimeout, v.age.column))
+            .max(lost_for(Fault::SpeedTimeout, v.age.speeds))
+            .max(lost_for(Fault::CommandTimeout, v.age.request))
     }
 
     /// The torque, the part of it that is the probe, and what limited it.
-    fn torque(&self, v: &mut Vitals, mode: Mode) -> (Torque, Option<Torque>, LimitReason) {
+    fn torque(&self, v: &mut Memory, mode: Mode) -> (Torque, Option<Torque>, LimitReason) {
         let (wanted, probe) = match mode {
             Mode::Active => {
                 let guidance = self.guidance(v);
@@ -498,7 +505,10 @@ impl Step<'_> {
                 (with(guidance, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
-            Mode::Fade | Mode::Handover => (lesser(v.ramp.step(self.elapsed), self.applied), None),
+            Mode::Fade | Mode::Handover => (
+                smaller_of_same_sign(v.ramp.step(self.elapsed), self.applied),
+                None,
+            ),
             // At once: what is behind these modes must not move the wheel for another tick.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
                 return (Torque::ZERO, None, LimitReason::Mode);
@@ -528,20 +538,19 @@ impl Step<'_> {
     }
 
     /// The probe's torque, while it is wanted or on its way out.
-    fn probe(&self, v: &mut Vitals) -> Option<Torque> {
-        let wanted = self.inputs.request.value().is_some_and(|r| r.probe != 0);
+    fn probe(&self, v: &mut Memory) -> Option<Torque> {
+        let wanted = self.inputs.request.value().is_some_and(|r| r.probe);
         self.config.probe.step(&mut v.probe, self.elapsed, wanted)
     }
 
     /// The law's torque, scaled by the authority.
-    fn guidance(&self, v: &mut Vitals) -> Torque {
+    fn guidance(&self, v: &mut Memory) -> Torque {
         let law = |sample| self.config.law.step(&mut v.law, self.now, sample);
         let asked = self.inputs.lane.value().map_or(Torque::ZERO, law);
-        #[cfg(feature = "fault-injection")]
-        let asked = self.forced_law.unwrap_or(asked);
+        let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
-        let share = |request: Request| request.authority.max(Gain::ZERO).min(Gain::ONE);
-        let authority = self.inputs.request.value().map_or(Gain::ZERO, share);
+        let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
+        let authority = self.inputs.request.value().map_or(Ratio::ZERO, share);
         Torque::from_wide(product(authority.bits(), asked.bits()))
     }
 }

@@ -22,15 +22,17 @@
 #![forbid(unsafe_code)]
 
 pub mod actuator;
-mod advice;
+mod background;
 pub mod bus;
+pub mod config;
 pub mod controller;
 pub mod download;
 pub mod ecu;
 pub mod envelope;
+pub mod estimator;
 pub mod faults;
+mod injection;
 pub mod law;
-pub mod lockstep;
 pub mod modes;
 pub mod monitor;
 pub mod params;
@@ -38,7 +40,6 @@ pub mod plausibility;
 pub mod probe;
 pub mod quantity;
 pub mod ramp;
-pub mod reliance;
+pub mod redundant;
 mod sine;
 pub mod stored;
-pub mod vital;

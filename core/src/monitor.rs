@@ -12,11 +12,11 @@
 //! the envelope may still be bringing an honest change about. While the host asks for the probe, and for a second
 //! after, the band is wider by the probe's amplitude.
 //!
-//! Each rule can be tried by itself: [`Monitor::nonsense`].
+//! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-use crate::vital::vital;
+use crate::redundant::words;
 
-vital! {
+words! {
     /// Limits in mN.m and per unit; immutable.
     pub struct Monitor {
         /// L.
@@ -30,7 +30,7 @@ vital! {
     }
 }
 
-vital! {
+words! {
     /// What the monitor remembers.
     pub struct MonitorState {
         torque_mnm: i32,
@@ -47,7 +47,7 @@ vital! {
     }
 }
 
-vital! {
+words! {
     /// Lane errors as the monitor reads them.
     struct Lane {
         e_y_mm: i32,
@@ -205,7 +205,7 @@ impl Monitor {
     /// exactly one rule refuses. Each of [`RULES`] turns tries another one. (Below a limit of 0.4 N.m nothing can be
     /// astray, and the limit refuses that turn.)
     #[must_use]
-    pub fn nonsense(&self, turn: u32) -> (MonitorState, [u8; 8]) {
+    pub fn self_test_vector(&self, turn: u32) -> (MonitorState, [u8; 8]) {
         // As long as nothing else is said: a held torque that each rule allows.
         let (mut torque, mut grown, mut mode, mut state) = (100, 0, ACTIVE, MonitorState::NEW);
         match turn % RULES {

@@ -10,7 +10,7 @@
 
 use fixed::types::I8F24;
 
-use crate::vital::Vital;
+use crate::redundant::Words;
 
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $from:ident, $get:ident, $unit:literal) => {
@@ -71,7 +71,7 @@ macro_rules! quantity {
             }
         }
 
-        impl Vital for $name {
+        impl Words for $name {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
                 Self::from_bits(self.bits().map_words(change))
             }
@@ -97,7 +97,7 @@ quantity!(
 );
 quantity!(
     /// A speed along the road, m/s, forward positive.
-    Speed, from_mps, mps, "metres per second"
+    Speed, from_m_per_s, m_per_s, "metres per second"
 );
 quantity!(
     /// A torque on the steering column, N.m, positive turns left.
@@ -125,11 +125,55 @@ impl Torque {
 }
 
 quantity!(
-    /// A gain or a margin, in the SI units that its field gives it.
-    Gain, from_si, si, "SI units"
+    /// A rate of a torque, N.m/s.
+    TorqueRate, from_nm_per_s, nm_per_s, "newton metres per second"
+);
+quantity!(
+    /// A torque summed over time, N.m.s.
+    AngularImpulse, from_nm_s, nm_s, "newton metre seconds"
+);
+quantity!(
+    /// A torque per length, N.m/m.
+    TorquePerLength, from_nm_per_m, nm_per_m, "newton metres per metre"
+);
+quantity!(
+    /// A torque per speed, N.m.s/m.
+    TorquePerSpeed, from_nm_s_per_m, nm_s_per_m, "newton metre seconds per metre"
+);
+quantity!(
+    /// A torque per angle, N.m/rad.
+    TorquePerAngle, from_nm_per_rad, nm_per_rad, "newton metres per radian"
+);
+quantity!(
+    /// A torque per turning rate, N.m.s/rad.
+    TorquePerTurningRate, from_nm_s_per_rad, nm_s_per_rad, "newton metre seconds per radian"
+);
+quantity!(
+    /// A torque per acceleration, N.m.s2/m.
+    TorquePerAcceleration, from_nm_s2_per_m, nm_s2_per_m, "newton metre seconds squared per metre"
+);
+quantity!(
+    /// An angle per length and angle, 1/m: how much a vehicle's path bends for an angle of the wheel.
+    CurvaturePerAngle, from_per_m, per_m, "one per metre"
+);
+quantity!(
+    /// A turning rate per angle, 1/s.
+    TurningRatePerAngle, from_per_s, per_s, "one per second"
+);
+quantity!(
+    /// A stability factor, s2/m2.
+    StabilityFactor, from_s2_per_m2, s2_per_m2, "seconds squared per metre squared"
+);
+quantity!(
+    /// A time as a factor, s. Spans of the clock are [`Micros`].
+    Seconds, from_s, s, "seconds"
+);
+quantity!(
+    /// A share, a slope between like quantities, or K_hg: no unit.
+    Ratio, from_si, si, "ones"
 );
 
-impl Gain {
+impl Ratio {
     /// One.
     pub const ONE: Self = Self::from_bits(1 << FRAC_BITS);
 
@@ -163,7 +207,7 @@ impl Micros {
     }
 }
 
-impl Vital for Micros {
+impl Words for Micros {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self(change(self.0))
     }
@@ -212,7 +256,7 @@ impl Instant {
     }
 }
 
-impl Vital for Instant {
+impl Words for Instant {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self(change(self.0))
     }

@@ -8,13 +8,13 @@ use haptic_core::actuator::Actuator;
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{Guidance, Message};
+use haptic_core::config::Setup;
 use haptic_core::ecu::Step;
 use haptic_core::ecu::injection::Region;
+use haptic_core::estimator::Sample;
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
-use haptic_core::params::Setup;
 use haptic_core::quantity::{Instant, Micros, Radians, Torque};
-use haptic_core::reliance::Sample;
 use rig::Rig;
 
 const LANE: usize = 0;
@@ -284,7 +284,7 @@ fn a_measurement_speaks_for_four_steps_and_not_five() {
 #[test]
 fn the_first_reading_takes_six_seconds_whenever_the_probe_begins() {
     for start_us in [0, 50_000, 123_000, 200_000, 311_000, 399_000] {
-        let estimator = Setup::PAPER.reliance;
+        let estimator = Setup::PAPER.estimator;
         let mut state = estimator.start();
         let first = (0..4000).find(|k| {
             let at = Instant::from_us(start_us).after(Micros::from_ms(2 * k));

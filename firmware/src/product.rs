@@ -16,12 +16,12 @@
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use haptic_core::bus::messages::{Column, Message, ParameterStatus, ResetCause};
+use haptic_core::config::Setup;
 use haptic_core::controller::Command;
 use haptic_core::download::Download;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_core::params::Setup;
 
 use crate::boards::{Board, ThisBoard};
 use crate::storage::{self, Found};
@@ -217,7 +217,7 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
         let turn = counts.steps / STEPS_PER_REPORT;
         service.status().encode(turn as u8)
     });
-    for frame in ecu.advise().iter().chain(&status) {
+    for frame in ecu.background_step().iter().chain(&status) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }

@@ -116,7 +116,7 @@ impl Record {
         let mut latched = FaultSet::NONE;
         latched.insert(Fault::Memory);
         Self {
-            latched: u32::from(latched.bits()),
+            latched: latched.bits(),
             ..Self::default()
         }
     }
@@ -132,7 +132,7 @@ impl Record {
     /// With faults that last until power-up.
     fn latching(self, faults: FaultSet) -> Self {
         Self {
-            latched: self.latched | u32::from(faults.bits()),
+            latched: self.latched | faults.bits(),
             ..self
         }
     }
@@ -228,7 +228,7 @@ impl Found {
             } else {
                 recent
             },
-            latched: FaultSet::from_bits(record.latched as u16),
+            latched: FaultSet::from_bits(record.latched),
         };
         (boot, next)
     }

@@ -178,7 +178,7 @@ fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
 }
 
 /// What a whole run over paper-course takes in QEMU, every frame of it compared: the stack that the lockstep image
-/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick, `Ecu::step` and `Ecu::advise`. The
+/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick, `Ecu::step` and `Ecu::background_step`. The
 /// probe is on, so that the estimator works.
 fn in_qemu(board: Board) -> Result<Vec<Figure>> {
     let text = tool::output(
@@ -219,9 +219,9 @@ fn in_qemu(board: Board) -> Result<Vec<Figure>> {
             1,
         ),
         figure(
-            "worst advice",
+            "worst background step",
             "instructions",
-            number(&spent["worst_advice"], "advice")?,
+            number(&spent["worst_background"], "background")?,
             1,
         ),
     ])

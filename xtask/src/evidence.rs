@@ -19,11 +19,11 @@ const MUTATED: [(&str, &[&str]); 14] = [
     ("ecu.rs", &["ecu", "memory", "probe", "edges", "endurance"]),
     ("ecu/receivers.rs", &["ecu", "memory", "edges", "endurance"]),
     ("ramp.rs", &["ramp", "ecu", "endurance"]),
-    ("vital.rs", &["memory"]),
+    ("redundant.rs", &["memory"]),
     ("stored.rs", &["stored"]),
     ("download.rs", &["download"]),
     ("actuator.rs", &["edges", "ecu"]),
-    ("faults.rs", &["ecu", "edges"]),
+    ("faults.rs", &["faults", "ecu", "edges"]),
 ];
 
 /// Line and region coverage of `core/` by its own tests; less than all of it is an error.

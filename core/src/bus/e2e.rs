@@ -10,7 +10,7 @@
 //! last accepted frame, modulo 16; *clean* is a frame that is intact, the next in count, and in range. (A preview
 //! that says of itself that it is not valid is clean: its sender is heard, and honest.)
 
-use crate::vital::vital;
+use crate::redundant::words;
 
 /// Data IDs, one for each counter value.
 const DATA_IDS: [u8; 16] = [
@@ -100,6 +100,7 @@ impl Protection {
 
 /// Why a frame was not accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Reject {
     /// Not eight bytes long.
     Length,
@@ -119,7 +120,7 @@ pub enum Reject {
     Older,
 }
 
-vital! {
+words! {
     /// One receiver's memory of a sender.
     pub struct ReceiverState {
         /// Counter of the last frame, [`NONE`] before the first.

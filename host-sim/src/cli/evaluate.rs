@@ -8,7 +8,7 @@ use haptic_batch::check_window;
 use haptic_batch::evaluate::{Evaluation, RUNS, evaluate};
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
-use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH, Scenario, Sensors};
+use haptic_sim::scenario::{DEFAULT_SPEED_KMH, Failure, SPEED_KMH, Scenario, Sensors};
 
 use super::output::Output;
 use super::table::{self, number};
@@ -51,20 +51,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(path) => haptic_batch::files::open_course(path)?,
         None => Course::paper(),
     };
-    let mut base = Scenario {
-        course,
-        speed_kmh: arguments.speed,
-        sensors: match arguments.sensors {
-            SensorsArgument::Exact => Sensors::Exact,
-            SensorsArgument::Paper => Sensors::Paper,
-        },
-        ..Scenario::default()
+    let sensors = match arguments.sensors {
+        SensorsArgument::Exact => Sensors::Exact,
+        SensorsArgument::Paper => Sensors::Paper,
     };
-    base.check()?;
+    let scenario = Scenario::builder().course(course).speed_kmh(arguments.speed);
+    let mut base = scenario.sensors(sensors).build()?;
     // On a course too short for the default, the results say so.
     if let Some(time_s) = arguments.failure_time {
         base.check_time("--failure-time", time_s)?;
-        base.failure.time_s = time_s;
+        let failure = Failure {
+            time_s,
+            ..base.failure()
+        };
+        base = base.to_builder().failure(failure).build()?;
     }
     let window = match arguments.window.as_deref() {
         Some(&[from_m, to_m]) => Some(Window { from_m, to_m }),

@@ -43,7 +43,9 @@ pub fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), OutputErro
     for (scenario, run) in &evaluation.runs {
         let name = format!(
             "t_p_{}_{}_failure_{}.csv",
-            scenario.driver.t_p, scenario.condition, scenario.failure.kind
+            scenario.driver().t_p,
+            scenario.condition(),
+            scenario.failure().kind
         );
         write_trace_csv(&directory.join("runs").join(name), &run.trace)?;
     }
@@ -55,7 +57,7 @@ pub fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), OutputErro
 }
 
 fn nominal_figure(evaluation: &Evaluation) -> Figure {
-    let shown = |s: &Scenario| s.failure.kind == FailureKind::None;
+    let shown = |s: &Scenario| s.failure().kind == FailureKind::None;
     panels(
         evaluation,
         "Lateral error by reliance on the guidance",
@@ -69,7 +71,7 @@ fn failure_figure(evaluation: &Evaluation) -> Figure {
         "Lateral error when the guidance fails at {} s",
         evaluation.results.failure_time_s
     );
-    let shown = |s: &Scenario| s.failure.kind == FailureKind::Torque || s.condition == Condition::Manual;
+    let shown = |s: &Scenario| s.failure().kind == FailureKind::Torque || s.condition() == Condition::Manual;
     let mut figure = panels(evaluation, &title, &[("", &shown)]);
     figure.markers.extend(failure_marker(evaluation));
     figure
@@ -81,7 +83,7 @@ fn handover_figure(evaluation: &Evaluation) -> Figure {
         "Lateral error: guidance torque lost, and input lost and handed over, at {} s",
         evaluation.results.failure_time_s
     );
-    let fails = |kind| move |s: &Scenario| s.failure.kind == kind || s.condition == Condition::Manual;
+    let fails = |kind| move |s: &Scenario| s.failure().kind == kind || s.condition() == Condition::Manual;
     let (lost, handed_over) = (fails(FailureKind::Torque), fails(FailureKind::Input));
     let mut figure = panels(
         evaluation,
@@ -97,9 +99,9 @@ fn failure_marker(evaluation: &Evaluation) -> Option<Marker> {
     let failed = evaluation
         .runs
         .iter()
-        .find(|(s, _)| s.failure.kind == FailureKind::Torque);
+        .find(|(s, _)| s.failure().kind == FailureKind::Torque);
     let place = failed.and_then(|(scenario, run)| {
-        let time_s = scenario.failure.at_s()?;
+        let time_s = scenario.failure().at_s()?;
         run.trace.samples.iter().find(|sample| sample.time_s >= time_s)
     });
     let [from, to] = evaluation.results.window_m;
@@ -122,18 +124,18 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
             let runs = evaluation
                 .runs
                 .iter()
-                .filter(|(s, _)| s.driver.t_p == *t_p && shown(s));
+                .filter(|(s, _)| s.driver().t_p == *t_p && shown(s));
             let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
             drivers.push(DriverPanel {
                 title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
                 runs: runs
-                    .map(|(s, run)| (label(s.condition).into(), style(s.condition), &run.trace))
+                    .map(|(s, run)| (label(s.condition()).into(), style(s.condition()), &run.trace))
                     .collect(),
             });
         }
     }
     let [from, to] = evaluation.results.window_m;
-    let course = evaluation.runs.first().map(|(scenario, _)| &scenario.course);
+    let course = evaluation.runs.first().map(|(scenario, _)| scenario.course());
     let bands = course.map(curves::bands).unwrap_or_default();
     let bands = bands.into_iter().filter(|band| band.from < to && band.to > from);
     figure(title, &drivers, (from, to), Vec::new(), bands.collect())

@@ -13,8 +13,8 @@ use haptic_analysis::metrics::DEFINITIONS;
 use haptic_batch::run::SingleRun;
 use haptic_log::Event;
 use haptic_log::trace::Sample;
-use haptic_sim::closed_loop::Ending;
 use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
+use haptic_sim::simulation::Ending;
 
 /// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON), a report (HTML), and the bus if it was
 /// recorded (as `candump -L` does).
@@ -59,7 +59,7 @@ fn figure(single: &SingleRun) -> Figure {
     };
     let failed = single
         .scenario
-        .failure
+        .failure()
         .at_s()
         .and_then(|t| samples.iter().find(|s| s.time_s >= t));
     let mut panels = vec![
@@ -76,7 +76,7 @@ fn figure(single: &SingleRun) -> Figure {
             ],
         ),
     ];
-    if single.scenario.guidance.probe {
+    if single.scenario.guidance().probe {
         let place = |time_s: f64| {
             let next = samples.partition_point(|s| s.time_s < time_s);
             samples.get(next).or(samples.last()).map_or(0.0, |s| s.s_m)
@@ -107,7 +107,7 @@ fn figure(single: &SingleRun) -> Figure {
             })
             .into_iter()
             .collect(),
-        bands: curves::bands(&single.scenario.course),
+        bands: curves::bands(single.scenario.course()),
     }
 }
 
@@ -115,9 +115,9 @@ fn figure(single: &SingleRun) -> Figure {
 fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
     let scenario = &single.scenario;
     let last_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
-    let end_s = scenario.failure.at_s().map_or(last_s, |t| t.min(last_s));
-    let start = scenario.gains.k_hg;
-    match &scenario.driver_change {
+    let end_s = scenario.failure().at_s().map_or(last_s, |t| t.min(last_s));
+    let start = scenario.gains().k_hg;
+    match &scenario.driver_change() {
         Some(change) if change.time_s < end_s => {
             let t = change.time_s;
             vec![(0.0, start), (t, start), (t, change.k_hg), (end_s, change.k_hg)]
@@ -138,12 +138,12 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
         title: "A run under shared steering control".into(),
         summary: format!(
             "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
-            scenario.course.name(),
-            scenario.speed_kmh,
-            scenario.driver.t_p,
-            scenario.gains.k_d,
-            scenario.gains.k_hg,
-            scenario.condition,
+            scenario.course().name(),
+            scenario.speed_kmh(),
+            scenario.driver().t_p,
+            scenario.gains().k_d,
+            scenario.gains().k_hg,
+            scenario.condition(),
             notes(&single.results.notes),
         ),
         sections: vec![
@@ -152,7 +152,7 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
                 blocks: vec![
                     Block::Figure {
                         figure,
-                        caption: if single.scenario.guidance.probe {
+                        caption: if single.scenario.guidance().probe {
                             "Lateral error, wheel angle, torques, and what the ECU says of K_hg.".into()
                         } else {
                             "Lateral error, wheel angle and torques.".into()
@@ -175,8 +175,8 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
 fn events(single: &SingleRun) -> Vec<Event> {
     let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
     let mut events = single.reported.clone();
-    if let Some(time_s) = single.scenario.failure.at_s().filter(|t| *t <= end_s) {
-        let what = match single.scenario.failure.kind {
+    if let Some(time_s) = single.scenario.failure().at_s().filter(|t| *t <= end_s) {
+        let what = match single.scenario.failure().kind {
             FailureKind::Input => "The lane preview stops",
             FailureKind::Torque | FailureKind::None => "The guidance torque drops to zero",
         };

@@ -5,18 +5,21 @@
 use haptic_core::params::Params;
 use serde::Deserialize;
 
-use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, Sensors};
+use super::{
+    Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, ScenarioBuilder,
+    Sensors,
+};
 use crate::input::{InputError, parse_toml};
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::road::{Course, PAPER_COURSE};
 use crate::models::vehicle::VehicleParameters;
 
-/// Parses a scenario, unchecked but for its course.
+/// Parses a scenario; only its course is checked.
 pub(super) fn parse(
     name: &str,
     text: &str,
     course: impl FnOnce(&str) -> Result<Course, InputError>,
-) -> Result<Scenario, InputError> {
+) -> Result<ScenarioBuilder, InputError> {
     let file: ScenarioFile = parse_toml(name, text).map_err(|error| {
         if Course::from_toml(name, text).is_ok() {
             let hint = "this is a course, not a scenario: a scenario names it with `course = \"FILE\"`";
@@ -47,19 +50,12 @@ pub(super) fn parse(
         k_d: k_d.unwrap_or(named.k_d),
         k_hg: k_hg.unwrap_or(named.k_hg),
     };
-    let condition = match file.condition {
-        Condition::Manual => Condition::Manual,
-        _ => [Condition::High, Condition::Mid, Condition::Low]
-            .into_iter()
-            .find(|c| c.gains() == gains)
-            .unwrap_or(Condition::Custom),
-    };
     let g = file.guidance;
-    Ok(Scenario {
-        course,
-        speed_kmh: file.speed,
-        condition,
-        driver: DriverParameters {
+    Ok(Scenario::builder()
+        .course(course)
+        .speed_kmh(file.speed)
+        .condition(file.condition)
+        .driver(DriverParameters {
             a1,
             a2,
             a3,
@@ -70,10 +66,10 @@ pub(super) fn parse(
             k_nms,
             remnant_sd_nm: file.driver.remnant_sd,
             remnant_corner_hz: file.driver.remnant_corner,
-        },
-        gains,
-        vehicle: file.vehicle,
-        guidance: GuidanceParameters {
+        })
+        .gains(gains)
+        .vehicle(file.vehicle)
+        .guidance(GuidanceParameters {
             controller: Params {
                 k_1: g.k_1,
                 a_1: g.a1,
@@ -84,7 +80,7 @@ pub(super) fn parse(
                 torque_limit_nm: g.torque_limit_nm,
                 wind_up_nm_per_s: g.wind_up_nm_per_s,
                 reduction_nm_per_s: g.reduction_nm_per_s,
-                least_speed_mps: g.least_speed_mps,
+                least_speed_m_per_s: g.least_speed_m_per_s,
                 probe_amplitude_nm: g.probe_amplitude_nm,
                 probe_frequency_hz: g.probe_frequency_hz,
                 // What the controller takes for granted, whatever the driver is.
@@ -96,12 +92,11 @@ pub(super) fn parse(
             t_n: g.t_n,
             t_f: g.t_f,
             probe: g.probe,
-        },
-        sensors: file.sensors,
-        failure: file.failure,
-        driver_change: file.driver_change,
-        seed: file.seed,
-    })
+        })
+        .sensors(file.sensors)
+        .failure(file.failure)
+        .driver_change(file.driver_change)
+        .seed(file.seed))
 }
 
 #[derive(Deserialize)]
@@ -206,7 +201,8 @@ struct GuidanceFile {
     torque_limit_nm: f64,
     wind_up_nm_per_s: f64,
     reduction_nm_per_s: f64,
-    least_speed_mps: f64,
+    #[serde(alias = "least_speed_mps")]
+    least_speed_m_per_s: f64,
     probe: bool,
     probe_amplitude_nm: f64,
     probe_frequency_hz: f64,
@@ -232,7 +228,7 @@ impl Default for GuidanceFile {
             torque_limit_nm: c.torque_limit_nm,
             wind_up_nm_per_s: c.wind_up_nm_per_s,
             reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_mps: c.least_speed_mps,
+            least_speed_m_per_s: c.least_speed_m_per_s,
             probe,
             probe_amplitude_nm: c.probe_amplitude_nm,
             probe_frequency_hz: c.probe_frequency_hz,

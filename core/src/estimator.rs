@@ -27,12 +27,12 @@
 
 use heapless::Deque;
 
-use crate::quantity::{Gain, Instant, Radians, Torque};
+use crate::quantity::{Instant, Radians, Ratio, Torque};
 use crate::sine::{ONE, QUARTER, sine};
 
 /// What the estimator knows of the probe and the driver's arm; immutable.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reliance {
+pub struct Estimator {
     /// Probe's phase per microsecond, in 2^-32 turns.
     pub(crate) phase_per_us: u32,
     /// Probe periods in a block.
@@ -62,14 +62,14 @@ pub struct Sample {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
     /// K_hg; 0: the driver relies on the guidance, 1: resists it.
-    pub k_hg: Gain,
+    pub k_hg: Ratio,
     /// Its standard deviation.
-    pub deviation: Gain,
+    pub deviation: Ratio,
 }
 
 /// What the estimator remembers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RelianceState {
+pub struct EstimatorState {
     last_phase: Option<u32>,
     /// Place in the first block's window, in 2^-32 of its length; the second is half a window apart.
     window: u32,
@@ -177,12 +177,12 @@ const FLOOR: f32 = 0.02 * 0.02;
 /// A block in which limits left less than half of the probe says nothing.
 const LEAST_SHARE: f32 = 0.5;
 
-impl Reliance {
+impl Estimator {
     /// Nothing seen yet.
     #[must_use]
-    pub fn start(&self) -> RelianceState {
+    pub fn start(&self) -> EstimatorState {
         let scale = PRIOR_NM / self.amplitude_nm;
-        RelianceState {
+        EstimatorState {
             last_phase: None,
             window: 0,
             blocks: [
@@ -207,7 +207,7 @@ impl Reliance {
     }
 
     /// One step while there is a probe, with the column's sample if there is a new one.
-    pub fn step(&self, state: &mut RelianceState, sample: Option<&Sample>) {
+    pub fn step(&self, state: &mut EstimatorState, sample: Option<&Sample>) {
         // A sample is work enough for a step, but must not keep the rest waiting if there is one in every step.
         state.spared = sample.is_some() && !state.spared;
         state.work = match state.work {
@@ -234,7 +234,7 @@ impl Reliance {
     }
 
     /// Adds a sample to both blocks; returns the one that ended before it.
-    fn add(&self, state: &mut RelianceState, sample: &Sample) -> Option<Block> {
+    fn add(&self, state: &mut EstimatorState, sample: &Sample) -> Option<Block> {
         // 2^32 us are a whole number of turns, so that the clock's wrap is none of the phase.
         let phase = self.phase_per_us.wrapping_mul(sample.at.us());
         let advance = phase.wrapping_sub(state.last_phase.unwrap_or(phase));
@@ -288,7 +288,7 @@ impl Reliance {
     }
 }
 
-impl RelianceState {
+impl EstimatorState {
     /// The estimate, once there is one.
     #[must_use]
     pub fn reading(&self) -> Option<Reading> {
@@ -360,8 +360,8 @@ impl Average {
         // An integer root is exact, and the same everywhere: 2^-28 in, 2^-14 out.
         let deviation = ((variance * 268_435_456.0) as u32).isqrt();
         (self.total >= FIRST_REPORT).then(|| Reading {
-            k_hg: Gain::from_f32(self.mean),
-            deviation: Gain::from_wide(i64::from(deviation) << 10),
+            k_hg: Ratio::from_f32(self.mean),
+            deviation: Ratio::from_wide(i64::from(deviation) << 10),
         })
     }
 }
