@@ -9,18 +9,21 @@ use serde_json::Value;
 use crate::tool::{self, cargo, run};
 
 /// What decides or guards a torque, with the tests that must notice a defect in it.
-const MUTATED: [(&str, &[&str]); 11] = [
+const MUTATED: [(&str, &[&str]); 14] = [
     ("envelope.rs", &["envelope"]),
     ("modes.rs", &["modes"]),
-    ("bus/e2e.rs", &["e2e"]),
+    ("bus/e2e.rs", &["e2e", "edges"]),
     ("monitor.rs", &["monitor", "probe"]),
     ("plausibility.rs", &["plausibility"]),
-    ("controller.rs", &["ecu", "probe"]),
-    ("ecu.rs", &["ecu", "memory", "probe"]),
-    ("ecu/receivers.rs", &["ecu", "memory"]),
-    ("faults.rs", &["faults", "ecu", "dbc"]),
-    ("ramp.rs", &["ramp", "ecu"]),
+    ("controller.rs", &["ecu", "probe", "edges", "endurance"]),
+    ("ecu.rs", &["ecu", "memory", "probe", "edges", "endurance"]),
+    ("ecu/receivers.rs", &["ecu", "memory", "edges", "endurance"]),
+    ("ramp.rs", &["ramp", "ecu", "endurance"]),
     ("redundant.rs", &["memory"]),
+    ("stored.rs", &["stored"]),
+    ("download.rs", &["download"]),
+    ("actuator.rs", &["edges", "ecu"]),
+    ("faults.rs", &["faults", "ecu", "dbc", "edges"]),
 ];
 
 /// Line and region coverage of `core/` by its own tests; less than all of it is an error.
