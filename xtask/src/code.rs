@@ -54,7 +54,7 @@ impl Code {
                 .arg(elf),
         )?;
         let code = Self::read(&text);
-        ensure!(code.0.len() > 50, "{}: hardly a function", elf.display());
+        ensure!(code.0.len() > 20, "{}: hardly a function", elf.display());
         Ok(code)
     }
 
