@@ -38,7 +38,9 @@ pub(super) fn data(figure: &Figure) -> Option<String> {
         .iter()
         .zip(figure.y_limits())
         .map(|(panel, limits)| {
-            let fixed = figure.same_y || panel.y.limits.is_some();
+            // The browser finds the limits of lines again when it zooms in; it knows nothing of stems and intervals.
+        let lines = panel.series.iter().all(|s| matches!(s.mark, Mark::Line));
+        let fixed = figure.same_y || panel.y.limits.is_some() || !lines;
             let series = panel.series.iter().map(|series| self::series(series, x_limits));
             json!({
                 "title": panel.title,
