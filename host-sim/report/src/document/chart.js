@@ -128,7 +128,12 @@
         y: panel.limits ? { range: () => panel.limits } : {},
       },
       axes: [
-        { label: last ? figure.x : undefined, size: last ? 34 : 24, values: plain },
+        {
+          label: last ? figure.x : undefined,
+          size: last ? 34 : 24,
+          values: plain,
+          incrs: figure.whole ? [1, 2, 5, 10, 20, 50, 100] : undefined,
+        },
         { label: panel.label, size: 66, values: plain },
       ],
       // The cursor moves in all panels, a drag is one panel's: its scale goes to the others below.
