@@ -1,5 +1,10 @@
 //! What writes parameters, and says which are in use. Only in Standby, and never the torque path's.
 
+#![expect(
+    clippy::as_conversions,
+    reason = "a code is its discriminant, and a field is masked to fewer bits than its type has"
+)]
+
 use super::{Info, Message, info, put, unsigned};
 use crate::params::PARAMETERS;
 
