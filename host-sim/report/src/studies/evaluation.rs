@@ -170,6 +170,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
         x: Axis {
             label: "Distance along the road (m)".into(),
             limits: Some((from, to)),
+            ..Axis::default()
         },
         same_y: true,
         panels,
