@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::reliance::{Plan, Results, study};
+use haptic_batch::reliance::{Plan, RelianceResults, study};
 use haptic_report::studies::reliance as files;
 
 use super::output::Output;
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     Ok(Outcome::Good)
 }
 
-fn readable(results: &Results) -> String {
+fn readable(results: &RelianceResults) -> String {
     format!(
         "Reliance read live: probe {} N.m at {} Hz, {} seeds\n\n{}\n{}\n{}",
         results.amplitude_nm,
