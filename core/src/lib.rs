@@ -116,5 +116,6 @@ pub mod probe;
 pub mod quantity;
 pub mod ramp;
 pub mod redundant;
+pub mod rejections;
 mod sine;
 pub mod stored;

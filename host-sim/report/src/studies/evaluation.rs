@@ -170,6 +170,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
         x: Axis {
             label: "Distance along the road (m)".into(),
             limits: Some((from, to)),
+            ..Axis::default()
         },
         same_y: true,
         panels,
@@ -232,7 +233,7 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
         sections.push(claims_section(results));
     }
     sections.push(Section {
-        heading: "Results".into(),
+        heading: "EvaluationResults".into(),
         blocks: vec![Block::Table(table(results))],
     });
     sections.push(Section {

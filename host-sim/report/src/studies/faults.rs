@@ -20,7 +20,7 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
     let faults = document::table_of_faults();
     write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
     let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
-                   they must keep."
+                   they must keep. A fault without a mark on the left has no deadline."
         .into();
     let mut blocks = vec![Block::Figure { figure, caption }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));

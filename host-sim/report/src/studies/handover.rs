@@ -107,7 +107,7 @@ fn figure(results: &HandoverResults) -> Figure {
     let conditions = [(Condition::High, 1), (Condition::Mid, 2)];
     let panel = |t_p: f64| {
         let mut series = vec![Series::line(
-            "most that a judged handover may cost",
+            "most that is allowed",
             0,
             vec![
                 (SPEEDS_KMH[0], results.most),
@@ -152,6 +152,7 @@ fn figure(results: &HandoverResults) -> Figure {
         x: Axis {
             label: "Speed (km/h)".into(),
             limits: Some((SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0)),
+            ..Axis::default()
         },
         same_y: true,
         panels: DRIVERS_T_P.map(panel).to_vec(),

@@ -33,6 +33,7 @@ pub(super) fn panel(
         y: Axis {
             label: "K_hg".into(),
             limits: Some((-0.5, 1.5)),
+            ..Axis::default()
         },
         series: vec![
             Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
