@@ -7,7 +7,7 @@
 
 mod builder;
 mod file;
-mod names;
+mod guidance_file;
 #[cfg(test)]
 mod tests;
 
