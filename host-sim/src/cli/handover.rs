@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::handover::{ROWS, HandoverResults, HandoverRow, study};
+use haptic_batch::handover::{HandoverResults, HandoverRow, ROWS, study};
 use haptic_report::studies::handover as files;
 
 use super::output::Output;

@@ -63,7 +63,7 @@ pub fn table(results: &SingleResults) -> Table {
         ]
     };
     let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
-    if let Some([k_hg, deviation]) = results.reliance {
+    if let Some([k_hg, deviation]) = results.k_hg {
         let name = Cell::Text("K_hg, as the ECU reads it".into());
         rows.push(vec![
             name,
