@@ -11,8 +11,20 @@
 //!
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`adapter`]: the way to a board.
 //! - [`link`]: frames as bytes.
-//! - [`judge`]: compares the answers, on its own thread. - [`stepped`]: a target for whoever judges by himself,
-//!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
+//! - [`judge`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller who compares
+//!   the answers alone and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
+//!
+//! ```
+//! use haptic_target::{Channel, PilError};
+//!
+//! // Over pipes thousands of ticks are under way at once; SLCAN is what an outside client speaks.
+//! assert_eq!("slcan".parse(), Ok(Channel::Slcan));
+//! let unknown: Result<Channel, _> = "usb".parse();
+//! assert_eq!(unknown.unwrap_err(), "channel 'usb' is neither fifo nor slcan");
+//! // What is missing says what to install or to plug in.
+//! let missing = haptic_target::parameters::Product::on("no-such-interface");
+//! assert!(matches!(missing, Err(PilError::Missing(_) | PilError::Failed(_))));
+//! ```
 //!
 //! Not here: the plant and the scenario.
 
