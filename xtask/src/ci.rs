@@ -12,6 +12,8 @@ pub(crate) fn run_all() -> Result<()> {
         ("qemu-system-arm", "qemu-system-arm"),
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
+        // For the examples of the documents.
+        ("python3", "python3"),
     ])?;
     let target_features = format!("{BOARD},gate,broken");
     let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
