@@ -12,10 +12,11 @@ pub(crate) fn run_all() -> Result<()> {
         ("qemu-system-arm", "qemu-system-arm"),
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
         // For the examples of the documents.
         ("python3", "python3"),
     ])?;
-    let target_features = format!("{BOARD},gate,broken");
+    let target_features = format!("{BOARD},gate,broken,bench");
     let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
         ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
         ("clippy", &|| {

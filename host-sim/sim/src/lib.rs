@@ -42,6 +42,7 @@ pub mod ecu_events;
 pub mod guidance;
 pub mod input;
 pub mod models;
+pub mod participants;
 mod preview;
 pub mod scenario;
 pub mod seeds;
