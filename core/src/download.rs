@@ -74,6 +74,10 @@ pub fn value(params: &Params, turn: u32) -> Option<ParameterValue> {
 
 /// The frames that carry a set. Values are rounded to f32.
 #[must_use]
+#[expect(
+    clippy::as_conversions,
+    reason = "rounded to what the bus carries, which saturates to infinity"
+)]
 pub fn frames(params: &Params) -> [Frame; VALUES] {
     let mut index = 0_u8;
     params.to_values().map(|value| {

@@ -9,6 +9,13 @@
 //! A rejected parameter is named with its value, unit and range. Not here: what the parameters decide, and ranges of
 //! their products ([`crate::config`]).
 
+#![expect(
+    clippy::as_conversions,
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    reason = "a list of constants, gone through in const functions; outside the torque path"
+)]
+
 use core::fmt;
 
 /// One parameter of the list.

@@ -51,11 +51,15 @@ enum Command {
     },
     /// Line and region coverage of the core by its tests: all of it, or exit code 1.
     Coverage,
-    /// A defect in every expression of what decides or guards a torque (needs cargo-mutants); prints those that no test
-    /// notices.
+    /// A defect in every expression of what decides or guards a torque (needs cargo-mutants); prints
+    /// those that no test notices.
     Mutants {
+        /// Only in lines that differ from this commit, branch or tag, for minutes instead of hours; then a survivor is an
+        /// error.
+        #[arg(long, value_name = "BASE")]
+        in_diff: Option<String>,
         /// Instead, the defects made by hand of core/tests/mutants.toml: exit code 1 if one is not noticed.
-        #[arg(long)]
+        #[arg(long, conflicts_with = "in_diff")]
         by_hand: bool,
     },
     /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
@@ -101,8 +105,8 @@ fn main() -> ExitCode {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
-        Command::Mutants { by_hand: true } => by_hand::run(),
-        Command::Mutants { by_hand: false } => evidence::mutants(),
+        Command::Mutants { by_hand: true, .. } => by_hand::run(),
+        Command::Mutants { in_diff, .. } => evidence::mutants(in_diff.as_deref()),
         Command::Boards { bless } => boards::check(bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),

@@ -83,7 +83,7 @@ macro_rules! messages {
 messages! {
     0x0C0 Guidance, 0x5A, 14, Ecu, 1.0;
     0x0D0 Warning, 0x66, 14, Ecu, 100.0;
-    0x100 LanePreview, 0x11, 3, Camera, 1000.0 / 120.0;
+    0x100 LanePreview, 0x11, 3, Camera, 8.333_333_333_333_334;
     0x110 Column, 0x22, 3, ColumnModule, 2.0;
     0x120 Vehicle, 0x33, 3, Host, 10.0;
     0x130 Demand, 0x44, 3, Host, 10.0;
@@ -148,10 +148,12 @@ pub trait Message: Copy {
 /// Every safety message is stale at this age.
 pub const TIMEOUT: Micros = Micros::from_ms(30);
 
+#[expect(clippy::as_conversions, reason = "two's complement, then masked to its bits")]
 const fn put(value: i64, start: u32, bits: u32) -> u64 {
     ((value as u64) & mask(bits)).wrapping_shl(start)
 }
 
+#[expect(clippy::as_conversions, reason = "masked to fewer bits than an i64 has")]
 const fn unsigned(word: u64, start: u32, bits: u32) -> i64 {
     (word.wrapping_shr(start) & mask(bits)) as i64
 }

@@ -1,6 +1,11 @@
 //! What writes parameters and says which are in use, and what tells of frames that were not used. Never the torque
 //! path's.
 
+#![expect(
+    clippy::as_conversions,
+    reason = "a code is its discriminant, and a field is masked to fewer bits than its type has"
+)]
+
 use super::{Info, Message, info, put, unsigned};
 use crate::bus::e2e::Reject;
 use crate::params::PARAMETERS;

@@ -278,6 +278,12 @@ impl Scenario {
         builder.build().map_err(|e| InputError::new(name, e))
     }
 
+    /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit.
+    pub fn to_toml(&self) -> String {
+        // Only a map whose keys are no strings cannot be written, and there is none.
+        file::write(self).unwrap_or_default()
+    }
+
     /// Whether what is to happen in mid-drive happens before the run ends.
     ///
     /// # Errors

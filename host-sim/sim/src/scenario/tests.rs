@@ -223,3 +223,37 @@ fn a_course_with_less_than_a_second_to_drive_is_refused() {
     );
     assert_eq!(short(33.4), Ok(()));
 }
+
+/// What a result holds of its scenario is enough to run it again.
+#[test]
+fn a_scenario_written_and_read_again_is_the_same() {
+    let course = "lane_width = 3.1\n[[segment]]\nlength = 150.5\n\
+                  [[segment]]\nlength = 1000\ncurvature_start = 0.0\ncurvature_end = -0.00123456789012345\n";
+    let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed = 71.3\nseed = 7\n\
+                  [driver]\nt_p = 0.1234567890123\nK_d = 3.21\nremnant_sd = 0.1\n\
+                  [guidance]\na2 = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
+                  [driver_change]\ntime = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm = 1234.5\n";
+    for text in ["", "condition = 'manual'", others] {
+        let load = |name: &str| Course::from_toml(name, course);
+        let scenario = Scenario::from_toml("s.toml", text, load).unwrap();
+        let written = scenario.to_toml();
+        let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+        assert_eq!(
+            Scenario::from_toml("again.toml", &written, none).unwrap(),
+            scenario,
+            "{written}"
+        );
+    }
+}
+
+#[test]
+fn a_bad_course_within_a_scenario_is_refused_like_one_in_a_file() {
+    let text = "[course]\nname = 'mine'\nlane_width = 3\n\
+                [[course.segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.5\n";
+    let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+    let error = Scenario::from_toml("s.toml", text, none).unwrap_err().to_string();
+    assert!(
+        error.contains("s.toml") && error.contains("segment 1: curvature_end = 0.5"),
+        "{error}"
+    );
+}
