@@ -13,6 +13,8 @@ pub(crate) fn run_all() -> Result<()> {
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        // For the examples of the documents.
+        ("python3", "python3"),
     ])?;
     let target_features = format!("{BOARD},gate,broken,bench");
     let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [

@@ -96,11 +96,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })
 }
 
+/// What a reader of the table cannot guess.
+const LEGEND: &str = "t_p: the driver's delay. condition: how much the driver relies on the guidance.
+failure: nothing, the guidance torque lost at once, or its input lost and handed over.
+e: lateral error. T_h: torque of the guidance. T_d: torque of the driver.";
+
 fn readable(evaluation: &Evaluation) -> String {
     let results = &evaluation.results;
     let [from, to] = results.window_m;
     let mut text = format!(
-        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}",
+        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}\n{LEGEND}\n",
         results.course,
         results.speed_kmh,
         from,

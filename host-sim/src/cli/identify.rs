@@ -21,14 +21,15 @@ pub(super) struct Arguments {
     /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
-    /// A drive without guidance: there is no K_hg, and guidance_torque_nm may be missing
+    /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
+    /// missing
     #[arg(long)]
     manual: bool,
     /// Prediction errors with a disturbance model, or the published way
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
     /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms);
-    /// may be repeated
+    /// may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
     /// Let the identified driver drive this course (TOML, or paper-course)

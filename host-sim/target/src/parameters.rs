@@ -19,12 +19,12 @@ use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::Speed;
 
 use super::adapter::{self, Adapter};
-use super::answers::pump;
 use super::link::{self, Decoder};
+use super::responses::pump;
 use super::{Channel, PilError};
 
 /// Longest wait for a status, which comes every second, and a start takes less than another.
-const PATIENCE: Duration = Duration::from_secs(5);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Statuses after a set was sent: its storing and the start take less than these seconds.
 const STATUSES: usize = 5;
 /// The parameters in use come one every 100 ms, and a frame may be lost.
@@ -154,7 +154,7 @@ impl Product {
 
     /// The next status, and the mode of the last torque frame before it.
     fn status_and_mode(&mut self) -> Result<(ParameterStatus, Mode), PilError> {
-        let until = Instant::now() + PATIENCE;
+        let until = Instant::now() + REPLY_TIMEOUT;
         let mut mode = None;
         while Instant::now() < until {
             let Some(frame) = self.frame()? else {
@@ -182,7 +182,7 @@ impl Product {
         Err(PilError::Failed(format!(
             "no ECU told of its parameters for {} s: does it run steering-ecu, is the bus terminated, and do adapter \
              and ECU both run at 500 kbit/s?",
-            PATIENCE.as_secs()
+            REPLY_TIMEOUT.as_secs()
         )))
     }
 

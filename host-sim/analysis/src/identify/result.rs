@@ -211,8 +211,10 @@ pub struct Correlation {
 impl Correlation {
     /// Of the `free` parameters that have a name, from the covariance of the errors.
     pub(crate) fn new(names: &[Option<&'static str>], errors: &DMatrix<f64>, free: &[usize]) -> Self {
-        let shown: Vec<(usize, &'static str)> =
-            free.iter().filter_map(|&i| names.get(i).copied().flatten().map(|n| (i, n))).collect();
+        let shown: Vec<(usize, &'static str)> = free
+            .iter()
+            .filter_map(|&i| names.get(i).copied().flatten().map(|n| (i, n)))
+            .collect();
         let entry = |i: usize, j: usize| {
             let c = errors[(i, j)] / (errors[(i, i)] * errors[(j, j)]).sqrt();
             c.is_finite()

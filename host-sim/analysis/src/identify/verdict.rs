@@ -127,7 +127,8 @@ pub(crate) fn of_residuals(white: &Whiteness, inputs: &[InputCorrelation]) -> Ve
                 "the prediction errors are not white: autocorrelation {:.3}",
                 white.largest_autocorrelation
             ),
-            cause: "a part of the drive is no driving, a sensor filters, or the driver is another one".to_owned(),
+            cause: "a part of the drive is no driving, a sensor filters, or the driver is another one"
+                .to_owned(),
             cure: "look at the residuals over time; leave out stretches with --from and --to".to_owned(),
         });
     }
@@ -138,7 +139,10 @@ pub(crate) fn of_residuals(white: &Whiteness, inputs: &[InputCorrelation]) -> Ve
                 "the prediction errors hold more of {}: {:.1} standard deviations",
                 test.input, test.largest_z
             ),
-            cause: format!("{} is late, filtered or at another scale, or the driver is another one", test.input),
+            cause: format!(
+                "{} is late, filtered or at another scale, or the driver is another one",
+                test.input
+            ),
             cure: "--estimate t_nms, k_nms, t_h_late or t_d_late".to_owned(),
         });
     }

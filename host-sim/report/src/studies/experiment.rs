@@ -138,6 +138,7 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         x: Axis {
             label: "Participant".into(),
             limits: Some((ends[0], ends[1])),
+            whole: true,
         },
         panels: panels.to_vec(),
         same_y: true,
@@ -159,7 +160,10 @@ fn estimates(experiment: &Experiment) -> Figure {
         Some((f64::from(d.participant) + ASIDE, k_hg.optimum?))
     });
     Figure {
-        x: Axis::of("Participant"),
+        x: Axis {
+            whole: true,
+            ..Axis::of("Participant")
+        },
         panels: vec![Panel {
             title: String::new(),
             y: Axis::of("K_hg"),

@@ -33,9 +33,9 @@ pub(super) fn parse(
         CourseField::Whole(inline) => inline.checked(name)?,
     };
     let DriverFile {
-        a1,
-        a2,
-        a3,
+        a_1,
+        a_2,
+        a_3,
         t_p,
         t_n,
         t_f,
@@ -56,9 +56,9 @@ pub(super) fn parse(
         .speed_kmh(file.speed)
         .condition(file.condition)
         .driver(DriverParameters {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -72,10 +72,10 @@ pub(super) fn parse(
         .guidance(GuidanceParameters {
             controller: Params {
                 k_1: g.k_1,
-                a_1: g.a1,
-                a_2: g.a2,
-                a_3: g.a3,
-                a_4: g.a4,
+                a_1: g.a_1,
+                a_2: g.a_2,
+                a_3: g.a_3,
+                a_4: g.a_4,
                 rate_corner_hz: g.rate_corner_hz,
                 torque_limit_nm: g.torque_limit_nm,
                 wind_up_nm_per_s: g.wind_up_nm_per_s,
@@ -132,9 +132,9 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         sensors: *sensors,
         seed: *seed,
         driver: DriverFile {
-            a1: d.a1,
-            a2: d.a2,
-            a3: d.a3,
+            a_1: d.a_1,
+            a_2: d.a_2,
+            a_3: d.a_3,
             t_p: d.t_p,
             t_n: d.t_n,
             t_f: d.t_f,
@@ -148,10 +148,10 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         vehicle: *vehicle,
         guidance: GuidanceFile {
             k_1: c.k_1,
-            a1: c.a_1,
-            a2: c.a_2,
-            a3: c.a_3,
-            a4: c.a_4,
+            a_1: c.a_1,
+            a_2: c.a_2,
+            a_3: c.a_3,
+            a_4: c.a_4,
             t_n: guidance.t_n,
             t_f: guidance.t_f,
             rate_corner_hz: c.rate_corner_hz,
@@ -262,9 +262,12 @@ impl Default for ScenarioFile {
 #[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct DriverFile {
-    a1: f64,
-    a2: f64,
-    a3: f64,
+    #[serde(alias = "a1")]
+    a_1: f64,
+    #[serde(alias = "a2")]
+    a_2: f64,
+    #[serde(alias = "a3")]
+    a_3: f64,
     t_p: f64,
     t_n: f64,
     t_f: f64,
@@ -282,9 +285,9 @@ struct DriverFile {
 impl Default for DriverFile {
     fn default() -> Self {
         let DriverParameters {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -294,9 +297,9 @@ impl Default for DriverFile {
             remnant_corner_hz,
         } = DriverParameters::default();
         Self {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -315,14 +318,14 @@ impl Default for DriverFile {
 struct GuidanceFile {
     #[serde(rename = "K_1", alias = "k_1")]
     k_1: f64,
-    #[serde(alias = "a_1")]
-    a1: f64,
-    #[serde(alias = "a_2")]
-    a2: f64,
-    #[serde(alias = "a_3")]
-    a3: f64,
-    #[serde(alias = "a_4")]
-    a4: f64,
+    #[serde(alias = "a1")]
+    a_1: f64,
+    #[serde(alias = "a2")]
+    a_2: f64,
+    #[serde(alias = "a3")]
+    a_3: f64,
+    #[serde(alias = "a4")]
+    a_4: f64,
     t_n: f64,
     t_f: f64,
     rate_corner_hz: f64,
@@ -346,10 +349,10 @@ impl Default for GuidanceFile {
         } = GuidanceParameters::default();
         Self {
             k_1: c.k_1,
-            a1: c.a_1,
-            a2: c.a_2,
-            a3: c.a_3,
-            a4: c.a_4,
+            a_1: c.a_1,
+            a_2: c.a_2,
+            a_3: c.a_3,
+            a_4: c.a_4,
             t_n,
             t_f,
             rate_corner_hz: c.rate_corner_hz,

@@ -96,12 +96,17 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     let [e_y, e_theta, phi, t_h, t_d] = examined;
     let named = [&e_y, &e_theta, &phi, &t_h, &t_d];
     let mut preflight = Preflight {
-        columns: COLUMNS[1..].iter().copied().zip(named.map(|e| e.faults)).collect(),
+        columns: COLUMNS[1..]
+            .iter()
+            .copied()
+            .zip(named.map(|e| e.faults))
+            .collect(),
         recorded_s: log.len() as f64 * dt,
         ..Preflight::default()
     };
     let [y, theta] = lane;
-    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed {
+    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed
+    {
         Some(s) => {
             *noise = s.noise;
             s.signal

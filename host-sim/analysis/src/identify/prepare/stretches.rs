@@ -86,7 +86,10 @@ pub(super) fn stretches(
     if !options.stretches.is_empty() {
         let asked = |k: usize| {
             let t = log.time_s(k);
-            options.stretches.iter().any(|&(from, to)| (from..=to).contains(&t))
+            options
+                .stretches
+                .iter()
+                .any(|&(from, to)| (from..=to).contains(&t))
         };
         for k in (0..n).filter(|&k| !asked(k)) {
             mark(k..k + 1, Reason::Asked);
@@ -212,7 +215,8 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
             let asked: f64 = r
                 .clone()
                 .map(|k| {
-                    let visual = super::USUAL_GAINS[1] * log.e_theta_rad[k] + super::USUAL_GAINS[0] * log.e_y_m[k]
+                    let visual = super::USUAL_GAINS[1] * log.e_theta_rad[k]
+                        + super::USUAL_GAINS[0] * log.e_y_m[k]
                         - log.wheel_angle_rad[k];
                     visual * visual
                 })

@@ -1,6 +1,6 @@
 //! What must hold in every cycle of every run, judged from the frames alone.
 //!
-//! The guard hears what the ECU hears and reads the guidance frame that it sends, both with `bytes`; its
+//! The checker hears what the ECU hears and reads the guidance frame that it sends, both with `bytes`; its
 //! arithmetic is f64, its limits are written down here a second time, and it shares no code with the core. It
 //! trusts the ECU in one thing only: which frames it accepted, since a bound on the driver's torque is a bound
 //! on the torque that the ECU has read.
@@ -72,7 +72,7 @@ fn classes_of(faults: u64) -> u64 {
 
 /// A rule that was broken.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Broken {
+pub struct Violation {
     /// Step of the run, ms.
     pub step: u32,
     /// Which rule, and by how much.
@@ -94,7 +94,7 @@ struct Ramp {
 
 /// Judges one ECU.
 #[derive(Debug, Clone)]
-pub(super) struct Guard {
+pub(super) struct InvariantChecker {
     last: Option<Last>,
     /// Whether the ECU may be Active from its first cycle on.
     starts_active: bool,
@@ -111,10 +111,10 @@ pub(super) struct Guard {
     /// Magnitudes for as long as one may be trusted, by the ECU's clock.
     outputs: VecDeque<(u32, f64)>,
     pub(super) cycles: u64,
-    pub(super) broken: Option<Broken>,
+    pub(super) violation: Option<Violation>,
 }
 
-impl Guard {
+impl InvariantChecker {
     /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active.
     pub(super) fn new(starts_active: bool, now_us: u32) -> Self {
         Self {
@@ -132,15 +132,15 @@ impl Guard {
             window: VecDeque::new(),
             outputs: VecDeque::new(),
             cycles: 0,
-            broken: None,
+            violation: None,
         }
     }
 
     /// The ECU was reset: what it knew is gone, and its torque with it.
     pub(super) fn reset(&mut self, now_us: u32) {
-        let (cycles, broken) = (self.cycles, self.broken.take());
+        let (cycles, violation) = (self.cycles, self.violation.take());
         *self = Self::new(false, now_us);
-        (self.cycles, self.broken) = (cycles, broken);
+        (self.cycles, self.violation) = (cycles, violation);
     }
 
     /// A frame that the ECU accepted.
@@ -172,8 +172,8 @@ impl Guard {
         self.cycles += 1;
         let status = Status::of(frame);
         let verdict = self.judge(world_us, now_us, frame, &status, others);
-        if let (Err(what), None) = (verdict, &self.broken) {
-            self.broken = Some(Broken { step, what });
+        if let (Err(what), None) = (verdict, &self.violation) {
+            self.violation = Some(Violation { step, what });
         }
         self.last = Some(Last {
             status,
