@@ -3,6 +3,8 @@
 //! A [`trace::Trace`] is a table of evenly spaced [`trace::Sample`]s, one channel a field, with the unit in its name. It is the
 //! truth of the simulated world, not what a sensor saw. An [`Event`] says in words what happened when.
 //!
+//! Records are written in and read from two formats: tables ([`table`], CSV) and the bus ([`candump`]).
+//!
 //! This crate knows nothing of ours, so that what reads records (metrics, identification, reports) needs no simulator.
 //!
 //! ```
@@ -22,7 +24,9 @@
 //!
 //! Not here: what a record means (`haptic-analysis`), and how it is drawn (`haptic-report`).
 
+pub mod candump;
 mod event;
+pub mod table;
 pub mod trace;
 
 pub use event::Event;
