@@ -378,6 +378,36 @@ fn every_link_leads_somewhere() {
     }
 }
 
+/// A file that a document names from the repository's root is there.
+#[test]
+fn every_file_that_is_named_is_there() {
+    let tops = [
+        "core/",
+        "firmware/",
+        "host-sim/",
+        "tests/",
+        "xtask/",
+        "docs/",
+        "examples/",
+        "bench/",
+    ];
+    for (name, text) in documents() {
+        let prose = prose(&text);
+        let code = prose.split('`').skip(1).step_by(2);
+        for word in code.flat_map(str::split_whitespace) {
+            let is_path = tops.iter().any(|top| word.starts_with(top));
+            // `firmware/src/boards/<board>.x` is a pattern.
+            if is_path && !word.contains(['<', '*']) {
+                assert!(
+                    root().join(word).exists(),
+                    "{}: {word} is not there",
+                    name.display()
+                );
+            }
+        }
+    }
+}
+
 /// Words that a reader cannot know, and a pattern is one of them where letters do not go on.
 const TERMS: [(&str, &str); 14] = [
     ("reliance", "#reliance"),

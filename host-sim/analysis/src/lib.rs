@@ -10,10 +10,10 @@
 //! use std::path::Path;
 //!
 //! let drives = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/driver-logs");
-//! let log = DriveLog::open(&drives.join("guided-probe.csv"), true)?;
+//! let log = DriveLog::open(&drives.join("guided-passive.csv"), false)?;
 //! let found = identify_with_noise_model(&log, &Options::default());
-//! // The drive was recorded with the probe on, which is what K_hg can be read from.
-//! assert!(found.parameters.k_hg.identified);
+//! // The drive was recorded without a probe, so its torque does not tell K_hg.
+//! assert!(!found.parameters.k_hg.identified);
 //! // The torque tells (K_d + K_nms) * a_i, never K_d alone.
 //! assert!(found.parameters.k_d.estimate.is_none());
 //! # Ok::<(), haptic_analysis::identify::LogError>(())

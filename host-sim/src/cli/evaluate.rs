@@ -97,9 +97,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
 }
 
 /// What a reader of the table cannot guess.
-const LEGEND: &str = "t_p: the driver's delay. condition: how much the driver relies on the guidance.
-failure: nothing, the guidance torque lost at once, or its input lost and handed over.
-e: lateral error. T_h: torque of the guidance. T_d: torque of the driver.";
+const LEGEND: &str = "t_p: the driver's delay. Condition: how much the driver relies on the guidance.
+Failure: none, the guidance torque lost at once, or its input lost and the torque handed over.";
 
 fn readable(evaluation: &Evaluation) -> String {
     let results = &evaluation.results;
