@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use host_sim::identify::{Identification, Options, open_recording};
 use host_sim::input::in_range;
-use host_sim::models::road::Course;
 use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
 
 use super::output::Output;
+use super::road::CourseArguments;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json};
 
@@ -32,9 +32,8 @@ pub(super) struct Arguments {
     /// may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
-    /// Let the identified driver drive this course (TOML, or paper-course)
-    #[arg(long, value_name = "FILE")]
-    course: Option<PathBuf>,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Speed on that course, km/h (20 to 250)
     #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
     speed: f64,
@@ -59,14 +58,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::Paper => Method::Paper,
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
+    let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
     let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
     let name = arguments.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, note.map(String::from));
-    if let Some(path) = &arguments.course {
-        drive.drive_again(Course::open(path)?, arguments.speed, &options)?;
+    if let Some(course) = course {
+        drive.drive_again(course, arguments.speed, &options)?;
     }
     output.finish(|place| drive.write(place))?;
     if arguments.json {

@@ -9,6 +9,7 @@ use host_sim::scenario::Scenario;
 use host_sim::studies::run::{SingleRun, run as simulate};
 
 use super::output::Output;
+use super::road::CourseArguments;
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, print_notes};
 
@@ -17,6 +18,8 @@ pub(super) struct Arguments {
     /// Scenario file (TOML); every field has a default (docs/files.md lists them, examples/ has some)
     #[arg(value_name = "SCENARIO.toml")]
     scenario: PathBuf,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Directory for a figure, the time series, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -30,7 +33,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let scenario = Scenario::load(&arguments.scenario)?;
+    let mut scenario = Scenario::load(&arguments.scenario)?;
+    match arguments.course.open()? {
+        Some(course) => scenario.course = course,
+        None => print_notes(scenario.course.notes()),
+    }
     let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let single = simulate(scenario, arguments.bus_log)
         .map_err(|e| InputError::new(arguments.scenario.display(), e))?;

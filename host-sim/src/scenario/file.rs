@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, Sensors};
 use crate::input::{InputError, parse_toml};
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::{Course, PAPER_COURSE};
+use crate::models::road::{Course, LaneChoice, PAPER_COURSE};
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario, unchecked but for its course.
@@ -22,10 +22,15 @@ pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Scenario, I
         }
         error
     })?;
+    let choice = LaneChoice {
+        road: file.road.clone(),
+        lane: file.lane,
+    };
     let course = if file.course == Path::new(PAPER_COURSE) {
+        choice.check_none(PAPER_COURSE)?;
         Course::paper()
     } else {
-        Course::load(&folder.join(&file.course))?
+        Course::load(&folder.join(&file.course), &choice)?
     };
     let DriverFile {
         a1,
@@ -106,6 +111,8 @@ pub(super) fn parse(name: &str, text: &str, folder: &Path) -> Result<Scenario, I
 #[serde(default, deny_unknown_fields)]
 struct ScenarioFile {
     course: PathBuf,
+    road: Option<String>,
+    lane: Option<i32>,
     speed: f64,
     condition: Condition,
     sensors: Sensors,
@@ -121,6 +128,8 @@ impl Default for ScenarioFile {
     fn default() -> Self {
         Self {
             course: PAPER_COURSE.into(),
+            road: None,
+            lane: None,
             speed: DEFAULT_SPEED_KMH,
             condition: Condition::Mid,
             sensors: Sensors::default(),

@@ -6,6 +6,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //! - [`processor`]: one scenario with the ECU's image in QEMU beside the host's.
@@ -14,6 +15,7 @@
 
 pub mod bus_load;
 pub mod claims;
+pub mod course;
 mod curves;
 pub mod evaluate;
 mod evaluation_files;

@@ -1,13 +1,18 @@
-//! A course as a person writes it: segments of linearly varying curvature, and a lane width.
+//! A course as a person writes it: segments of linearly varying curvature, bank and grade, and a lane width; or
+//! a lane of an OpenDRIVE file.
 //!
 //! As TOML: `lane_width = 3.6` (m) and `[[segment]]` tables with `length` (m) and either `curvature` (1/m,
-//! left positive, default 0) or both `curvature_start` and `curvature_end`. Curvature may jump between
-//! segments (an arc without a clothoid); heading never does.
+//! left positive, default 0) or both `curvature_start` and `curvature_end`; in the same way `bank` (rad, positive
+//! where the left edge is the higher one) and `grade` (rise per distance). All may jump between segments (an arc
+//! without a clothoid); heading never does.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use serde::Deserialize;
 
+use super::opendrive::{self, LaneChoice, RoadUsed};
+use super::piece::Piece;
 use crate::input::{InputError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
@@ -21,9 +26,13 @@ const MAX_COURSE_M: f64 = 200_000.0;
 /// Lane widths of roads, m. The lower end clears the vehicle's 1.7 m.
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=10.0;
 const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
+/// Banks of a course file, rad: far beyond the 8 % of public roads.
+const BANK_RAD: std::ops::RangeInclusive<f64> = -0.3..=0.3;
+/// Grades of a course file.
+const GRADE: std::ops::RangeInclusive<f64> = -0.3..=0.3;
 
-/// A piece of road whose curvature is linear in arc length.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A part of a road whose curvature, bank and grade are linear in arc length.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Segment {
     /// Arc length, m.
     pub length_m: f64,
@@ -31,6 +40,10 @@ pub struct Segment {
     pub curvature_start_1pm: f64,
     /// Curvature at the end, 1/m, left positive.
     pub curvature_end_1pm: f64,
+    /// Bank at the start and at the end, rad, positive where the left edge is the higher one.
+    pub bank_rad: [f64; 2],
+    /// Rise per distance at the start and at the end, positive uphill.
+    pub grade: [f64; 2],
 }
 
 /// A checked course: every segment finite, within range, and at least one of them.
@@ -39,6 +52,10 @@ pub struct Course {
     name: String,
     lane_width_m: f64,
     segments: Vec<Segment>,
+    /// The lane's centre in fine pieces where segments are only a summary of it.
+    pieces: Option<Arc<[Piece]>>,
+    roads: Vec<RoadUsed>,
+    notes: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -57,6 +74,12 @@ struct SegmentFile {
     curvature: Option<f64>,
     curvature_start: Option<f64>,
     curvature_end: Option<f64>,
+    bank: Option<f64>,
+    bank_start: Option<f64>,
+    bank_end: Option<f64>,
+    grade: Option<f64>,
+    grade_start: Option<f64>,
+    grade_end: Option<f64>,
 }
 
 fn default_lane_width() -> f64 {
@@ -71,25 +94,25 @@ impl Course {
     pub fn paper() -> Self {
         let straight = |length_m| Segment {
             length_m,
-            curvature_start_1pm: 0.0,
-            curvature_end_1pm: 0.0,
+            ..Segment::default()
         };
         let curve = |curvature_1pm: f64, clothoid_m, arc_m| {
             [
                 Segment {
                     length_m: clothoid_m,
-                    curvature_start_1pm: 0.0,
                     curvature_end_1pm: curvature_1pm,
+                    ..Segment::default()
                 },
                 Segment {
                     length_m: arc_m,
                     curvature_start_1pm: curvature_1pm,
                     curvature_end_1pm: curvature_1pm,
+                    ..Segment::default()
                 },
                 Segment {
                     length_m: clothoid_m,
                     curvature_start_1pm: curvature_1pm,
-                    curvature_end_1pm: 0.0,
+                    ..Segment::default()
                 },
             ]
         };
@@ -100,31 +123,75 @@ impl Course {
         segments.push(straight(200.0));
         segments.extend(curve(1.0 / 600.0, 100.0, 400.0));
         segments.push(straight(400.0));
+        Self::of_segments(PAPER_COURSE, DEFAULT_LANE_WIDTH_M, segments)
+    }
+
+    pub(super) fn of_segments(name: &str, lane_width_m: f64, segments: Vec<Segment>) -> Self {
         Self {
-            name: PAPER_COURSE.into(),
-            lane_width_m: DEFAULT_LANE_WIDTH_M,
+            name: name.into(),
+            lane_width_m,
             segments,
+            pieces: None,
+            roads: Vec::new(),
+            notes: Vec::new(),
         }
+    }
+
+    /// A lane's centre in fine pieces; `segments` sum it up for pictures.
+    pub(super) fn of_pieces(name: &str, pieces: Vec<Piece>, segments: Vec<Segment>) -> Self {
+        let narrowest = pieces.iter().flat_map(|p| p.width_m).fold(f64::INFINITY, f64::min);
+        Self {
+            pieces: Some(pieces.into()),
+            ..Self::of_segments(name, narrowest, segments)
+        }
+    }
+
+    pub(super) fn from_roads(self, roads: Vec<RoadUsed>, notes: Vec<String>) -> Self {
+        Self { roads, notes, ..self }
     }
 
     /// The built-in course if `path` is its name, else as [`Course::load`].
     ///
     /// # Errors
     /// As [`Course::load`].
-    pub fn open(path: &Path) -> Result<Self, InputError> {
+    pub fn open(path: &Path, choice: &LaneChoice) -> Result<Self, InputError> {
         if path == Path::new(PAPER_COURSE) {
+            choice.check_none(PAPER_COURSE)?;
             return Ok(Self::paper());
         }
-        Self::load(path)
+        Self::load(path, choice)
     }
 
-    /// Reads and checks a course file.
+    /// Reads and checks a course file: OpenDRIVE if its name ends with `.xodr`, else TOML.
     ///
     /// # Errors
     /// An unreadable file, a syntax error (with its line), an unknown field (by name), a value out of range
-    /// (by segment, field, value and range).
-    pub fn load(path: &Path) -> Result<Self, InputError> {
-        Self::from_toml(&path.display().to_string(), &crate::input::read(path)?)
+    /// (by segment, field, value and range), a road or lane chosen that is not there.
+    pub fn load(path: &Path, choice: &LaneChoice) -> Result<Self, InputError> {
+        let name = path.display().to_string();
+        if path.extension().is_some_and(|x| x.eq_ignore_ascii_case("xodr")) {
+            let bytes = std::fs::read(path).map_err(|e| InputError::new(&name, e))?;
+            return Self::from_opendrive(&name, &String::from_utf8_lossy(&bytes), choice);
+        }
+        choice.check_none(&name)?;
+        Self::from_toml(&name, &crate::input::read(path)?)
+    }
+
+    /// A lane of an OpenDRIVE file's text; `name` stands for the file in errors and results.
+    ///
+    /// # Errors
+    /// What is broken, missing or not supported, by road and element.
+    pub fn from_opendrive(name: &str, text: &str, choice: &LaneChoice) -> Result<Self, InputError> {
+        let fail = |e: String| InputError::new(name, e);
+        let course = opendrive::read(name, text, choice).map_err(fail)?;
+        let length_m = course.length_m();
+        in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(fail)?;
+        Ok(course)
+    }
+
+    /// The course as the text of an OpenDRIVE file.
+    pub fn to_opendrive(&self) -> String {
+        opendrive::write(self)
     }
 
     /// Checks the text of a course file; `name` stands for the file in errors and results.
@@ -146,11 +213,7 @@ impl Course {
                     .map_err(|e| fail(format!("segment {}: {e}", i + 1)))?,
             );
         }
-        let course = Self {
-            name: name.into(),
-            lane_width_m: file.lane_width,
-            segments,
-        };
+        let course = Self::of_segments(name, file.lane_width, segments);
         in_range(
             "course length",
             course.length_m(),
@@ -166,44 +229,84 @@ impl Course {
         &self.name
     }
 
-    /// Width of the lane whose middle is the centreline, m.
+    /// Width of the lane whose middle is the centreline, m; the least one where it varies.
     pub fn lane_width_m(&self) -> f64 {
         self.lane_width_m
     }
 
-    /// The segments, in order of arc length.
+    /// The segments, in order of arc length. Of a lane of an OpenDRIVE file that is not made of straights, arcs
+    /// and clothoids they are a summary, one a geometry element.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
+    pub(super) fn pieces(&self) -> Option<&[Piece]> {
+        self.pieces.as_deref()
+    }
+
+    /// The roads of the OpenDRIVE file that the course came from, in order of driving.
+    pub fn roads(&self) -> &[RoadUsed] {
+        &self.roads
+    }
+
+    /// What was decided for the reader of an OpenDRIVE file, in sentences.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// Arc length of the whole centreline, m.
     pub fn length_m(&self) -> f64 {
-        self.segments.iter().map(|s| s.length_m).sum()
+        match &self.pieces {
+            Some(pieces) => pieces.iter().map(|piece| piece.length_m).sum(),
+            None => self.segments.iter().map(|s| s.length_m).sum(),
+        }
+    }
+
+    /// Whether any part of the course is banked or climbs.
+    pub fn is_flat(&self) -> bool {
+        match &self.pieces {
+            Some(pieces) => pieces.iter().all(|p| p.bank_rad == [0.0; 2] && p.grade == [0.0; 2]),
+            None => self.segments.iter().all(|s| s.bank_rad == [0.0; 2] && s.grade == [0.0; 2]),
+        }
+    }
+}
+
+/// A quantity of a segment: `NAME` for all of it, or `NAME_start` and `NAME_end`.
+fn ends(
+    name: &str,
+    unit: &str,
+    range: std::ops::RangeInclusive<f64>,
+    [constant, start, end]: [Option<f64>; 3],
+) -> Result<[f64; 2], String> {
+    match (constant, start, end) {
+        (None, None, None) => Ok([0.0; 2]),
+        (Some(value), None, None) => in_range(name, value, range, unit).map(|()| [value; 2]),
+        (None, Some(start), Some(end)) => {
+            in_range(&format!("{name}_start"), start, range.clone(), unit)?;
+            in_range(&format!("{name}_end"), end, range, unit)?;
+            Ok([start, end])
+        }
+        (Some(_), _, _) => Err(format!(
+            "give either `{name}` or `{name}_start` and `{name}_end`, not both"
+        )),
+        (None, ..) => Err(format!("`{name}_start` and `{name}_end` go together")),
     }
 }
 
 impl SegmentFile {
     fn checked(&self) -> Result<Segment, String> {
         in_range("length", self.length, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
-        let (start, end) = match (self.curvature, self.curvature_start, self.curvature_end) {
-            (constant, None, None) => (constant.unwrap_or(0.0), constant.unwrap_or(0.0)),
-            (None, Some(start), Some(end)) => (start, end),
-            (Some(_), _, _) => {
-                return Err(
-                    "give either `curvature` or `curvature_start` and `curvature_end`, not both".into(),
-                );
-            }
-            (None, ..) => return Err("`curvature_start` and `curvature_end` go together".into()),
-        };
+        let curvature = [self.curvature, self.curvature_start, self.curvature_end];
         let range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
-        let constant = self.curvature.is_some();
-        let name = |ramp| if constant { "curvature" } else { ramp };
-        in_range(name("curvature_start"), start, range.clone(), "1/m")?;
-        in_range(name("curvature_end"), end, range, "1/m")?;
+        let [start, end] = ends("curvature", "1/m", range, curvature)?;
+        let bank = [self.bank, self.bank_start, self.bank_end];
+        let grade = [self.grade, self.grade_start, self.grade_end];
         Ok(Segment {
             length_m: self.length,
             curvature_start_1pm: start,
             curvature_end_1pm: end,
+            bank_rad: ends("bank", "rad", BANK_RAD, bank)?,
+            grade: ends("grade", "", GRADE, grade)?,
         })
     }
 }
@@ -293,7 +396,8 @@ mod tests {
                 "{text:?} gave {error:?}, not {expected:?}"
             );
         }
-        let missing = Course::load(Path::new("no-such.toml")).unwrap_err().to_string();
+        let missing = Course::load(Path::new("no-such.toml"), &LaneChoice::default());
+        let missing = missing.unwrap_err().to_string();
         assert!(missing.starts_with("no-such.toml: "), "{missing}");
     }
 }
