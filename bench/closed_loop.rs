@@ -6,9 +6,9 @@
 
 use std::time::Instant;
 
-use host_sim::closed_loop::{Run, simulate};
-use host_sim::models::road::Centreline;
-use host_sim::scenario::Scenario;
+use haptic_sim::closed_loop::{Run, simulate};
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::Scenario;
 
 /// One run. A function of its own so that callgrind can count what is below it.
 #[inline(never)]

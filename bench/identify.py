@@ -2,7 +2,7 @@
 
     python3 bench/identify.py LOG.csv
 
-The problem is that of host-sim/src/identify/noise_model.rs, written as a researcher writes it: a residual function in
+The problem is that of host-sim/analysis/src/identify/noise_model, written as a researcher writes it: a residual function in
 NumPy (the lag by lfilter, the delay by interpolation, the disturbance by lfilter), given to
 scipy.optimize.least_squares with its default finite differences. Prints one JSON object. Needs numpy and scipy, and
 builds the workbench by cargo. Exit code 1: the two do not reach the same loss or K_hg.

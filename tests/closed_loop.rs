@@ -7,10 +7,10 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Column, Guidance, LanePreview, Message};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
-use host_sim::closed_loop::{Cycle, Run, drive, observe, simulate};
-use host_sim::guidance::FloatLaw;
-use host_sim::models::road::{Centreline, Course, LaneChoice};
-use host_sim::scenario::{Condition, FailureKind, Scenario, Sensors};
+use haptic_sim::closed_loop::{Cycle, Run, drive, observe, simulate};
+use haptic_sim::guidance::FloatLaw;
+use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::scenario::{Condition, FailureKind, Scenario, Sensors};
 
 fn scenario(condition: Condition, t_p: f64, sensors: Sensors) -> Scenario {
     let mut scenario = Scenario {
@@ -119,7 +119,7 @@ fn whole_curves_are_those_of_an_independent_program() {
 #[test]
 fn on_a_second_course_the_shipping_controller_drives_as_a_float_one() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/country-road.toml");
-    let course = Course::load(&path, &LaneChoice::default()).unwrap();
+    let course = haptic_batch::files::load_course(&path).unwrap();
     let line = Centreline::new(&course);
     for t_p in [0.1, 0.3, 0.5] {
         for condition in [Condition::High, Condition::Mid, Condition::Low] {

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use host_sim::faults::table::{Place, Row, rows};
-use host_sim::faults::{World, campaign, document};
+use haptic_campaign::table::{Place, Row, rows};
+use haptic_campaign::{World, campaign, document};
 
 #[test]
 fn every_fault_with_a_few_seeds_breaks_no_rule() {

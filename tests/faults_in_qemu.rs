@@ -1,8 +1,8 @@
 //! The rows of the fault campaign that a target has to show as well, with one seed each; bits flip in its memory.
 //! More of them: `host-sim faults --target --seeds 20`.
 
-use host_sim::faults::table::{Class, Place, Row, rows};
-use host_sim::faults::{World, target};
+use haptic_campaign::table::{Class, Place, Row, rows};
+use haptic_campaign::{World, target};
 
 #[test]
 fn the_image_survives_what_the_host_survives() {

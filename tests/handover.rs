@@ -1,10 +1,10 @@
 //! A failed input is no failed guidance: the ECU that hands over its last trusted torque within 2 s, against
 //! published figures of an independent float64 model that does the same, and against the sudden loss.
 
-use host_sim::closed_loop::simulate;
-use host_sim::models::driver::DriverParameters;
-use host_sim::models::road::{Centreline, Course};
-use host_sim::scenario::{Condition, Failure, FailureKind, Scenario};
+use haptic_sim::closed_loop::simulate;
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario};
 
 /// Peak lateral error in the first curve of the paper's course, with a failure at 70 s.
 fn peak_m(line: &Centreline, t_p: f64, kind: FailureKind) -> f64 {
@@ -20,7 +20,7 @@ fn peak_m(line: &Centreline, t_p: f64, kind: FailureKind) -> f64 {
     };
     let run = simulate(&scenario, line).unwrap();
     assert!(!run.diverged());
-    let in_curve = |s: &&host_sim::trace::Sample| (1080.0..=1740.0).contains(&s.s_m);
+    let in_curve = |s: &&haptic_log::trace::Sample| (1080.0..=1740.0).contains(&s.s_m);
     let errors = run.trace.samples.iter().filter(in_curve);
     errors.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max)
 }

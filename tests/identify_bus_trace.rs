@@ -6,11 +6,11 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use host_sim::closed_loop::{self, Cycle};
-use host_sim::identify::{Options, identify_with_noise_model, open_recording};
-use host_sim::models::driver::{ArmGains, DriverParameters};
-use host_sim::models::road::Centreline;
-use host_sim::scenario::{Condition, Scenario};
+use haptic_analysis::identify::{Options, identify_with_noise_model, open_recording};
+use haptic_sim::closed_loop::{self, Cycle};
+use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::{Condition, Scenario};
 
 /// What candump would have written, and the driver's e_theta at each millisecond.
 static DRIVE: LazyLock<(String, Vec<f64>)> = LazyLock::new(|| {
@@ -51,7 +51,7 @@ fn record(scenario: &Scenario) -> (String, Vec<f64>) {
 fn open(
     text: &str,
     dbc: Option<&str>,
-) -> Result<(host_sim::identify::DriveLog, Option<&'static str>), String> {
+) -> Result<(haptic_analysis::identify::DriveLog, Option<&'static str>), String> {
     let directory = tempfile::tempdir().unwrap();
     let [trace, dbc_file] = ["trace.log", "mine.dbc"].map(|name| directory.path().join(name));
     std::fs::write(&trace, text).unwrap();

@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use host_sim::identify::{DriveLog, Identification, Options};
-use host_sim::studies::identify::{Method, identify};
+use haptic_analysis::identify::{DriveLog, Identification, Options};
+use haptic_batch::identify::{Method, identify};
 
 /// Noise between -0.5 and 0.5 from a linear congruential generator (Knuth's MMIX constants).
 fn noise(seed: u64) -> impl FnMut() -> f64 {

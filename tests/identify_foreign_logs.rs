@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use host_sim::identify::{
+use haptic_analysis::identify::{
     DriveLog, Identification, Options, Parameter, identify_as_published, identify_with_noise_model,
 };
 use serde_json::Value;

@@ -1,12 +1,12 @@
 //! The fourteen participants as drivers with a known truth: what the identification must find, what it must
 //! refuse, and whether its standard errors are right.
 
-use host_sim::closed_loop::{self, Cycle};
-use host_sim::identify::{Identification, Options, Parameter, identify_with_noise_model};
-use host_sim::models::driver::{ArmGains, DriverParameters};
-use host_sim::models::road::{Centreline, Course};
-use host_sim::scenario::{Condition, Scenario, Sensors};
-use host_sim::studies::experiment::{Plan, PublishedDriver, Recorder, experiment, participants, repeat};
+use haptic_analysis::identify::{Identification, Options, Parameter, identify_with_noise_model};
+use haptic_batch::experiment::{Plan, PublishedDriver, Recorder, experiment, participants, repeat};
+use haptic_sim::closed_loop::{self, Cycle};
+use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::scenario::{Condition, Scenario, Sensors};
 use rayon::prelude::*;
 
 /// One guided drive with a probe, without remnant, logged exactly.
@@ -131,10 +131,9 @@ fn without_a_probe_k_hg_is_not_identified() {
         );
         assert!(k_hg.standard_error.unwrap() > 0.15, "{}", drive.participant);
     }
-    let on_bound =
-        |d: &&&host_sim::studies::experiment::Drive| d.paper.identification.parameters.k_hg.on_bound;
+    let on_bound = |d: &&&haptic_batch::experiment::Drive| d.paper.identification.parameters.k_hg.on_bound;
     assert!(guided.iter().filter(on_bound).count() >= 10);
-    let mean_fit = |drives: &[&host_sim::studies::experiment::Drive]| {
+    let mean_fit = |drives: &[&haptic_batch::experiment::Drive]| {
         drives
             .iter()
             .map(|d| d.paper.identification.fit_percent)

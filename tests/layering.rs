@@ -1,7 +1,7 @@
 //! The arrows of docs/design.md, checked on the sources: who may import whom.
 //!
-//! For each crate a table names, for every module, the modules that it may use; an arrow that is not in the
-//! table fails, and so does one in the table that nobody uses any more. Imports are read from the text, without
+//! Between crates Cargo holds them, and a table here the manifests. Inside core a table names, for every module, the
+//! modules that it may use; an arrow that is not in the table fails, and so does one that nobody uses any more. Imports are read from the text, without
 //! comments: `crate::a`, groups such as `crate::{a::b, c}`, and `super::` chains that reach the crate's root.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -36,31 +36,27 @@ const CORE: Arrows = &[
     ("stored", &["params"]),
 ];
 
-/// Models know nothing of the controller or of studies, studies nothing of the command line.
+/// Which of our packages each package of the workspace may depend on, without its tests.
 #[rustfmt::skip]
-const HOST_SIM: Arrows = &[
-    ("closed_loop", &["guidance", "models", "scenario", "trace"]),
-    ("ecu_events", &["closed_loop", "models", "report"]),
-    ("faults", &["closed_loop", "ecu_events", "guidance", "models", "pil", "report", "scenario"]),
-    ("guidance", &["models"]),
-    // The vehicle, for what the bus does not carry.
-    ("identify", &["models"]),
-    ("metrics", &["trace"]),
-    ("models", &["input"]),
-    ("plot", &["trace"]),
-    ("report", &["metrics", "plot", "trace"]),
-    ("scenario", &["input", "models"]),
-    ("studies", &["closed_loop", "ecu_events", "guidance", "identify", "input", "metrics", "models", "pil", "plot", "report", "scenario", "trace"]),
+const PACKAGES: Arrows = &[
+    ("core", &[]),
+    ("firmware", &["haptic-core"]),
+    ("host-sim/log", &[]),
+    ("host-sim/sim", &["haptic-core", "haptic-log"]),
+    ("host-sim/analysis", &["haptic-log"]),
+    ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
+    ("host-sim/target", &["haptic-core"]),
+    ("host-sim/campaign", &["haptic-core", "haptic-log", "haptic-sim", "haptic-target"]),
+    ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
 ];
+
+/// What the simulator may not touch: it runs in a browser and in somebody else's process.
+const NOT_IN_SIM: [&str; 6] = ["fs", "thread", "time", "env", "process", "net"];
 
 /// Parts of a crate that may not use something from outside it.
 const OUTSIDERS: &[(&str, &[&str])] = &[
-    ("core/src", &["host_sim", "haptic_firmware", "std", "alloc"]),
-    ("firmware/src", &["host_sim"]),
-    ("host-sim/src", &["haptic_firmware"]),
-    ("host-sim/src/models", &["haptic_core"]),
-    ("host-sim/src/metrics", &["haptic_core"]),
-    ("host-sim/src/plot", &["haptic_core"]),
+    ("core/src", &["std", "alloc"]),
+    ("host-sim/sim/src/models", &["haptic_core"]),
 ];
 
 /// The command line's own: nothing beside `cli` uses them.
@@ -71,16 +67,21 @@ fn root() -> &'static Path {
 }
 
 fn sources(dir: &Path) -> Vec<PathBuf> {
+    let found = sources_below(dir);
+    assert!(!found.is_empty(), "no sources in {}", dir.display());
+    found
+}
+
+fn sources_below(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(dir).unwrap_or_else(|e| panic!("{}: {e}", dir.display())) {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            found.extend(sources(&path));
+            found.extend(sources_below(&path));
         } else if path.extension().is_some_and(|x| x == "rs") {
             found.push(path);
         }
     }
-    assert!(!found.is_empty(), "no sources in {}", dir.display());
     found
 }
 
@@ -189,12 +190,44 @@ fn the_core_has_the_arrows_of_its_table_and_no_others() {
     assert_eq!(arrows("core/src"), as_written(CORE));
 }
 
-/// The command line (`cli`) stands above all: it speaks to the library by the crate's name.
+/// Cargo refuses what a manifest does not name, so the manifests are the arrows.
 #[test]
-fn the_simulator_has_the_arrows_of_its_table_and_no_others() {
-    let mut found = arrows("host-sim/src");
-    found.remove("cli");
-    assert_eq!(found, as_written(HOST_SIM));
+fn the_packages_have_the_arrows_of_their_table_and_no_others() {
+    for (place, allowed) in PACKAGES {
+        let text = std::fs::read_to_string(root().join(place).join("Cargo.toml")).unwrap();
+        let mut in_dependencies = false;
+        let mut found = BTreeSet::new();
+        for line in text.lines() {
+            if let Some(section) = line.strip_prefix('[') {
+                in_dependencies = section.ends_with("dependencies]") && !section.contains("dev-dependencies");
+            } else if in_dependencies && line.starts_with("haptic-") {
+                let end = line.find(['.', ' ', '=']).unwrap();
+                found.insert(&line[..end]);
+            }
+        }
+        assert_eq!(found, allowed.iter().copied().collect(), "{place}/Cargo.toml");
+    }
+}
+
+#[test]
+fn only_the_campaign_asks_for_fault_injection() {
+    for (place, _) in PACKAGES {
+        let text = std::fs::read_to_string(root().join(place).join("Cargo.toml")).unwrap();
+        let (product, _) = text.split_once("[dev-dependencies]").unwrap_or((&text, ""));
+        let asks = product.contains("features = [\"fault-injection\"]");
+        assert_eq!(asks, *place == "host-sim/campaign", "{place}");
+    }
+}
+
+#[test]
+fn the_simulator_has_no_file_no_thread_and_no_clock() {
+    for path in sources(&root().join("host-sim/sim/src")) {
+        let tokens = tokens(&std::fs::read_to_string(&path).unwrap());
+        for three in tokens.windows(3) {
+            let hit = three[0] == "std" && three[1] == "::" && NOT_IN_SIM.contains(&three[2].as_str());
+            assert!(!hit, "{} uses std::{}", path.display(), three[2]);
+        }
+    }
 }
 
 #[test]
@@ -211,9 +244,12 @@ fn no_part_uses_a_crate_that_it_must_not_know() {
 
 #[test]
 fn only_the_command_line_reads_options_and_writes_to_the_terminal() {
-    let src = root().join("host-sim/src");
+    let src = root().join("host-sim");
     for path in sources(&src) {
-        if path.starts_with(src.join("cli")) || path == src.join("main.rs") {
+        let below = path.strip_prefix(&src).unwrap();
+        let library =
+            below.components().any(|part| part.as_os_str() == "src") && !below.starts_with("src/cli");
+        if !library || below == Path::new("src/main.rs") {
             continue;
         }
         let tokens = tokens(&std::fs::read_to_string(&path).unwrap());

@@ -1,16 +1,16 @@
 //! The paper's evaluation (section 5, figures 8 and 9): every number of an independent float64 implementation's
 //! table, and the paper's claims as orderings.
 //!
-//! The table itself is data of another program and is kept once, in `host_sim::studies::claims`. What is compared
+//! The table itself is data of another program and is kept once, in `haptic_batch::claims`. What is compared
 //! with it, and how closely, is this test's own: peak and mean from the traces, and the tolerances.
 
+use haptic_batch::claims::TABLE;
+use haptic_batch::evaluate::{Results, evaluate};
 use haptic_core::params::Params;
-use host_sim::closed_loop::{Run, drive};
-use host_sim::guidance::{FloatLaw, NoGuidance};
-use host_sim::models::road::Centreline;
-use host_sim::scenario::{Condition, FailureKind, Scenario, Sensors};
-use host_sim::studies::claims::TABLE;
-use host_sim::studies::evaluate::{Results, evaluate};
+use haptic_sim::closed_loop::{Run, drive};
+use haptic_sim::guidance::{FloatLaw, NoGuidance};
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::{Condition, FailureKind, Scenario, Sensors};
 
 /// Peak and mean |e| over the first curve, by this test's own arithmetic.
 fn figures(run: &Run) -> [f64; 2] {

@@ -14,7 +14,7 @@ use haptic_core::bus::messages::WriteOutcome;
 use haptic_core::bus::slcan;
 use haptic_core::download;
 use haptic_core::params::Params;
-use host_sim::pil::parameters::Product;
+use haptic_target::parameters::Product;
 use machine::{Machine, image};
 
 const BOARD: &str = "mps2-an386";

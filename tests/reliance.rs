@@ -1,11 +1,11 @@
 //! The driver's reliance, read live by the ECU from its probe, against the truth of the driver model. (Whether the
 //! envelope clips the probe is `unclipped`'s question.)
 
-use host_sim::closed_loop::{self, Cycle};
-use host_sim::models::driver::ArmGains;
-use host_sim::models::road::Centreline;
-use host_sim::scenario::Scenario;
-use host_sim::studies::reliance::{Plan, study};
+use haptic_batch::reliance::{Plan, study};
+use haptic_sim::closed_loop::{self, Cycle};
+use haptic_sim::models::driver::ArmGains;
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::Scenario;
 
 /// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`host-sim reliance` has 20 seeds.)
 #[test]

@@ -6,7 +6,7 @@
 
 use std::path::PathBuf;
 
-use host_sim::identify::{DriveLog, Options, identify_with_noise_model, track};
+use haptic_analysis::identify::{DriveLog, Options, identify_with_noise_model, track};
 
 const GAIN: [f64; 3] = [0.3, 0.08, 14.0];
 const T_P: f64 = 0.15;

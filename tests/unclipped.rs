@@ -1,11 +1,11 @@
 //! The envelope is for faults: no limit touches the torque in ordinary driving, with or without the probe.
 
-use host_sim::closed_loop::{Cycle, observe};
-use host_sim::models::driver::{ArmGains, DriverParameters};
-use host_sim::models::road::{Centreline, Course};
-use host_sim::scenario::{Condition, Scenario};
-use host_sim::studies::evaluate::DRIVERS_T_P;
-use host_sim::studies::experiment::{REMNANT_GUIDED_NM, participants};
+use haptic_batch::evaluate::DRIVERS_T_P;
+use haptic_batch::experiment::{REMNANT_GUIDED_NM, participants};
+use haptic_sim::closed_loop::{Cycle, observe};
+use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::scenario::{Condition, Scenario};
 
 /// The paper's nominal runs, and the participants of table 6 with the remnant that brings their fit into the paper's
 /// range.

@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-use host_sim::identify::{DriveLog, Options, identify_as_published, identify_with_noise_model};
+use haptic_analysis::identify::{DriveLog, Options, identify_as_published, identify_with_noise_model};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);

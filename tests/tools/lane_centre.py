@@ -1,7 +1,7 @@
 """The centre of a lane of an OpenDRIVE file, evaluated a second time, by brute force and with other means.
 
 Nothing here is shared with the reader under test: the reference line of clothoids is integrated in steps of a
-millimetre, polynomials are walked along their parameter in tiny steps, offsets are summed and points are placed on
+centimetre, polynomials are walked along their parameter in tiny steps, offsets are summed and points are placed on
 the superelevated cross section; headings, curvatures and lengths are differences of points. Standard library alone.
 
     python3 tests/tools/lane_centre.py FILE.xodr ROAD:LANE,LANE,... [ROAD:LANE,...]  < course.json
@@ -17,7 +17,7 @@ import math
 import sys
 import xml.etree.ElementTree as ElementTree
 
-STEP = 0.002  # m along the reference line
+STEP = 0.01  # m along the reference line
 
 
 def strip(node):
@@ -165,9 +165,7 @@ def main(path, *legs):
         share = (sample["s_m"] - arc[i]) / max(arc[i + 1] - arc[i], 1e-12)
         x, y, bank = (p + share * (q - p) for p, q in zip(a, b))
         dx, dy = sample["x_m"] - x, sample["y_m"] - y
-        # The heading from points far enough apart for rounding not to matter, unless a kink lies between.
-        low, high = max(0, i - 5), min(len(points) - 1, i + 6)
-        heading = math.atan2(points[high][1] - points[low][1], points[high][0] - points[low][0])
+        heading = math.atan2(b[1] - a[1], b[0] - a[0])
         turn = (sample["heading_rad"] - heading + math.pi) % (2 * math.pi) - math.pi
         worst["place"] = max(worst["place"], math.hypot(dx, dy))
         worst["beside"] = max(worst["beside"], abs(dy * math.cos(heading) - dx * math.sin(heading)))

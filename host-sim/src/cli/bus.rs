@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::table::text;
 use super::{BadInput, Outcome, print, print_json};
-use host_sim::studies::bus_load::{BIT_RATE, MAX_LOAD, table};
+use haptic_batch::bus_load::{BIT_RATE, MAX_LOAD, table};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {

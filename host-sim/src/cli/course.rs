@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::models::road::Course;
-use host_sim::report::write_file;
-use host_sim::studies::course::{Survey, survey};
+use haptic_batch::course::{Sample, Survey, survey};
+use haptic_batch::files::open_course;
+use haptic_report::document::write_file;
 
 use super::output::Output;
 use super::road::LaneArguments;
@@ -36,10 +36,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let course = Course::open(&arguments.file, &arguments.lane.choice())?;
+    let course = open_course(&arguments.file, &arguments.lane.choice())?;
     let survey = survey(&course);
     if let Some(directory) = &arguments.out {
-        Output::begin(directory)?.finish(|place| survey.write(&course, place))?;
+        Output::begin(directory)?
+            .finish(|place| haptic_report::studies::course::write(&survey, &course, place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if let Some(path) = &arguments.save {
@@ -60,10 +61,17 @@ fn readable(survey: &Survey) -> String {
     let mut text = format!("{}: {:.2} m", survey.course, survey.length_m);
     for road in &survey.roads {
         let direction = if road.along_s { "along" } else { "against" };
-        text.push_str(&format!("\nroad {}, lane {}, driven {direction} its s", road.road, road.lane));
+        text.push_str(&format!(
+            "\nroad {}, lane {}, driven {direction} its s",
+            road.road, road.lane
+        ));
     }
-    let mut lines = vec![["along the lane's centre", "least", "most", "unit"].map(String::from).to_vec()];
-    let quantities: [(&str, &str, usize, fn(&host_sim::studies::course::Sample) -> f64); 4] = [
+    let mut lines = vec![
+        ["along the lane's centre", "least", "most", "unit"]
+            .map(String::from)
+            .to_vec(),
+    ];
+    let quantities: [(&str, &str, usize, fn(&Sample) -> f64); 4] = [
         ("curvature, left positive", "1/m", 5, |s| s.curvature_1pm),
         ("bank, positive: left edge higher", "rad", 4, |s| s.bank_rad),
         ("grade, positive uphill", "", 4, |s| s.grade),
@@ -81,7 +89,10 @@ fn readable(survey: &Survey) -> String {
 /// The plan in dots, with one scale for both axes; o marks the start.
 fn picture(survey: &Survey) -> String {
     let [columns, rows] = PICTURE;
-    let (mut x, mut y) = ([f64::INFINITY, f64::NEG_INFINITY], [f64::INFINITY, f64::NEG_INFINITY]);
+    let (mut x, mut y) = (
+        [f64::INFINITY, f64::NEG_INFINITY],
+        [f64::INFINITY, f64::NEG_INFINITY],
+    );
     for sample in &survey.samples {
         x = [x[0].min(sample.x_m), x[1].max(sample.x_m)];
         y = [y[0].min(sample.y_m), y[1].max(sample.y_m)];
@@ -93,7 +104,7 @@ fn picture(survey: &Survey) -> String {
     let mut cells = vec![vec![0_u8; columns]; used];
     // Bits of a Braille character by row and column of its dots.
     const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
-    let place = |sample: &host_sim::studies::course::Sample| {
+    let place = |sample: &Sample| {
         let column = ((sample.x_m - x[0]) / scale) as usize;
         let row = ((y[1] - sample.y_m) / scale) as usize;
         [column.min(2 * columns - 1), row.min(4 * used - 1)]

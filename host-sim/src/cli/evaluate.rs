@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use host_sim::input::in_range;
-use host_sim::metrics::Window;
-use host_sim::models::road::Course;
-use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH, Scenario, Sensors};
-use host_sim::studies::check_window;
-use host_sim::studies::evaluate::{Evaluation, RUNS, evaluate};
+use haptic_analysis::metrics::Window;
+use haptic_batch::check_window;
+use haptic_batch::evaluate::{Evaluation, RUNS, evaluate};
+use haptic_sim::input::in_range;
+use haptic_sim::models::road::Course;
+use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH, Scenario, Sensors};
 
 use super::output::Output;
 use super::road::CourseArguments;
@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let bar = progress::bar(RUNS as u64, "runs");
     let evaluation = evaluate(&base, window, || bar.inc(1))?;
     bar.finish_and_clear();
-    output.finish(|place| evaluation.write(place))?;
+    output.finish(|place| haptic_report::studies::evaluation::write(&evaluation, place))?;
     if arguments.json {
         print_json(&evaluation.results)?;
     } else {

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::identify::Muscle;
-use host_sim::studies::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
+use haptic_analysis::identify::Muscle;
+use haptic_batch::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
 
 use super::output::Output;
 use super::participants::Participants;
@@ -66,9 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     bar.finish_and_clear();
     output.finish(|place| {
         if arguments.logs {
-            result.write_logs(&place.join("logs"))?;
+            haptic_report::studies::experiment::write_logs(&result, &place.join("logs"))?;
         }
-        result.write(place)
+        haptic_report::studies::experiment::write(&result, place)
     })?;
     if arguments.json {
         print_json(&result)?;
@@ -100,7 +100,7 @@ fn readable(result: &Experiment) -> String {
             let found = &finding.identification;
             let p = &found.parameters;
             // The published method names a number whatever the data say.
-            let value = |p: &host_sim::identify::Parameter, decimals| {
+            let value = |p: &haptic_analysis::identify::Parameter, decimals| {
                 number(
                     if found.method == "paper" {
                         p.optimum

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::faults::campaign::{self, Campaign};
-use host_sim::faults::table::{self as rows, Place, Row};
-use host_sim::faults::{World, document, target};
-use host_sim::report::{write_file, write_json};
+use haptic_campaign::campaign::{self, Campaign};
+use haptic_campaign::table::{self as rows, Place, Row};
+use haptic_campaign::{World, document, target};
+use haptic_report::document::{write_file, write_json};
 
 use super::output::Output;
 use super::table::{self, number};

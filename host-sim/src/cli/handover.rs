@@ -1,7 +1,7 @@
 //! `host-sim handover`.
 
 use clap::Args;
-use host_sim::studies::handover::{ROWS, Results, Row, study};
+use haptic_batch::handover::{ROWS, Results, Row, study};
 
 use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use host_sim::identify::{Identification, Options, open_recording};
-use host_sim::input::in_range;
-use host_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
-use host_sim::studies::identify::{IdentifiedDrive, Method, identify};
+use haptic_analysis::identify::{Identification, Options, open_recording};
+use haptic_batch::identify::{IdentifiedDrive, Method, identify};
+use haptic_sim::input::in_range;
+use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
 use super::road::CourseArguments;
@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(course) = course {
         drive.drive_again(course, arguments.speed, &options)?;
     }
-    output.finish(|place| drive.write(place))?;
+    output.finish(|place| haptic_report::studies::identify::write(&drive, place))?;
     if arguments.json {
         print_json(&drive.results)?;
     } else {

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use host_sim::report::FileSet;
-use host_sim::studies::OutputError;
+use haptic_report::document::FileSet;
+use haptic_report::studies::OutputError;
 
 use super::{BadInput, INTERRUPTED};
 

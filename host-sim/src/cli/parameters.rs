@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use host_sim::input::InputError;
-use host_sim::pil::PilError;
-use host_sim::pil::parameters::Product;
-use host_sim::scenario::Scenario;
+use haptic_sim::input::InputError;
+use haptic_target::PilError;
+use haptic_target::parameters::Product;
 use serde_json::json;
 
 use super::{BadInput, Outcome, print, print_json};
@@ -30,7 +29,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let params = match &arguments.scenario {
         Some(path) => {
-            let scenario = Scenario::load(path)?;
+            let scenario = haptic_batch::files::load_scenario(path)?;
             // What is out of range is told in the words of the file.
             scenario
                 .setup()

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use host_sim::input::InputError;
-use host_sim::pil::{Channel, Machine, PilError, Target};
-use host_sim::scenario::Scenario;
-use host_sim::studies::processor::{self, ProcessorError};
+use haptic_sim::input::InputError;
+use haptic_sim::scenario::Scenario;
+use haptic_target::{Channel, Machine, PilError, Target};
+use host_sim::processor::{self, ProcessorError};
 
 use super::{BadInput, Outcome, print, print_json, progress};
 
@@ -42,7 +42,7 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let scenario = match &arguments.scenario {
-        Some(path) => Scenario::load(path)?,
+        Some(path) => haptic_batch::files::load_scenario(path)?,
         None => Scenario::default(),
     };
     let steps = scenario.course.length_m() / scenario.speed_mps() * 1e3;

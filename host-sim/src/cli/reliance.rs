@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::studies::reliance::{NEAR, Plan, Results, SETTLING_S, study};
+use haptic_batch::reliance::{NEAR, Plan, Results, SETTLING_S, study};
 
 use super::output::Output;
 use super::participants::Participants;
@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let results = study(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
     if let Some(output) = output {
-        output.finish(|place| results.write(place))?;
+        output.finish(|place| haptic_report::studies::reliance::write(&results, place))?;
     }
     if arguments.json {
         print_json(&results)?;

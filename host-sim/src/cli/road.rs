@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::input::InputError;
-use host_sim::models::road::{Course, LaneChoice};
+use haptic_sim::input::InputError;
+use haptic_sim::models::road::{Course, LaneChoice};
 
 #[derive(Debug, Args)]
 pub(super) struct CourseArguments {
@@ -45,14 +45,17 @@ impl CourseArguments {
                 Ok(Some(course))
             }
             None if choice == LaneChoice::default() => Ok(None),
-            None => Err(InputError::new("--road and --lane", "they need --course FILE.xodr")),
+            None => Err(InputError::new(
+                "--road and --lane",
+                "they need --course FILE.xodr",
+            )),
         }
     }
 }
 
 /// Opens a course and says on stderr what was decided.
 pub(super) fn open(path: &Path, choice: &LaneChoice) -> Result<Course, InputError> {
-    let course = Course::open(path, choice)?;
+    let course = haptic_batch::files::open_course(path, choice)?;
     super::print_notes(course.notes());
     Ok(course)
 }

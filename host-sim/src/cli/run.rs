@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::input::InputError;
-use host_sim::metrics::DEFINITIONS;
-use host_sim::scenario::Scenario;
-use host_sim::studies::run::{SingleRun, run as simulate};
+use haptic_analysis::metrics::DEFINITIONS;
+use haptic_batch::run::{SingleRun, run as simulate};
+use haptic_sim::input::InputError;
 
 use super::output::Output;
 use super::road::CourseArguments;
@@ -33,7 +32,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let mut scenario = Scenario::load(&arguments.scenario)?;
+    let mut scenario = haptic_batch::files::load_scenario(&arguments.scenario)?;
     match arguments.course.open()? {
         Some(course) => scenario.course = course,
         None => print_notes(scenario.course.notes()),
@@ -42,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let single = simulate(scenario, arguments.bus_log)
         .map_err(|e| InputError::new(arguments.scenario.display(), e))?;
     if let (Some(output), Some(directory)) = (output, &arguments.out) {
-        output.finish(|place| single.write(place))?;
+        output.finish(|place| haptic_report::studies::run::write(&single, place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if arguments.json {

@@ -1,0 +1,291 @@
+//! A drive recorded on the bus: the text of `candump`, with the DBC file that says what the frames mean.
+//!
+//! Needed are the lane preview (e_y at the near point that driver and guidance share, e_theta at the guidance's far
+//! point), the column (driver torque, wheel angle), the torque of the guidance unless the drive is a manual one, and the
+//! speed. Signals are found by their names in `core/haptic.dbc`, wherever a DBC file puts them. e_theta at the
+//! driver's far point is not on the bus; [`far_point`] computes it, and a note says so.
+//!
+//! The signals are put on an even grid at the pace of the camera: T_h as held at each instant, the others on the line
+//! between their neighbours. A signal that pauses, a preview that is not valid and a speed that changes are refused
+//! with their line. What is not here: counters and CRCs, which were the business of those who received the frames.
+
+mod candump;
+mod far_point;
+
+use std::path::Path;
+
+use can_dbc::{ByteOrder, Dbc, MessageId, Signal, ValueType};
+
+use super::log::{DriveLog, LogError};
+use candump::Record;
+
+/// The product's own bus.
+const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
+
+/// Rows a second: the camera's.
+const RATE_HZ: f64 = 120.0;
+/// Longest pause of a signal, s: the age at which the ECU no longer trusts it.
+const LONGEST_PAUSE_S: f64 = 0.03;
+/// The speed's largest share of deviation from its mean: the vehicle model is one of constant speed.
+const SPEED_TOLERANCE: f64 = 0.03;
+/// Slowest mean speed, m/s, at which the guidance works.
+const SLOWEST_MPS: f64 = 5.0;
+
+/// Said of every log that comes from a trace.
+const NOTE: &str = "From a bus trace: e_theta at the driver's far point (1.0 s) is computed from the guidance's far point \
+                    (0.7 s), 0.3 s later, and the turn that the vehicle of table 9 makes until then with the recorded wheel angle. The \
+                    estimates are as good as that vehicle's parameters.";
+
+/// Reads the log at `path`, a CSV file or a trace of `candump`; `dbc` says what the trace's frames mean, if it is not
+/// the product's own file. The sentence, if any, says what was computed.
+///
+/// # Errors
+/// As [`DriveLog::open`], for a trace too: what is missing, with the line where there is one.
+pub fn open_recording(
+    path: &Path,
+    dbc: Option<&Path>,
+    manual: bool,
+) -> Result<(DriveLog, Option<&'static str>), LogError> {
+    let named = |e: String| LogError::new(format!("{}: {e}", path.display()));
+    let bytes = std::fs::read(path).map_err(|e| named(e.to_string()))?;
+    let text = std::str::from_utf8(&bytes)
+        .ok()
+        .filter(|t| candump::looks_like_one(t));
+    let Some(text) = text else {
+        return Ok((
+            DriveLog::read(&bytes[..], manual).map_err(|e| named(e.to_string()))?,
+            None,
+        ));
+    };
+    let dbc = match dbc {
+        None => HAPTIC_DBC.to_owned(),
+        Some(dbc) => {
+            std::fs::read_to_string(dbc).map_err(|e| LogError::new(format!("{}: {e}", dbc.display())))?
+        }
+    };
+    let log = read_trace(text, &dbc, manual).map_err(named)?;
+    Ok((log, Some(NOTE)))
+}
+
+/// A signal over time.
+struct Course {
+    name: &'static str,
+    line: Vec<usize>,
+    time_s: Vec<f64>,
+    value: Vec<f64>,
+}
+
+fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
+    let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
+    let records = candump::parse(text)?;
+    let course = |name| Course::of(name, &dbc, &records);
+
+    let e_y = course("LanePreview_LateralError")?;
+    let e_theta = course("LanePreview_YawError")?;
+    let valid = course("LanePreview_Valid")?;
+    let age = course("LanePreview_Age")?;
+    if let Some(k) = valid.value.iter().position(|&v| v == 0.0) {
+        return Err(format!("line {}: the lane preview is not valid", valid.line[k]));
+    }
+    let [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age));
+    let [torque, angle] = [course("Column_DriverTorque")?, course("Column_WheelAngle")?];
+    let guidance = if manual {
+        None
+    } else {
+        Some(course("Guidance_Torque")?)
+    };
+    let speed = course("Vehicle_Speed1")?;
+    let speed_mps = speed.steady()?;
+
+    let needed: Vec<&Course> = [&e_y, &e_theta, &torque, &angle]
+        .into_iter()
+        .chain(guidance.as_ref())
+        .collect();
+    for c in &needed {
+        c.check_pauses()?;
+    }
+    let start_s = needed
+        .iter()
+        .map(|c| c.time_s[0])
+        .fold(f64::NEG_INFINITY, f64::max);
+    let end_s = needed.iter().map(|c| c.last_s()).fold(f64::INFINITY, f64::min);
+    let rows = ((end_s - start_s).max(0.0) * RATE_HZ) as usize;
+    let dt_s = 1.0 / RATE_HZ;
+    let at = |k: usize| start_s + k as f64 * dt_s;
+    let on_grid = |c: &Course| -> Vec<f64> { sampled(c, (0..rows).map(at), Hold::Line) };
+    let wheel_angle_rad = on_grid(&angle);
+    let e_theta_rad = far_point::driver_yaw_error(&on_grid(&e_theta), &wheel_angle_rad, speed_mps, dt_s);
+    let rows = e_theta_rad.len();
+    let cut = |mut values: Vec<f64>| {
+        values.truncate(rows);
+        values
+    };
+    // The ECU's milliseconds are counted from one of its frames.
+    let first_decided_s = guidance.as_ref().map_or(start_s, |g| g.time_s[0]);
+    DriveLog::from_signals(
+        start_s - first_decided_s,
+        dt_s,
+        [
+            cut(on_grid(&e_y)),
+            e_theta_rad,
+            cut(wheel_angle_rad),
+            guidance.map_or_else(
+                || vec![0.0; rows],
+                |g| sampled(&g, (0..rows).map(at), Hold::Value),
+            ),
+            cut(on_grid(&torque)),
+        ],
+    )
+    .map_err(|e| e.to_string())
+}
+
+impl Course {
+    /// The signal in SI units, from all frames that carry it.
+    fn of(name: &'static str, dbc: &Dbc, records: &[Record]) -> Result<Self, String> {
+        let found = dbc
+            .messages
+            .iter()
+            .find_map(|m| Some((m, m.signals.iter().find(|s| s.name == name)?)));
+        let Some((message, signal)) = found else {
+            return Err(format!("the DBC file has no signal {name}"));
+        };
+        if signal.byte_order != ByteOrder::LittleEndian {
+            return Err(format!(
+                "signal {name} of the DBC file is big-endian, which is not read"
+            ));
+        }
+        let unit = match signal.unit.as_str() {
+            "deg" => std::f64::consts::PI / 180.0,
+            "ms" => 1e-3,
+            _ => 1.0,
+        };
+        let id = match message.id {
+            MessageId::Standard(id) => u32::from(id),
+            MessageId::Extended(id) => id,
+        };
+        let mut course = Self {
+            name,
+            line: Vec::new(),
+            time_s: Vec::new(),
+            value: Vec::new(),
+        };
+        for record in records.iter().filter(|r| r.id == id) {
+            let raw = raw(signal, &record.data).ok_or_else(|| {
+                format!(
+                    "line {}: frame {id:03X} has {} bytes, too few for {name}",
+                    record.line,
+                    record.data.len()
+                )
+            })?;
+            if course.time_s.last().is_some_and(|&last| record.time_s < last) {
+                return Err(format!("line {}: the time goes back", record.line));
+            }
+            course.line.push(record.line);
+            course.time_s.push(record.time_s);
+            course
+                .value
+                .push((raw as f64 * signal.factor + signal.offset) * unit);
+        }
+        if course.value.len() < 2 {
+            return Err(format!("no frame {id:03X} ({}), so no {name}", message.name));
+        }
+        Ok(course)
+    }
+
+    fn last_s(&self) -> f64 {
+        self.time_s[self.time_s.len() - 1]
+    }
+
+    /// Moved to when it was measured.
+    fn earlier_by(mut self, age: &Self) -> Self {
+        for (time_s, age_s) in self.time_s.iter_mut().zip(&age.value) {
+            *time_s -= age_s;
+        }
+        self
+    }
+
+    fn check_pauses(&self) -> Result<(), String> {
+        let pause = self
+            .time_s
+            .windows(2)
+            .position(|w| !(0.0..=LONGEST_PAUSE_S).contains(&(w[1] - w[0])));
+        pause.map_or(Ok(()), |k| {
+            Err(format!(
+                "line {}: {} comes {:.3} s after the one before; at most {LONGEST_PAUSE_S} s is wanted",
+                self.line[k + 1],
+                self.name,
+                self.time_s[k + 1] - self.time_s[k]
+            ))
+        })
+    }
+
+    /// The mean of a speed that does not change.
+    fn steady(&self) -> Result<f64, String> {
+        let mean = self.value.iter().sum::<f64>() / self.value.len() as f64;
+        if mean < SLOWEST_MPS {
+            return Err(format!(
+                "{} is {mean:.2} m/s in the mean, below {SLOWEST_MPS}: there is no guidance",
+                self.name
+            ));
+        }
+        let off = self
+            .value
+            .iter()
+            .position(|v| (v - mean).abs() > SPEED_TOLERANCE * mean);
+        off.map_or(Ok(mean), |k| {
+            Err(format!(
+                "line {}: {} is {:.2} m/s where the mean is {mean:.2}: e_theta at the driver's far point can be computed \
+                 for a constant speed only",
+                self.line[k], self.name, self.value[k]
+            ))
+        })
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Hold {
+    /// The last value.
+    Value,
+    /// On the line to the next one.
+    Line,
+}
+
+/// Values at rising instants within the course. Instants a microsecond before a value, as candump's clock rounds
+/// them, have the new value already.
+fn sampled(course: &Course, at_s: impl Iterator<Item = f64>, hold: Hold) -> Vec<f64> {
+    let (time, value) = (&course.time_s, &course.value);
+    let mut k = 0;
+    at_s.map(|t| {
+        while k + 1 < time.len() && time[k + 1] <= t + 1e-6 {
+            k += 1;
+        }
+        let next = (k + 1).min(time.len() - 1);
+        match hold {
+            Hold::Line if time[next] > time[k] => {
+                value[k] + (t - time[k]) / (time[next] - time[k]) * (value[next] - value[k])
+            }
+            _ => value[k],
+        }
+    })
+    .collect()
+}
+
+/// The bits of a little-endian signal, with its sign; none if the frame is too short.
+fn raw(signal: &Signal, data: &[u8]) -> Option<i64> {
+    let (start, size) = (
+        u32::try_from(signal.start_bit).ok()?,
+        u32::try_from(signal.size).ok()?,
+    );
+    let end = start.checked_add(size)?;
+    if !(1..=64).contains(&size) || end as usize > 8 * data.len() || end > 64 {
+        return None;
+    }
+    let mut bytes = [0; 8];
+    bytes[..data.len()].copy_from_slice(data);
+    // To the top, and back down with or without the sign.
+    let top = u64::from_le_bytes(bytes) << (64 - end);
+    Some(match signal.value_type {
+        ValueType::Signed => (top as i64) >> (64 - size),
+        ValueType::Unsigned => (top >> (64 - size)) as i64,
+    })
+}

@@ -1,0 +1,4 @@
+//! What a recorded drive tells.
+
+pub mod identify;
+pub mod metrics;

@@ -1,0 +1,145 @@
+//! Section 5 of the paper: three drivers (table 7) under four conditions, and again with a failure of the
+//! guidance. A manual run has no failure run, so there are 21. Beyond the paper, 9 more in which the guidance's
+//! input fails, and the ECU hands over.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::RunRecord;
+use super::claims::{self, Claim};
+use super::record::{default_window, failure_notes, nominal_peak_m};
+use haptic_analysis::metrics::Window;
+use haptic_sim::closed_loop::{Run, simulate};
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
+
+/// Processing delays of the three drivers, s (table 7).
+pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
+/// Runs of an evaluation: 3 drivers x (4 conditions + 2 x 3 that can fail).
+pub const RUNS: usize = 30;
+
+/// An evaluation with everything that was simulated.
+#[derive(Debug, Clone)]
+pub struct Evaluation {
+    /// The runs of section 5, driver by driver: nominal ones first, then those with failure. Behind them the
+    /// runs whose guidance input fails.
+    pub runs: Vec<(Scenario, Run)>,
+    /// What is handed on.
+    pub results: Results,
+}
+
+/// The results of an evaluation, as JSON holds them.
+#[derive(Debug, Clone, Serialize)]
+pub struct Results {
+    /// Name of the course.
+    pub course: String,
+    /// Its length, m.
+    pub course_length_m: f64,
+    /// Speed, km/h.
+    pub speed_kmh: f64,
+    /// When the guidance fails in the runs with failure, s.
+    pub failure_time_s: f64,
+    /// What the controller saw.
+    pub sensors: Sensors,
+    /// Stretch that was measured, m.
+    pub window_m: [f64; 2],
+    /// One record for each run: the 21 of section 5 (no failure, or a sudden loss of the torque), then the 9 in
+    /// which the guidance's input fails and the ECU hands over.
+    pub runs: Vec<RunRecord>,
+    /// What the evaluation must show; empty where it was not run as the paper ran it.
+    pub claims: Vec<Claim>,
+    /// What a reader has to know of these results.
+    pub notes: Vec<String>,
+}
+
+impl Results {
+    /// The record of a run, if there is one.
+    pub fn record(&self, t_p: f64, condition: Condition, failure: FailureKind) -> Option<&RunRecord> {
+        self.runs
+            .iter()
+            .find(|r| r.t_p == t_p && r.condition == condition && r.failure == failure)
+    }
+
+    /// Whether no claim is broken.
+    pub fn all_claims_hold(&self) -> bool {
+        self.claims.iter().all(|claim| claim.holds)
+    }
+}
+
+/// Runs the evaluation on all cores. `base` gives course, speed, sensors, vehicle, guidance and the time of the
+/// failure; its driver's delay, condition and kind of failure are varied. `progress` is called after each run.
+///
+/// # Errors
+/// As [`Scenario::check`], and a window that does not lie where the runs drive.
+pub fn evaluate(
+    base: &Scenario,
+    window: Option<Window>,
+    progress: impl Fn() + Sync,
+) -> Result<Evaluation, String> {
+    let window = window.unwrap_or_else(|| default_window(&base.course));
+    base.check()?;
+    super::check_window(window, base)?;
+    let centreline = Centreline::new(&base.course);
+    let runs: Vec<(Scenario, Run)> = scenarios(base)
+        .into_par_iter()
+        .map(|scenario| {
+            let run = simulate(&scenario, &centreline)?;
+            progress();
+            Ok((scenario, run))
+        })
+        .collect::<Result<_, String>>()?;
+
+    let peak_without_failure = |failed: &Scenario| {
+        let failure_time_s = failed.failure.at_s()?;
+        let (_, run) = runs.iter().find(|(scenario, _)| {
+            let same = scenario.driver == failed.driver && scenario.condition == failed.condition;
+            same && scenario.failure.kind == FailureKind::None
+        })?;
+        nominal_peak_m(run, window, failure_time_s)
+    };
+    let records: Vec<_> = runs
+        .iter()
+        .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
+        .collect();
+    let notes = failure_notes(base.failure.time_s, &records, window);
+    let mut results = Results {
+        course: base.course.name().into(),
+        course_length_m: base.course.length_m(),
+        speed_kmh: base.speed_kmh,
+        failure_time_s: base.failure.time_s,
+        sensors: base.sensors,
+        window_m: [window.from_m, window.to_m],
+        runs: records,
+        claims: Vec::new(),
+        notes,
+    };
+    if claims::apply_to(base, window) {
+        results.claims = claims::check(&results);
+    }
+    Ok(Evaluation { runs, results })
+}
+
+fn scenarios(base: &Scenario) -> Vec<Scenario> {
+    let mut scenarios = Vec::with_capacity(RUNS);
+    for t_p in DRIVERS_T_P {
+        for kind in [FailureKind::None, FailureKind::Torque, FailureKind::Input] {
+            for condition in Condition::ALL {
+                // There is no guidance to fail.
+                if condition == Condition::Manual && kind != FailureKind::None {
+                    continue;
+                }
+                scenarios.push(Scenario {
+                    condition,
+                    gains: condition.gains(),
+                    driver: DriverParameters { t_p, ..base.driver },
+                    failure: Failure { kind, ..base.failure },
+                    ..base.clone()
+                });
+            }
+        }
+    }
+    // Stable: the others stay driver by driver.
+    scenarios.sort_by_key(|scenario| scenario.failure.kind == FailureKind::Input);
+    scenarios
+}

@@ -1,0 +1,146 @@
+//! Are the standard errors right? The guided drives many times over, each with another remnant.
+//!
+//! Terms: *coverage*, the share of repetitions whose 95 % interval contains the truth; *error*, estimate minus
+//! truth, over the repetitions in which the parameter is identified.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Plan, PublishedDriver, chosen, driven};
+use haptic_analysis::identify::{Muscle, Options, Parameter, Parameters, identify_with_noise_model};
+use haptic_sim::models::road::{Centreline, Course};
+
+/// What is compared with the truth: the parameters that a torque record can carry.
+const COMPARED: usize = 5;
+
+/// What the repetitions found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Repetitions {
+    /// Amplitude of the probe, N.m.
+    pub probe_nm: f64,
+    /// Seed of the first repetition; the others count on from it.
+    pub seed: u64,
+    /// Drives of each participant.
+    pub repetitions: u32,
+    /// By participant and parameter.
+    pub participants: Vec<Repeated>,
+    /// All participants together, by parameter.
+    pub pooled: Vec<Repeated>,
+}
+
+/// One parameter over the repetitions.
+#[derive(Debug, Clone, Serialize)]
+pub struct Repeated {
+    /// Number of the participant; none for all together.
+    pub participant: Option<u32>,
+    /// Key of the parameter.
+    pub parameter: &'static str,
+    /// Drives.
+    pub drives: usize,
+    /// Share of drives in which the parameter was identified.
+    pub identified: f64,
+    /// Coverage of the 95 % interval.
+    pub coverage: f64,
+    /// Mean error; none if never identified.
+    pub bias: Option<f64>,
+    /// Standard deviation of the error about zero; none if never identified.
+    pub rms: Option<f64>,
+    /// Largest error in size; none if never identified.
+    pub largest: Option<f64>,
+    /// Mean of the standard errors that the method gives; none where it gave none.
+    pub standard_error: Option<f64>,
+}
+
+/// Repeats the guided drives of `plan` and identifies each by the default method; `done` is called after each, from
+/// any thread.
+///
+/// # Errors
+/// As [`super::experiment`].
+pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<Repetitions, String> {
+    let centreline = Centreline::new(&Course::paper());
+    let jobs: Vec<(u32, PublishedDriver, u64)> = chosen(&plan.participants)?
+        .into_iter()
+        .flat_map(|p| (0..u64::from(repetitions)).map(move |r| (p.number, p.guided, r)))
+        .collect();
+    let found: Vec<[Compared; COMPARED]> = jobs
+        .into_par_iter()
+        .map(|(number, truth, repetition)| {
+            let plan = Plan {
+                seed: plan.seed.wrapping_add(repetition),
+                ..plan.clone()
+            };
+            let log = driven(&plan, number, &truth, &centreline)?.log;
+            let identification = identify_with_noise_model(&log, &Options::default());
+            done();
+            Ok(compared(&truth, &identification.parameters))
+        })
+        .collect::<Result<_, String>>()?;
+    let lines = |participant: Option<u32>, drives: &[[Compared; COMPARED]]| {
+        (0..COMPARED)
+            .filter(|_| !drives.is_empty())
+            .map(|i| {
+                let of_one: Vec<Compared> = drives.iter().map(|d| d[i]).collect();
+                Repeated::new(participant, &of_one)
+            })
+            .collect::<Vec<_>>()
+    };
+    let each = plan
+        .participants
+        .iter()
+        .zip(found.chunks(repetitions.max(1) as usize));
+    Ok(Repetitions {
+        probe_nm: plan.probe_nm,
+        seed: plan.seed,
+        repetitions,
+        participants: each
+            .flat_map(|(&number, drives)| lines(Some(number), drives))
+            .collect(),
+        pooled: lines(None, &found),
+    })
+}
+
+/// A parameter's key, what was found, and the truth.
+type Compared = (&'static str, Parameter, f64);
+
+fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
+    let sum = truth.k_d + Muscle::default().k_nms;
+    [
+        ("gain_1", found.gain_1, sum * truth.a_1),
+        ("gain_2", found.gain_2, sum * truth.a_2),
+        ("gain_3", found.gain_3, sum * truth.a_3),
+        ("t_p", found.t_p, truth.t_p),
+        ("k_hg", found.k_hg, truth.k_hg.unwrap_or(0.0)),
+    ]
+}
+
+impl Repeated {
+    /// Of at least one drive.
+    fn new(participant: Option<u32>, drives: &[Compared]) -> Self {
+        let errors: Vec<f64> = drives
+            .iter()
+            .filter_map(|(_, found, truth)| Some(found.estimate? - truth))
+            .collect();
+        let standard_errors: Vec<f64> = drives.iter().filter_map(|d| d.1.standard_error).collect();
+        let covered = drives.iter().filter(|(_, found, truth)| {
+            // An interval that the data do not bound holds everything.
+            found
+                .interval_95
+                .is_none_or(|[low, high]| low <= *truth && *truth <= high)
+        });
+        let share = |count: usize| count as f64 / drives.len() as f64;
+        let mean =
+            |values: &[f64]| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+        let squares: Vec<f64> = errors.iter().map(|e| e * e).collect();
+        Self {
+            participant,
+            parameter: drives[0].0,
+            drives: drives.len(),
+            identified: share(drives.iter().filter(|d| d.1.identified).count()),
+            coverage: share(covered.count()),
+            bias: mean(&errors),
+            rms: mean(&squares).map(f64::sqrt),
+            largest: errors.iter().map(|e| e.abs()).reduce(f64::max),
+            standard_error: mean(&standard_errors),
+        }
+    }
+}

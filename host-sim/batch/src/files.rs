@@ -1,0 +1,85 @@
+//! Scenario and course files: the one place where what a person wrote is read from a disk.
+
+use std::path::Path;
+
+use haptic_sim::input::InputError;
+use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
+use haptic_sim::scenario::Scenario;
+
+/// Reads and checks a scenario file. A course file named in it is looked for beside the scenario.
+///
+/// # Errors
+/// An unreadable file; as [`Scenario::from_toml`] and [`load_course`].
+pub fn load_scenario(path: &Path) -> Result<Scenario, InputError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    Scenario::from_toml(&path.display().to_string(), &read(path)?, |course, lane| {
+        load_lane(&folder.join(course), lane)
+    })
+}
+
+/// The built-in course if `path` is its name, else as [`load_lane`].
+///
+/// # Errors
+/// As [`load_lane`].
+pub fn open_course(path: &Path, lane: &LaneChoice) -> Result<Course, InputError> {
+    if path == Path::new(PAPER_COURSE) {
+        lane.check_none(PAPER_COURSE)?;
+        return Ok(Course::paper());
+    }
+    load_lane(path, lane)
+}
+
+/// Reads and checks a course file, in the lane that is sensible if it is one of OpenDRIVE.
+///
+/// # Errors
+/// As [`load_lane`].
+pub fn load_course(path: &Path) -> Result<Course, InputError> {
+    load_lane(path, &LaneChoice::default())
+}
+
+/// Reads and checks a course file: a lane of an OpenDRIVE file if its name ends with `.xodr`, else TOML.
+///
+/// # Errors
+/// An unreadable file; as [`Course::from_opendrive`] and [`Course::from_toml`].
+pub fn load_lane(path: &Path, lane: &LaneChoice) -> Result<Course, InputError> {
+    let name = path.display().to_string();
+    if path.extension().is_some_and(|x| x.eq_ignore_ascii_case("xodr")) {
+        let bytes = std::fs::read(path).map_err(|e| InputError::new(&name, e))?;
+        // Names in other encodings than UTF-8 do not matter to the road.
+        return Course::from_opendrive(&name, &String::from_utf8_lossy(&bytes), lane);
+    }
+    lane.check_none(&name)?;
+    Course::from_toml(&name, &read(path)?)
+}
+
+/// Names the file and what the system says of it.
+fn read(path: &Path) -> Result<String, InputError> {
+    std::fs::read_to_string(path).map_err(|e| InputError::new(path.display(), e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptic_sim::scenario::Condition;
+
+    #[test]
+    fn the_examples_are_good_and_the_one_with_every_field_holds_the_defaults() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+        assert_eq!(
+            load_scenario(&folder.join("every-field.toml")).unwrap(),
+            Scenario::default()
+        );
+        let relying = load_scenario(&folder.join("relying-driver.toml")).unwrap();
+        assert_eq!(
+            (relying.condition, relying.failure.at_s()),
+            (Condition::High, Some(40.0))
+        );
+        assert!(relying.course.name().ends_with("hill-road.toml"));
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_named() {
+        let missing = load_course(Path::new("no-such.toml")).unwrap_err().to_string();
+        assert!(missing.starts_with("no-such.toml: "), "{missing}");
+    }
+}

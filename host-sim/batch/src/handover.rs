@@ -1,0 +1,177 @@
+//! What a failed input costs when the ECU hands over, and what a sudden loss costs, by speed, delay and reliance.
+//!
+//! The road is the first curve of the paper's course, stretched: at `k` times 60 km/h every length is `k` times and
+//! every radius `k^2` times as long. So each run meets the curve at the same time, with the same lateral
+//! acceleration of 0.93 m/s2, and the failure comes 0.4 s into the arc. The straight before it is 120 m where the
+//! course has 1080 m.
+//!
+//! A row is *judged* for high and mid reliance, and where the manual driver is stable: the driver has to be able to
+//! take over. Stable means that the manual driver's error dies down on the last straight, 24 s long: its largest
+//! value in the second half is at most 0.9 times that of the whole. Low reliance is shown, not judged: this driver
+//! drives nearly as manually, works against the guidance until he notices, and has least to lose by its absence.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::evaluate::DRIVERS_T_P;
+use haptic_sim::closed_loop::{Run, simulate};
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenario};
+
+/// Speeds of the study, km/h.
+pub const SPEEDS_KMH: [f64; 9] = [40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0];
+/// Most that a survived failure may cost: times the larger of the no-failure and the manual peak.
+const MOST: f64 = 1.25;
+/// Rows of the study.
+pub const ROWS: usize = SPEEDS_KMH.len() * DRIVERS_T_P.len() * 3;
+/// The failure, s after the start at 60 km/h: 6.7 m into the arc, as on the paper's course.
+const FAILURE_S: f64 = 12.4;
+/// An error below this has died down whatever it was before, m.
+const SETTLED_M: f64 = 0.005;
+/// Length of the last straight, m at 60 km/h.
+const LAST_STRAIGHT_M: f64 = 400.0;
+
+/// One speed, delay and reliance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Row {
+    /// Speed, km/h.
+    pub speed_kmh: f64,
+    /// Processing delay, s.
+    pub t_p: f64,
+    /// Reliance on the guidance.
+    pub condition: Condition,
+    /// Whether the manual driver is stable.
+    pub manual_stable: bool,
+    /// Peak lateral error of the manual driver, m; `None` if the run diverged, as below.
+    pub manual_m: Option<f64>,
+    /// With guidance and no failure, m.
+    pub nominal_m: Option<f64>,
+    /// With the input lost and handed over, m.
+    pub handover_m: Option<f64>,
+    /// With the torque lost, m.
+    pub loss_m: Option<f64>,
+    /// Handover over the larger of the no-failure and the manual peak.
+    pub handover_ratio: Option<f64>,
+    /// The same of the sudden loss.
+    pub loss_ratio: Option<f64>,
+}
+
+impl Row {
+    /// Whether the row has to keep the bound.
+    pub fn is_judged(&self) -> bool {
+        self.manual_stable && self.condition != Condition::Low
+    }
+
+    /// Whether the handover costs too much where it is judged.
+    pub fn is_broken(&self) -> bool {
+        self.is_judged() && self.handover_ratio.is_none_or(|ratio| ratio > MOST)
+    }
+}
+
+/// What the study found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// By speed, delay and reliance.
+    pub rows: Vec<Row>,
+    /// Largest handover ratio of the judged rows.
+    pub largest_judged_ratio: f64,
+    /// Most that it may be.
+    pub most: f64,
+}
+
+/// Runs every row on all cores; `progress` is called after each.
+///
+/// # Errors
+/// As [`Scenario::check`]; none of these scenarios meets one.
+pub fn study(progress: impl Fn() + Sync) -> Result<Results, String> {
+    let cases: Vec<(f64, f64)> = SPEEDS_KMH
+        .iter()
+        .flat_map(|kmh| DRIVERS_T_P.map(|t_p| (*kmh, t_p)))
+        .collect();
+    let rows: Vec<Vec<Row>> = cases
+        .into_par_iter()
+        .map(|(kmh, t_p)| rows_of(kmh, t_p, &progress))
+        .collect::<Result<_, String>>()?;
+    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let judged = rows.iter().filter(|row| row.is_judged());
+    Ok(Results {
+        largest_judged_ratio: judged.filter_map(|row| row.handover_ratio).fold(0.0, f64::max),
+        most: MOST,
+        rows,
+    })
+}
+
+fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<Row>, String> {
+    let course = stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?;
+    let line = Centreline::new(&course);
+    let run = |condition: Condition, kind| {
+        let scenario = Scenario {
+            course: course.clone(),
+            speed_kmh,
+            condition,
+            gains: condition.gains(),
+            driver: DriverParameters {
+                t_p,
+                ..Default::default()
+            },
+            failure: Failure {
+                kind,
+                time_s: FAILURE_S,
+            },
+            ..Default::default()
+        };
+        simulate(&scenario, &line)
+    };
+    let manual = run(Condition::Manual, FailureKind::None)?;
+    let manual_m = peak_m(&manual, 0.0);
+    let straight_m = LAST_STRAIGHT_M * speed_kmh / DEFAULT_SPEED_KMH;
+    let manual_stable =
+        match [straight_m, 0.5 * straight_m].map(|rest_m| peak_m(&manual, course.length_m() - rest_m)) {
+            [Some(whole_m), Some(second_half_m)] => second_half_m < (0.9 * whole_m).max(SETTLED_M),
+            _ => false,
+        };
+    let mut rows = Vec::new();
+    for condition in [Condition::High, Condition::Mid, Condition::Low] {
+        let peak = |kind| run(condition, kind).map(|run| peak_m(&run, 0.0));
+        let nominal_m = peak(FailureKind::None)?;
+        let (handover_m, loss_m) = (peak(FailureKind::Input)?, peak(FailureKind::Torque)?);
+        let larger_m = nominal_m.zip(manual_m).map(|(a, b)| a.max(b));
+        let ratio = |failed: Option<f64>| failed.zip(larger_m).map(|(a, b)| a / b);
+        rows.push(Row {
+            speed_kmh,
+            t_p,
+            condition,
+            manual_stable,
+            manual_m,
+            nominal_m,
+            handover_m,
+            loss_m,
+            handover_ratio: ratio(handover_m),
+            loss_ratio: ratio(loss_m),
+        });
+        progress();
+    }
+    Ok(rows)
+}
+
+/// Largest lateral error from a place on, m; `None` for a run that diverged.
+fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
+    let samples = run.trace.samples.iter().filter(|s| s.s_m >= from_m);
+    (!run.diverged()).then(|| samples.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max))
+}
+
+fn stretched_curve(k: f64) -> Result<Course, String> {
+    let curvature = 1.0 / (300.0 * k * k);
+    let (clothoid, arc) = (80.0 * k, 300.0 * k);
+    let toml = format!(
+        "[[segment]]\nlength = {before}\n\
+         [[segment]]\nlength = {clothoid}\ncurvature_start = 0.0\ncurvature_end = {curvature}\n\
+         [[segment]]\nlength = {arc}\ncurvature = {curvature}\n\
+         [[segment]]\nlength = {clothoid}\ncurvature_start = {curvature}\ncurvature_end = 0.0\n\
+         [[segment]]\nlength = {after}\n",
+        before = 120.0 * k,
+        after = LAST_STRAIGHT_M * k,
+    );
+    Course::from_toml("first curve of paper-course, stretched", &toml).map_err(|e| e.to_string())
+}

@@ -1,0 +1,116 @@
+//! One scenario, simulated and measured.
+
+use haptic_core::bus::Frame;
+use serde::Serialize;
+
+use super::RunRecord;
+use super::record::{default_window, failure_notes, nominal_peak_m};
+use super::reliance::Readings;
+use haptic_log::Event;
+use haptic_sim::closed_loop::{Cycle, Observer, Run, observe, simulate};
+use haptic_sim::ecu_events::EcuEvents;
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
+
+/// A scenario with its run.
+#[derive(Debug, Clone)]
+pub struct SingleRun {
+    /// What was simulated.
+    pub scenario: Scenario,
+    /// What came of it.
+    pub run: Run,
+    /// What the ECU said of itself, from its frames.
+    pub reported: Vec<Event>,
+    /// What the ECU said of the driver's reliance; nothing past the bus.
+    pub readings: Readings,
+    /// The bus, if it was recorded: milliseconds since the start, and what was sent then, in order.
+    pub bus: Vec<(u32, Frame)>,
+    /// What is handed on.
+    pub results: SingleResults,
+}
+
+/// The results of one run, as JSON holds them.
+#[derive(Debug, Clone, Serialize)]
+pub struct SingleResults {
+    /// Name of the course.
+    pub course: String,
+    /// Its length, m.
+    pub course_length_m: f64,
+    /// Speed, km/h.
+    pub speed_kmh: f64,
+    /// What the controller saw.
+    pub sensors: Sensors,
+    /// When the guidance failed, if it did, s.
+    pub failure_time_s: Option<f64>,
+    /// Seed of the remnant.
+    pub seed: u64,
+    /// The ECU's last estimate of K_hg and its standard deviation, if it identified any.
+    pub reliance: Option<[f64; 2]>,
+    /// Stretch that was measured, m: the paper's curve on its course, else all of it.
+    pub window_m: [f64; 2],
+    /// The run's record.
+    #[serde(flatten)]
+    pub record: RunRecord,
+    /// What a reader has to know of these results.
+    pub notes: Vec<String>,
+}
+
+/// Simulates a scenario; one with a failure also without it, to tell when the driver has recovered. With
+/// `record_bus` every frame is kept.
+///
+/// # Errors
+/// As [`Scenario::check`] and [`Scenario::check_times`]; a bus to record where there is none.
+pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
+    scenario.check()?;
+    scenario.check_times()?;
+    if record_bus && (scenario.sensors == Sensors::Exact || scenario.condition == Condition::Manual) {
+        return Err(
+            "there is no bus to record: it takes sensors = \"paper\" and a condition with guidance".into(),
+        );
+    }
+    let centreline = Centreline::new(&scenario.course);
+    let window = default_window(&scenario.course);
+    let (mut ecu, mut readings, mut bus) = (EcuEvents::new(), Readings::default(), Vec::new());
+    let run = observe(&scenario, &centreline, &mut |cycle: &Cycle| {
+        ecu.cycle(cycle);
+        readings.cycle(cycle);
+        if record_bus {
+            let frames = cycle.frames_in.iter().chain(cycle.frames_out);
+            bus.extend(frames.map(|frame| (cycle.view.step, *frame)));
+        }
+    })?;
+    let nominal_peak_m = if let Some(failure_time_s) = scenario.failure.at_s() {
+        let failure = Failure {
+            kind: FailureKind::None,
+            ..scenario.failure
+        };
+        let nominal = Scenario {
+            failure,
+            ..scenario.clone()
+        };
+        nominal_peak_m(&simulate(&nominal, &centreline)?, window, failure_time_s)
+    } else {
+        None
+    };
+    let record = RunRecord::new(&scenario, &run, window, nominal_peak_m);
+    let results = SingleResults {
+        course: scenario.course.name().into(),
+        course_length_m: scenario.course.length_m(),
+        speed_kmh: scenario.speed_kmh,
+        sensors: scenario.sensors,
+        failure_time_s: scenario.failure.at_s(),
+        seed: scenario.seed,
+        reliance: readings.readings.iter().rev().find_map(|r| r.estimate),
+        window_m: [window.from_m, window.to_m],
+        record,
+        notes: failure_notes(scenario.failure.time_s, &[record], window),
+    };
+    Ok(SingleRun {
+        scenario,
+        run,
+        reported: ecu.into_events(),
+        readings,
+        bus,
+        results,
+    })
+}

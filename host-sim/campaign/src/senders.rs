@@ -1,0 +1,193 @@
+//! The nodes that talk to the ECU, and what is wrong with their values: readings in, frames out.
+//!
+//! A sender encodes what it believes with the shipping encoders; what must not agree with the core by
+//! construction is read and forged with `bytes`.
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::injection::{Change, Injection, Signal, Wish};
+use super::wire::MESSAGES;
+use haptic_sim::guidance::View;
+use haptic_sim::models::sensors;
+
+const COLUMN_PERIOD_MS: u32 = 2;
+const HOST_PERIOD_MS: u32 = 10;
+
+/// What the senders believe in one step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Readings {
+    pub(super) lane: Option<(f64, f64)>,
+    pub(super) lane_valid: bool,
+    pub(super) column: Option<(f64, f64)>,
+    pub(super) speeds_mps: Option<[f64; 2]>,
+}
+
+/// The senders with their counters, and the values that a fault remembers.
+#[derive(Debug, Clone)]
+pub(super) struct Senders {
+    counters: [u8; 4],
+    /// By signal: the value at the onset.
+    held: [Option<f64>; Signal::COUNT],
+    toggled: bool,
+    wishes: u32,
+    /// Whether the host wants the probe as well.
+    probe: bool,
+}
+
+impl Senders {
+    pub(super) fn new(probe: bool) -> Self {
+        Self {
+            counters: [0; 4],
+            held: [None; Signal::COUNT],
+            toggled: false,
+            wishes: 0,
+            probe,
+        }
+    }
+
+    /// What is read in this step, with what is wrong with it; `since_s` the onset if the injections act.
+    pub(super) fn read(
+        &mut self,
+        view: &View,
+        injections: &[Injection],
+        since_s: Option<f64>,
+        noise: &mut Xoshiro256PlusPlus,
+    ) -> Readings {
+        let mut read = |signal: Signal, truth: f64| {
+            let Some(since_s) = since_s else { return truth };
+            let changes = injections.iter().filter_map(|injection| match injection {
+                Injection::Sensor(of, change) if *of == signal => Some(change),
+                _ => None,
+            });
+            changes.fold(truth, |value, change| {
+                let held = *self.held[signal as usize].get_or_insert(value);
+                changed(change, value, held, since_s, noise)
+            })
+        };
+        let at = |period: u32| view.step.is_multiple_of(period);
+        let speeds_mps = at(HOST_PERIOD_MS).then(|| {
+            [
+                read(Signal::Speed1, view.speed_mps),
+                read(Signal::Speed2, view.speed_mps),
+            ]
+        });
+        let column = at(COLUMN_PERIOD_MS).then(|| {
+            (
+                read(Signal::DriverTorque, sensors::torque_nm(view.driver_torque_nm)),
+                read(Signal::WheelAngle, sensors::wheel_angle_rad(view.wheel_angle_rad)),
+            )
+        });
+        let lane = view.lane.map(|errors| {
+            (
+                read(Signal::LateralError, errors.e_y_m),
+                read(Signal::YawError, errors.e_theta_rad),
+            )
+        });
+        Readings {
+            lane,
+            lane_valid: since_s.is_none() || !injections.contains(&Injection::Invalid),
+            column,
+            speeds_mps,
+        }
+    }
+
+    /// Whether guidance is wanted in the command of this step; `high` without a fault.
+    fn wish(&mut self, high: bool, injections: &[Injection], acts: bool) -> bool {
+        let wish = injections.iter().find_map(|injection| match injection {
+            Injection::Wish(wish) if acts => Some(*wish),
+            _ => None,
+        });
+        let Some(wish) = wish else { return high };
+        self.toggled = !self.toggled;
+        self.wishes += 1;
+        match wish {
+            Wish::Ends => false,
+            Wish::Drops(frames) => self.wishes > frames,
+            Wish::Toggles => !self.toggled,
+        }
+    }
+
+    /// The frames of this step, in order of sending.
+    pub(super) fn send(
+        &mut self,
+        view: &View,
+        readings: &Readings,
+        requested: bool,
+        injections: &[Injection],
+        acts: bool,
+        frames: &mut Vec<Frame>,
+    ) {
+        let mut count = |sender: usize| {
+            let counter = self.counters[sender];
+            self.counters[sender] = counter.wrapping_add(1);
+            counter
+        };
+        if let Some((e_y_m, e_theta_rad)) = readings.lane {
+            let message = LanePreview {
+                e_y: Metres::from_m(e_y_m),
+                e_theta: Radians::from_rad(e_theta_rad),
+                age: Micros::from_us(0),
+                valid: readings.lane_valid,
+            };
+            frames.push(message.encode(count(0)));
+        }
+        if let Some((torque_nm, angle_rad)) = readings.column {
+            let message = Column {
+                driver_torque: Torque::from_nm(torque_nm),
+                wheel_angle: Radians::from_rad(angle_rad),
+                motor_torque: Torque::from_nm(view.motor_torque_nm),
+            };
+            frames.push(message.encode(count(1)));
+        }
+        if let Some(speeds_mps) = readings.speeds_mps {
+            let message = Vehicle {
+                speeds: speeds_mps.map(Speed::from_mps),
+            };
+            frames.push(message.encode(count(2)));
+        }
+        if view.step.is_multiple_of(HOST_PERIOD_MS) {
+            let counter = count(3);
+            let message = Demand {
+                engage: self.wish(requested, injections, acts),
+                authority: Gain::ONE,
+                probe: self.probe,
+            };
+            frames.push(message.encode(counter));
+        }
+    }
+
+    /// A sender that sends `count` frames where one is due goes on counting.
+    pub(super) fn skip_counts(&mut self, id: u16, count: u8) {
+        if let Some(sender) = MESSAGES.iter().position(|message| *message == id) {
+            self.counters[sender] = self.counters[sender].wrapping_add(count);
+        }
+    }
+}
+
+fn changed(change: &Change, value: f64, held: f64, since_s: f64, noise: &mut Xoshiro256PlusPlus) -> f64 {
+    match *change {
+        Change::Frozen => held,
+        Change::Times(factor) => factor * value,
+        Change::Mirrored => 2.0 * held - value,
+        Change::Plus(offset) => value + offset,
+        Change::Drifting(per_s) => value + per_s * since_s,
+        Change::Noisy(sd) => {
+            let white: f64 = StandardNormal.sample(noise);
+            value + sd * white
+        }
+        Change::StuckAt(constant) => constant,
+        Change::Approaching { value: end, per_s } => {
+            let way = end - held;
+            held + way.signum() * (per_s * since_s).min(way.abs())
+        }
+        // A period of the host's messages up, one down.
+        Change::Jumping(by) => {
+            let up = ((since_s * 100.0).round() as u64).is_multiple_of(2);
+            value + if up { by } else { -by }
+        }
+    }
+}

@@ -1,0 +1,488 @@
+//! Faults of the inputs: values that are wrong before they are encoded, or raw values under a fitting CRC.
+//!
+//! Sigma of the lane errors is 5 mm and 0.5 mrad. A jerk of the wheel moves the vehicle where a fault can only
+//! be seen by a movement that does not come.
+
+use super::{Row, STALE_MS, row};
+use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
+use crate::injection::{Change, Hand, Injection, Signal, Start, Wire, Wish};
+use crate::residual::Seen;
+
+use Change::{Approaching, Drifting, Frozen, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
+use Injection::{Invalid, Sensor};
+use Signal::{DriverTorque, LateralError, Speed1, Speed2, WheelAngle, YawError};
+
+/// Moves the vehicle aside within a second: faults of the lane errors show.
+const JERK: Injection = Injection::Hand(Hand::Jerk {
+    peak_nm: 2.5,
+    ms: 600,
+    before_ms: 300,
+});
+
+/// A raw value in every frame from the onset on.
+const fn always(id: u16, start: u32, bits: u32, value: i64) -> Injection {
+    field(id, start, bits, value, None)
+}
+
+const fn once(id: u16, start: u32, bits: u32, value: i64) -> Injection {
+    field(id, start, bits, value, Some(1))
+}
+
+const fn field(id: u16, start: u32, bits: u32, value: i64, frames: Option<u32>) -> Injection {
+    Injection::Wire(Wire::Field {
+        id,
+        start,
+        bits,
+        value,
+        frames,
+    })
+}
+
+const fn opposing(torque_nm: f64, ms: i32) -> Injection {
+    Injection::Hand(Hand::Opposes { torque_nm, ms })
+}
+
+pub(super) const ROWS: &[Row] = &[
+    row("jerk", "driver jerks the wheel: no fault", &[JERK]),
+    row(
+        "lateral-error-frozen",
+        "e_y' frozen",
+        &[JERK, Sensor(LateralError, Frozen)],
+    )
+    .contradicts(),
+    row(
+        "yaw-error-frozen",
+        "e_theta' frozen",
+        &[JERK, Sensor(YawError, Frozen)],
+    )
+    .contradicts(),
+    row(
+        "all-frozen",
+        "every input frozen, counters alive",
+        &[
+            JERK,
+            Sensor(LateralError, Frozen),
+            Sensor(YawError, Frozen),
+            Sensor(DriverTorque, Frozen),
+            Sensor(WheelAngle, Frozen),
+            Sensor(Speed1, Frozen),
+            Sensor(Speed2, Frozen),
+        ],
+    )
+    .contradicts(),
+    row("lane-invalid", "lane preview marked invalid", &[Invalid]).hands_over(STALE_MS),
+    row(
+        "lane-invalid-blink",
+        "lane preview marked invalid for 15 ms",
+        &[Invalid],
+    )
+    .bridged()
+    .lasts(15),
+    // One LSB beyond the range, once and always.
+    row(
+        "lateral-error-beyond-once",
+        "e_y' one LSB above 4 m, one frame",
+        &[once(LANE, 12, 17, 32_769)],
+    )
+    .rejected(),
+    row(
+        "lateral-error-beyond",
+        "e_y' one LSB above 4 m",
+        &[always(LANE, 12, 17, 32_769)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "yaw-error-beyond-once",
+        "e_theta' one LSB below -0.5 rad, one frame",
+        &[once(LANE, 29, 17, -32_769)],
+    )
+    .rejected(),
+    row(
+        "yaw-error-beyond",
+        "e_theta' one LSB below -0.5 rad",
+        &[always(LANE, 29, 17, -32_769)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "driver-torque-beyond-once",
+        "T_d one LSB above 20 N.m, one frame",
+        &[once(COLUMN, 12, 18, 81_921)],
+    )
+    .rejected(),
+    row(
+        "driver-torque-beyond",
+        "T_d one LSB above 20 N.m",
+        &[always(COLUMN, 12, 18, 81_921)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "wheel-angle-beyond-once",
+        "phi one LSB below -720 deg, one frame",
+        &[once(COLUMN, 30, 18, -72_001)],
+    )
+    .rejected(),
+    row(
+        "wheel-angle-beyond",
+        "phi one LSB below -720 deg",
+        &[always(COLUMN, 30, 18, -72_001)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speed-beyond-once",
+        "speed one LSB above 90 m/s, one frame",
+        &[once(VEHICLE, 12, 16, 23_041)],
+    )
+    .rejected(),
+    row(
+        "speed-beyond",
+        "speed one LSB above 90 m/s",
+        &[always(VEHICLE, 12, 16, 23_041)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "authority-beyond-once",
+        "authority one LSB above 1, one frame",
+        &[once(DEMAND, 13, 8, 129)],
+    )
+    .rejected(),
+    row(
+        "authority-beyond",
+        "authority one LSB above 1",
+        &[always(DEMAND, 13, 8, 129)],
+    )
+    .hands_over(STALE_MS),
+    // The ends of each field, as a sender with a broken computation would send them.
+    row(
+        "lateral-error-raw-min",
+        "e_y' at the least raw value",
+        &[always(LANE, 12, 17, -65_536)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "lateral-error-raw-max",
+        "e_y' at the largest raw value",
+        &[always(LANE, 12, 17, 65_535)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "yaw-error-raw-min",
+        "e_theta' at the least raw value",
+        &[always(LANE, 29, 17, -65_536)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "yaw-error-raw-max",
+        "e_theta' at the largest raw value",
+        &[always(LANE, 29, 17, 65_535)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "driver-torque-raw-min",
+        "T_d at the least raw value",
+        &[always(COLUMN, 12, 18, -131_072)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "driver-torque-raw-max",
+        "T_d at the largest raw value",
+        &[always(COLUMN, 12, 18, 131_071)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "wheel-angle-raw-min",
+        "phi at the least raw value",
+        &[always(COLUMN, 30, 18, -131_072)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "wheel-angle-raw-max",
+        "phi at the largest raw value",
+        &[always(COLUMN, 30, 18, 131_071)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speed-raw-min",
+        "speed at the least raw value",
+        &[always(VEHICLE, 28, 16, -32_768)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speed-raw-max",
+        "speed at the largest raw value",
+        &[always(VEHICLE, 28, 16, 32_767)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "authority-raw-max",
+        "authority at the largest raw value",
+        &[always(DEMAND, 13, 8, 255)],
+    )
+    .hands_over(STALE_MS),
+    // i32::MIN and MAX in the sender's own numbers: its encoder saturates at the signal's range.
+    row(
+        "lateral-error-min",
+        "e_y' of i32::MIN in the sender",
+        &[Sensor(LateralError, StuckAt(-2_147_483_648.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "lateral-error-max",
+        "e_y' of i32::MAX in the sender",
+        &[Sensor(LateralError, StuckAt(2_147_483_647.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "yaw-error-min",
+        "e_theta' of i32::MIN in the sender",
+        &[Sensor(YawError, StuckAt(-2_147_483_648.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "yaw-error-max",
+        "e_theta' of i32::MAX in the sender",
+        &[Sensor(YawError, StuckAt(2_147_483_647.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "wheel-angle-min",
+        "phi of i32::MIN in the sender",
+        &[Sensor(WheelAngle, StuckAt(-2_147_483_648.0))],
+    )
+    .contradicts(),
+    row(
+        "wheel-angle-max",
+        "phi of i32::MAX in the sender",
+        &[Sensor(WheelAngle, StuckAt(2_147_483_647.0))],
+    )
+    .contradicts(),
+    row(
+        "speed-max",
+        "speeds of i32::MAX in the sender",
+        &[
+            Sensor(Speed1, StuckAt(2_147_483_647.0)),
+            Sensor(Speed2, StuckAt(2_147_483_647.0)),
+        ],
+    )
+    .hands_over(STALE_MS),
+    // Steps, signs, drifts, gains, noise.
+    row(
+        "lateral-error-step-once",
+        "e_y' 0.5 m off in one sample",
+        &[Sensor(LateralError, Plus(0.5))],
+    )
+    .bridged()
+    .lasts(8),
+    row(
+        "lateral-error-step",
+        "e_y' 0.5 m off",
+        &[Sensor(LateralError, Plus(0.5))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "lateral-error-flipped",
+        "e_y' with the wrong sign",
+        &[JERK, Sensor(LateralError, Times(-1.0))],
+    )
+    .contradicts(),
+    row(
+        "yaw-error-flipped",
+        "e_theta' with the wrong sign",
+        &[JERK, Sensor(YawError, Times(-1.0))],
+    )
+    .contradicts(),
+    row(
+        "lateral-rate-flipped",
+        "e_y' mirrored: its rate has the wrong sign",
+        &[JERK, Sensor(LateralError, Mirrored)],
+    )
+    .contradicts(),
+    row(
+        "yaw-rate-flipped",
+        "e_theta' mirrored: its rate has the wrong sign",
+        &[JERK, Sensor(YawError, Mirrored)],
+    )
+    .contradicts(),
+    row(
+        "lateral-error-drifting",
+        "e_y' drifts by 0.1 m/s",
+        &[Sensor(LateralError, Drifting(0.1))],
+    ),
+    row(
+        "lateral-error-x0",
+        "e_y' times 0",
+        &[JERK, Sensor(LateralError, Times(0.0))],
+    )
+    .may_hand_over(),
+    row(
+        "lateral-error-x2",
+        "e_y' times 2",
+        &[JERK, Sensor(LateralError, Times(2.0))],
+    )
+    .may_hand_over()
+    .torque(5.0),
+    row(
+        "lateral-error-x10",
+        "e_y' times 10",
+        &[JERK, Sensor(LateralError, Times(10.0))],
+    )
+    .may_hand_over()
+    .torque(5.0),
+    row(
+        "yaw-error-x0",
+        "e_theta' times 0",
+        &[JERK, Sensor(YawError, Times(0.0))],
+    )
+    .may_hand_over(),
+    row(
+        "yaw-error-x2",
+        "e_theta' times 2",
+        &[JERK, Sensor(YawError, Times(2.0))],
+    )
+    .may_hand_over()
+    .torque(5.0),
+    row(
+        "yaw-error-x10",
+        "e_theta' times 10",
+        &[JERK, Sensor(YawError, Times(10.0))],
+    )
+    .may_hand_over()
+    .torque(5.0),
+    row(
+        "noise-3-sigma",
+        "noise of 15 mm and 1.5 mrad",
+        &[
+            Sensor(LateralError, Noisy(0.015)),
+            Sensor(YawError, Noisy(0.0015)),
+        ],
+    ),
+    row(
+        "noise-10-sigma",
+        "noise of 50 mm and 5 mrad",
+        &[Sensor(LateralError, Noisy(0.05)), Sensor(YawError, Noisy(0.005))],
+    ),
+    // The driver and his sensor.
+    row(
+        "driver-torque-zero",
+        "T_d stuck at 0",
+        &[Sensor(DriverTorque, StuckAt(0.0))],
+    )
+    .may_hand_over(),
+    row(
+        "driver-torque-full-left",
+        "T_d stuck at 20 N.m",
+        &[Sensor(DriverTorque, StuckAt(20.0))],
+    )
+    .contradicts(),
+    row(
+        "driver-torque-full-right",
+        "T_d stuck at -20 N.m",
+        &[Sensor(DriverTorque, StuckAt(-20.0))],
+    )
+    .contradicts(),
+    row(
+        "driver-torque-flipped",
+        "T_d with the wrong sign",
+        &[Sensor(DriverTorque, Times(-1.0))],
+    )
+    .contradicts(),
+    row(
+        "driver-torque-scaled",
+        "T_d times 1.26",
+        &[JERK, Sensor(DriverTorque, Times(1.26))],
+    )
+    .may_hand_over(),
+    row(
+        "driver-opposes-0.80",
+        "driver opposes with 0.80 N.m for 0.3 s: no cut",
+        &[opposing(0.80, 300)],
+    )
+    .uncut(),
+    row(
+        "driver-opposes-0.81",
+        "driver opposes with 0.81 N.m for 0.3 s",
+        &[opposing(0.81, 300)],
+    )
+    .opposed(),
+    row(
+        "driver-opposes-2.47",
+        "driver opposes with 2.47 N.m for 0.15 s",
+        &[opposing(2.47, 150)],
+    )
+    .yields(3)
+    .lasts(150),
+    row(
+        "driver-opposes-10",
+        "driver opposes with 10 N.m for 50 ms",
+        &[opposing(10.0, 50)],
+    )
+    .yields(3)
+    .lasts(50),
+    row(
+        "driver-taps",
+        "driver taps against the guidance at 5 Hz with 3 N.m: no growing oscillation",
+        &[Injection::Hand(Hand::Taps { torque_nm: 3.0 })],
+    )
+    .opposed(),
+    // Speed.
+    row(
+        "speed-falls-to-zero",
+        "speeds fall to 0 at 10 m/s2 while the vehicle goes on, which may be seen to be impossible first",
+        &[
+            Sensor(
+                Speed1,
+                Approaching {
+                    value: 0.0,
+                    per_s: 10.0,
+                },
+            ),
+            Sensor(
+                Speed2,
+                Approaching {
+                    value: 0.0,
+                    per_s: 10.0,
+                },
+            ),
+        ],
+    )
+    .fades(20)
+    .seen(Seen::Speed),
+    row(
+        "speed-zero",
+        "speeds 0 at once",
+        &[Sensor(Speed1, StuckAt(0.0)), Sensor(Speed2, StuckAt(0.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speed-negative",
+        "a speed one LSB below 0",
+        &[always(VEHICLE, 28, 16, -1)],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speed-jumping",
+        "speeds jump by 5 m/s up and down",
+        &[Sensor(Speed1, Jumping(5.0)), Sensor(Speed2, Jumping(5.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speeds-apart",
+        "second speed 2 m/s higher",
+        &[Sensor(Speed2, Plus(2.0))],
+    )
+    .hands_over(STALE_MS),
+    row(
+        "speeds-drift-apart",
+        "second speed drifts away at 5 m/s2: 2 m/s apart after 400 ms",
+        &[Sensor(Speed2, Drifting(5.0))],
+    )
+    .hands_over(420),
+    row("heading-wraps", "the road's heading passes +-pi: no jump", &[]).from(Start::HeadingWraps),
+    // The host's request.
+    row("request-ends", "request ends", &[Injection::Wish(Wish::Ends)]).fades(12),
+    row(
+        "request-drops",
+        "request low in one frame: no way around the rate limits",
+        &[Injection::Wish(Wish::Drops(1))],
+    )
+    .fades(12),
+];

@@ -1,0 +1,152 @@
+//! Faults of memory, computation, output and power.
+
+use haptic_core::ecu::injection::Region;
+
+use super::{MOTOR_MS, Row, row};
+use crate::injection::{Hand, Injection, Inside, Motor, Start, Wish};
+use crate::residual::Seen;
+
+const fn inside(inside: Inside) -> Injection {
+    Injection::Inside(inside)
+}
+
+pub(super) const ROWS: &[Row] = &[
+    row("hard-fault", "the processor faults", &[])
+        .restarts(2, 20)
+        .only_q(),
+    row("panic", "a check fails outside the torque path", &[])
+        .restarts(3, 20)
+        .only_q(),
+    row("stack-overflow", "the stack runs into its guard", &[])
+        .restarts(4, 20)
+        .only_q(),
+    row(
+        "flip-state",
+        "one bit of torque, state or ramp flips",
+        &[inside(Inside::Flip(Region::Controller))],
+    )
+    .stops(10)
+    .q(),
+    row(
+        "flip-inputs",
+        "one bit of inputs, applied torque or monitor state flips",
+        &[inside(Inside::Flip(Region::Ecu))],
+    )
+    .stops(10)
+    .q(),
+    row(
+        "flip-gains",
+        "one bit of gains, limits or margins flips",
+        &[inside(Inside::Flip(Region::Config))],
+    )
+    .stops(10)
+    .q(),
+    row(
+        "flip-monitor",
+        "one bit of the monitor's limits flips",
+        &[inside(Inside::Flip(Region::Monitor))],
+    )
+    .stops(10)
+    .q(),
+    row(
+        "parameters-bad",
+        "one bit wrong in both copies of the parameters at boot",
+        &[],
+    )
+    .locks()
+    .from(Start::NoParameters)
+    .q(),
+    row(
+        "parameters-absurd",
+        "every gain and the limit at the end of its range",
+        &[],
+    )
+    .only_rules()
+    .from(Start::Absurd)
+    .torque(5.0),
+    row(
+        "page-half-written",
+        "power fails while parameters are written: engages with the previous ones",
+        &[],
+    )
+    .engages()
+    .from(Start::HalfWritten)
+    .q(),
+    row(
+        "law-forced",
+        "the law asks for 5 N.m the wrong way: monitor, then zero",
+        &[inside(Inside::LawForced)],
+    )
+    .stops(500),
+    row(
+        "law-interrupted",
+        "the law asks for 5 N.m to the left, but in one of 16 ms for none",
+        &[inside(Inside::LawInterrupted)],
+    )
+    .stops(500),
+    row(
+        "law-random",
+        "the law asks for a random torque every 200 ms",
+        &[inside(Inside::LawRandom)],
+    )
+    .stops(2000),
+    row(
+        "monitor-agrees",
+        "the monitor agrees with everything: self-test within 1 s",
+        &[inside(Inside::MonitorAgrees)],
+    )
+    .stops(1000),
+    row(
+        "motor-ignores",
+        "the motor goes on with its torque while the request ends",
+        &[Injection::Motor(Motor::Stuck), Injection::Wish(Wish::Ends)],
+    )
+    .stops(MOTOR_MS)
+    .seen(Seen::Motor)
+    .after_fade(),
+    row(
+        "motor-half",
+        "the motor delivers half",
+        &[Injection::Motor(Motor::Times(0.5))],
+    )
+    .stops(MOTOR_MS)
+    .seen(Seen::Motor),
+    row(
+        "motor-dead",
+        "the motor delivers nothing, as a limiter that zeroes in silence",
+        &[Injection::Motor(Motor::Times(0.0))],
+    )
+    .stops(MOTOR_MS)
+    .seen(Seen::Motor),
+    row(
+        "motor-reversed",
+        "the motor turns the wrong way",
+        &[Injection::Motor(Motor::Times(-1.0))],
+    )
+    .stops(MOTOR_MS)
+    .seen(Seen::Motor),
+    row(
+        "brown-out",
+        "the supply breaks down in the curve",
+        &[inside(Inside::BrownOut)],
+    )
+    .restarts(5, 2),
+    row("three-resets", "third reset within 10 s", &[])
+        .locks()
+        .from(Start::ThirdReset)
+        .q(),
+    row(
+        "engage-in-curve",
+        "request in mid-curve with a large error",
+        &[Injection::Hand(Hand::Jerk {
+            peak_nm: 1.8,
+            ms: 600,
+            before_ms: 600,
+        })],
+    )
+    .engages()
+    .from(Start::Boot)
+    // The error that is left when guidance comes is larger than any of ordinary driving.
+    .torque(2.5)
+    .q(),
+];

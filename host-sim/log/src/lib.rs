@@ -1,0 +1,6 @@
+//! Records of drives.
+
+mod event;
+pub mod trace;
+
+pub use event::Event;

@@ -1,0 +1,138 @@
+//! A report as HTML: structure and style sheet.
+//!
+//! Text goes through the template's escaping; the only raw insertions are the style sheet below and drawings
+//! made by `plot`, which escapes its own text. The content security policy forbids the browser to load or run
+//! anything.
+
+use haptic_log::Event;
+
+use super::{Block, Cell, Report, Section, Table};
+use crate::plot::PlotError;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
+
+/// Figures keep white paper in the dark: their colours are chosen for it.
+const STYLE: &str = include_str!("report.css");
+
+pub(super) fn document(report: &Report) -> Result<String, PlotError> {
+    let sections = report
+        .sections
+        .iter()
+        .enumerate()
+        .map(|(i, s)| section(i, s))
+        .collect::<Result<Vec<_>, _>>()?;
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                title { (report.title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (report.title) }
+                    @if !report.summary.is_empty() { p { (report.summary) } }
+                    nav {
+                        @for (i, section) in report.sections.iter().enumerate() {
+                            a href={ "#section-" (i + 1) } { (section.heading) }
+                        }
+                    }
+                }
+                main { @for section in &sections { (section) } }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+fn section(index: usize, section: &Section) -> Result<Markup, PlotError> {
+    let blocks = section.blocks.iter().map(block).collect::<Result<Vec<_>, _>>()?;
+    Ok(html! {
+        section id={ "section-" (index + 1) } {
+            h2 { (section.heading) }
+            @for block in &blocks { (block) }
+        }
+    })
+}
+
+fn block(block: &Block) -> Result<Markup, PlotError> {
+    Ok(match block {
+        Block::Text(text) => html! { p { (text) } },
+        Block::Table(t) => table(t),
+        Block::Figure { figure, caption } => {
+            let svg = figure.to_svg()?;
+            html! {
+                figure { (PreEscaped(svg)) figcaption { (caption) } }
+            }
+        }
+        Block::Events(list) => events(list),
+    })
+}
+
+fn table(table: &Table) -> Markup {
+    // A heading stands over its column: at the right over numbers.
+    let is_number = |column: usize| {
+        matches!(
+            table.rows.first().and_then(|r| r.get(column)),
+            Some(Cell::Number { .. })
+        )
+    };
+    html! {
+        div.table {
+            table {
+                @if !table.caption.is_empty() { caption { (table.caption) } }
+                thead { tr {
+                    @for (i, column) in table.columns.iter().enumerate() {
+                        th.number[is_number(i)] scope="col" { (column) }
+                    }
+                } }
+                tbody {
+                    @for row in &table.rows {
+                        tr { @for c in row { (cell(c)) } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn cell(cell: &Cell) -> Markup {
+    match cell {
+        // Names of conditions stay on one line, sentences break.
+        Cell::Text(text) => html! { td.short[text.chars().count() <= 20] { (text) } },
+        Cell::Number { value, decimals } => html! { td.number { (number(*value, *decimals)) } },
+    }
+}
+
+/// A number in plain ASCII, so that it can be copied into a spreadsheet; no negative zero.
+pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
+    match value.filter(|v| v.is_finite()) {
+        None => "\u{2013}".into(),
+        Some(value) => {
+            let text = format!("{value:.decimals$}");
+            let is_zero = !text.contains(|c: char| ('1'..='9').contains(&c));
+            if is_zero {
+                text.trim_start_matches('-').into()
+            } else {
+                text
+            }
+        }
+    }
+}
+
+fn events(events: &[Event]) -> Markup {
+    html! {
+        @if events.is_empty() { p { "No events." } }
+        @else {
+            ol.events {
+                @for event in events {
+                    li { span.time { (number(Some(event.time_s), 3)) " s" } " " (event.what) }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! What a reader and a file system rely on.
+
+use super::*;
+use crate::plot::{Axis, Line, Panel};
+use haptic_analysis::metrics::{DEFINITIONS, Metrics};
+use std::fs;
+use std::io;
+
+fn report_of(blocks: Vec<Block>) -> String {
+    let section = Section {
+        heading: "Results & more".into(),
+        blocks,
+    };
+    Report {
+        title: "A <b>title</b>".into(),
+        summary: "Course: ours.".into(),
+        sections: vec![section],
+    }
+    .to_html()
+    .unwrap()
+}
+
+#[test]
+fn text_from_outside_cannot_become_markup() {
+    let evil = "</td><script>alert('x')</script>";
+    let figure = Figure {
+        title: evil.into(),
+        panels: vec![Panel::default()],
+        ..Figure::default()
+    };
+    let html = report_of(vec![
+        Block::Text(evil.into()),
+        Block::Table(Table::of_pairs([evil, "b"], [(evil, evil)])),
+        Block::Figure {
+            figure,
+            caption: evil.into(),
+        },
+        Block::Events(vec![Event {
+            time_s: 70.0,
+            what: evil.into(),
+        }]),
+    ]);
+    assert!(!html.contains("<script") && !html.contains("<b>"));
+    assert_eq!(
+        html.matches("&lt;script&gt;").count(),
+        7,
+        "each place shows the text"
+    );
+    assert!(html.contains("Results &amp; more"));
+}
+
+#[test]
+fn a_report_loads_nothing() {
+    let figure = Figure {
+        panels: vec![Panel::default()],
+        ..Figure::default()
+    };
+    let html = report_of(vec![Block::Figure {
+        figure,
+        caption: String::new(),
+    }]);
+    let namespace = "xmlns=\"http://www.w3.org/2000/svg\"";
+    for outside in ["http:", "https:", "src=", "url(", "@import", "<link"] {
+        assert!(!html.replace(namespace, "").contains(outside), "{outside}");
+    }
+}
+
+#[test]
+fn a_number_that_is_none_is_a_dash() {
+    let cell = |value, decimals| Cell::Number { value, decimals };
+    let table = Table {
+        columns: ["a", "b", "c", "d"].map(String::from).to_vec(),
+        rows: vec![vec![
+            cell(Some(0.12345), 4),
+            cell(None, 4),
+            cell(Some(f64::NAN), 1),
+            cell(Some(-0.0001), 2),
+        ]],
+        ..Table::default()
+    };
+    let html = report_of(vec![Block::Table(table)]);
+    let cells: Vec<_> = html
+        .split("<td class=\"number\">")
+        .skip(1)
+        .map(|c| c.split('<').next().unwrap())
+        .collect();
+    assert_eq!(cells, ["0.1235", "\u{2013}", "\u{2013}", "0.00"]);
+}
+
+#[test]
+fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
+    let x = Axis {
+        label: "x".into(),
+        limits: Some((1.0, 0.0)),
+    };
+    let figure = Figure {
+        title: "Figure 8".into(),
+        x,
+        ..Figure::default()
+    };
+    let section = Section {
+        heading: String::new(),
+        blocks: vec![Block::Figure {
+            figure,
+            caption: String::new(),
+        }],
+    };
+    let report = Report {
+        sections: vec![section],
+        ..Report::default()
+    };
+    assert!(report.to_html().unwrap_err().to_string().contains("Figure 8"));
+}
+
+#[test]
+fn a_metrics_table_shows_the_chosen_metrics_with_units() {
+    let metrics = Metrics {
+        peak_lateral_error_m: Some(0.61789),
+        conflict_time_share: Some(0.25),
+        ..Metrics::default()
+    };
+    let keys = ["Driver"];
+    let runs = [(vec![Cell::Text("t_p 0.5".into())], metrics)];
+    let shown = ["peak_lateral_error_m", "conflict_time_share", "time_to_recover_s"];
+    let table = metrics_table("", &keys, &runs, |d| shown.contains(&d.name));
+    assert_eq!(
+        table.columns,
+        [
+            "Driver",
+            "Peak lateral error (m)",
+            "Conflict",
+            "Time to recover (s)"
+        ]
+    );
+    assert_eq!(
+        table.rows[0][1],
+        Cell::Number {
+            value: Some(0.61789),
+            decimals: 4
+        }
+    );
+    assert_eq!(
+        table.rows[0][3],
+        Cell::Number {
+            value: None,
+            decimals: 2
+        }
+    );
+    assert_eq!(definitions_table().rows.len(), DEFINITIONS.len());
+}
+
+#[test]
+fn a_file_is_replaced_whole_or_not_at_all() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("new/out.txt");
+    write_file(&path, |f| f.write_all(b"first")).unwrap();
+    let error = write_file(&path, |f| {
+        f.write_all(b"half of the sec")?;
+        Err(io::Error::other("the run was stopped"))
+    })
+    .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!("cannot write {}: the run was stopped", path.display())
+    );
+    assert_eq!(fs::read_to_string(&path).unwrap(), "first");
+    assert_eq!(
+        fs::read_dir(path.parent().unwrap()).unwrap().count(),
+        1,
+        "no partial file is left"
+    );
+}
+
+#[test]
+fn an_unwritable_path_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("file");
+    fs::write(&file, "").unwrap();
+    let below = file.join("report.html");
+    let message = write_file(&below, |_| Ok(())).unwrap_err().to_string();
+    assert!(message.contains("report.html"), "{message}");
+}
+
+#[test]
+fn json_has_null_where_there_is_no_value() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("results.json");
+    write_json(&path, &[f64::NAN, 0.5]).unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "[\n  null,\n  0.5\n]\n");
+}
+
+/// A page of four figures of long records stays below a few megabytes.
+#[test]
+fn a_report_of_long_records_stays_small() {
+    let points: Vec<_> = (0..46_000)
+        .map(|i| f64::from(i) / 200.0)
+        .map(|t| (t, (3.0 * t).sin()))
+        .collect();
+    let line = |style| Line {
+        label: format!("run {style}"),
+        style,
+        points: points.clone(),
+    };
+    let panel = Panel {
+        lines: (0..4).map(line).collect(),
+        ..Panel::default()
+    };
+    let figure = Figure {
+        panels: vec![panel.clone(), panel.clone(), panel],
+        ..Figure::default()
+    };
+    let block = Block::Figure {
+        figure,
+        caption: String::new(),
+    };
+    let html = report_of(vec![block.clone(), block.clone(), block.clone(), block]);
+    assert!(html.len() < 3_000_000, "{} bytes", html.len());
+}

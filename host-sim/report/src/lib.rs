@@ -1,0 +1,5 @@
+//! Results as tables and figures.
+
+pub mod document;
+pub mod plot;
+pub mod studies;

@@ -1,0 +1,263 @@
+//! The files that an evaluation leaves: figures 8 and 9, figure 9 beside a handover, time series, results, and
+//! the report that shows them.
+
+use std::path::Path;
+
+use super::files::{write_figure, write_report};
+use super::{OutputError, curves, notes};
+use crate::document::{
+    Block, Cell, Report, Section, Table, definitions_table, metrics_table, write_json, write_trace_csv,
+};
+use crate::plot::lateral_error::{DriverPanel, figure};
+use crate::plot::{Figure, Marker};
+use haptic_analysis::metrics::Definition;
+use haptic_batch::RunRecord;
+use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, Results};
+use haptic_sim::models::road::PAPER_COURSE;
+use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+
+/// Metrics of the short table; the report's second table has all of them.
+const IN_SHORT: [&str; 7] = [
+    "peak_lateral_error_m",
+    "mean_abs_lateral_error_m",
+    "sdlp_m",
+    "time_out_of_lane_s",
+    "min_time_to_lane_crossing_s",
+    "peak_guidance_torque_nm",
+    "peak_driver_torque_nm",
+];
+
+/// Writes figures 8 and 9 (SVG, PNG), the time series (CSV), the results (JSON) and a report (HTML).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), OutputError> {
+    let figures = [
+        ("figure8", nominal_figure(evaluation)),
+        ("figure9", failure_figure(evaluation)),
+        ("figure9_handover", handover_figure(evaluation)),
+    ];
+    for (name, figure) in &figures {
+        write_figure(directory, name, figure)?;
+    }
+    for (scenario, run) in &evaluation.runs {
+        let name = format!(
+            "t_p_{}_{}_failure_{}.csv",
+            scenario.driver.t_p, scenario.condition, scenario.failure.kind
+        );
+        write_trace_csv(&directory.join("runs").join(name), &run.trace)?;
+    }
+    write_json(&directory.join("results.json"), &evaluation.results)?;
+    write_report(
+        directory,
+        &report(&evaluation.results, figures.map(|(_, figure)| figure)),
+    )
+}
+
+fn nominal_figure(evaluation: &Evaluation) -> Figure {
+    let shown = |s: &Scenario| s.failure.kind == FailureKind::None;
+    panels(
+        evaluation,
+        "Lateral error by reliance on the guidance",
+        &[("", &shown)],
+    )
+}
+
+/// The manual run has no guidance to fail; it is drawn as what the others fall back to.
+fn failure_figure(evaluation: &Evaluation) -> Figure {
+    let title = format!(
+        "Lateral error when the guidance fails at {} s",
+        evaluation.results.failure_time_s
+    );
+    let shown = |s: &Scenario| s.failure.kind == FailureKind::Torque || s.condition == Condition::Manual;
+    let mut figure = panels(evaluation, &title, &[("", &shown)]);
+    figure.markers.extend(failure_marker(evaluation));
+    figure
+}
+
+/// The sudden loss above the handover, driver by driver, on the same axes.
+fn handover_figure(evaluation: &Evaluation) -> Figure {
+    let title = format!(
+        "Lateral error: guidance torque lost, and input lost and handed over, at {} s",
+        evaluation.results.failure_time_s
+    );
+    let fails = |kind| move |s: &Scenario| s.failure.kind == kind || s.condition == Condition::Manual;
+    let (lost, handed_over) = (fails(FailureKind::Torque), fails(FailureKind::Input));
+    let mut figure = panels(
+        evaluation,
+        &title,
+        &[(": torque lost", &lost), (": handed over", &handed_over)],
+    );
+    figure.markers.extend(failure_marker(evaluation));
+    figure
+}
+
+/// Where the guidance fails, if that is in the figure.
+fn failure_marker(evaluation: &Evaluation) -> Option<Marker> {
+    let failed = evaluation
+        .runs
+        .iter()
+        .find(|(s, _)| s.failure.kind == FailureKind::Torque);
+    let place = failed.and_then(|(scenario, run)| {
+        let time_s = scenario.failure.at_s()?;
+        run.trace.samples.iter().find(|sample| sample.time_s >= time_s)
+    });
+    let [from, to] = evaluation.results.window_m;
+    place
+        .filter(|sample| (from..=to).contains(&sample.s_m))
+        .map(|sample| Marker {
+            label: "failure".into(),
+            x: sample.s_m,
+        })
+}
+
+/// What a panel's title ends with, and which runs it shows.
+type Shown<'a> = (&'a str, &'a dyn Fn(&Scenario) -> bool);
+
+/// For each driver one panel for each of `kinds`.
+fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
+    let mut drivers = Vec::new();
+    for (number, t_p) in DRIVERS_T_P.iter().enumerate() {
+        for (ending, shown) in kinds {
+            let runs = evaluation
+                .runs
+                .iter()
+                .filter(|(s, _)| s.driver.t_p == *t_p && shown(s));
+            let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
+            drivers.push(DriverPanel {
+                title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
+                runs: runs
+                    .map(|(s, run)| (label(s.condition).into(), style(s.condition), &run.trace))
+                    .collect(),
+            });
+        }
+    }
+    let [from, to] = evaluation.results.window_m;
+    let course = evaluation.runs.first().map(|(scenario, _)| &scenario.course);
+    let bands = course.map(curves::bands).unwrap_or_default();
+    let bands = bands.into_iter().filter(|band| band.from < to && band.to > from);
+    figure(title, &drivers, (from, to), Vec::new(), bands.collect())
+}
+
+fn label(condition: Condition) -> &'static str {
+    match condition {
+        Condition::Manual => "manual",
+        Condition::High => "high reliance",
+        Condition::Mid => "mid reliance",
+        Condition::Low => "low reliance",
+        Condition::Custom => "other gains",
+    }
+}
+
+fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Report {
+    let course = if results.course == PAPER_COURSE {
+        "The course is this project's own: the paper prints no numbers for its own. "
+    } else {
+        ""
+    };
+    let [from, to] = results.window_m;
+    let mut sections = vec![
+        Section {
+            heading: "Reliance on the guidance (figure 8)".into(),
+            blocks: vec![Block::Figure {
+                figure: nominal,
+                caption: "Lateral error from the centreline, left positive, without failure.".into(),
+            }],
+        },
+        Section {
+            heading: "Failure of the guidance (figure 9)".into(),
+            blocks: vec![Block::Figure {
+                figure: failure,
+                caption: format!(
+                    "The guidance torque drops to zero at {} s; one second later the driver steers as manually. \
+                     The manual run has no failure and is drawn for comparison.",
+                    results.failure_time_s
+                ),
+            }],
+        },
+        Section {
+            heading: "Failure of the guidance's input".into(),
+            blocks: vec![Block::Figure {
+                figure: handover,
+                caption: format!(
+                    "Above, the torque drops to zero at {t} s. Below, the lane preview stops at {t} s: the ECU \
+                     holds its last trusted torque and fades it to zero over 2 s. One second after either the \
+                     driver steers as manually.",
+                    t = results.failure_time_s
+                ),
+            }],
+        },
+    ];
+    if !results.claims.is_empty() {
+        sections.push(claims_section(results));
+    }
+    sections.push(Section {
+        heading: "Results".into(),
+        blocks: vec![Block::Table(table(
+            results,
+            "The main metrics of each run.",
+            |d| IN_SHORT.contains(&d.name),
+        ))],
+    });
+    sections.push(Section {
+        heading: "All metrics".into(),
+        blocks: vec![
+            Block::Table(table(results, "", |_| true)),
+            Block::Table(definitions_table()),
+        ],
+    });
+    Report {
+        title: "Evaluation of shared steering control".into(),
+        summary: format!(
+            "Three drivers under four conditions on {}, {} km/h, the shipping controller in the loop, sensors: \
+             {}. {course}Metrics are taken over {from} to {to} m of the road. {}",
+            results.course,
+            results.speed_kmh,
+            format!("{:?}", results.sensors).to_lowercase(),
+            notes(&results.notes),
+        ),
+        sections,
+    }
+}
+
+fn claims_section(results: &Results) -> Section {
+    let rows = results.claims.iter().map(|claim| {
+        let holds = if claim.holds { "holds" } else { "BROKEN" };
+        [claim.claim.as_str(), holds, &claim.evidence]
+            .map(|text| Cell::Text(text.into()))
+            .to_vec()
+    });
+    Section {
+        heading: "What it must show".into(),
+        blocks: vec![Block::Table(Table {
+            caption: "The independent implementation's numbers, and the paper's claims as orderings.".into(),
+            columns: ["Claim", "", "Evidence"].map(String::from).to_vec(),
+            rows: rows.collect(),
+        })],
+    }
+}
+
+fn table(results: &Results, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
+    let keys = |r: &RunRecord| {
+        let ended = if r.diverged {
+            format!("diverged at {:.0} m", r.end_m)
+        } else {
+            "end of course".into()
+        };
+        let texts = [r.condition.to_string(), r.failure.to_string(), ended].map(Cell::Text);
+        [Cell::Number {
+            value: Some(r.t_p),
+            decimals: 1,
+        }]
+        .into_iter()
+        .chain(texts)
+        .collect()
+    };
+    let rows: Vec<(Vec<Cell>, _)> = results.runs.iter().map(|r| (keys(r), r.metrics)).collect();
+    metrics_table(
+        caption,
+        &["t_p (s)", "Condition", "Failure", "Ended"],
+        &rows,
+        shown,
+    )
+}

@@ -1,0 +1,282 @@
+//! The files that the experiment leaves: truth beside estimate, the paths driven and driven again (as the
+//! paper's figure 7), trajectory errors beside the paper's, results, and the report that shows them.
+
+use std::path::Path;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Report, Section, Table, write_file, write_json};
+use crate::plot::{Axis, Figure, Line, Panel};
+use haptic_analysis::identify::{Parameter, Parameters};
+use haptic_batch::experiment::{Drive, Experiment, Finding};
+
+/// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
+    let mut figures = vec![("trajectory_errors", trajectory_errors(experiment))];
+    if let Some(drive) = typical(experiment) {
+        figures.push(("paths", paths(drive)));
+        figures.push(("torque", torque(drive)));
+    }
+    for (name, figure) in &figures {
+        write_figure(directory, name, figure)?;
+    }
+    write_json(&directory.join("results.json"), experiment)?;
+    write_report(
+        directory,
+        &report(experiment, figures.into_iter().map(|f| f.1).collect()),
+    )
+}
+
+/// Writes what was recorded of each drive, a CSV file each, as `identify` reads them.
+///
+/// # Errors
+/// What could not be written.
+pub fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
+    for drive in &experiment.drives {
+        let kind = if drive.guided { "guided" } else { "manual" };
+        let name = format!("participant-{:02}-{kind}.csv", drive.participant);
+        write_file(&directory.join(name), |f| drive.log.write(f))?;
+    }
+    Ok(())
+}
+
+/// The guided drive whose fit is the middle one, as the paper shows "a typical participant".
+fn typical(experiment: &Experiment) -> Option<&Drive> {
+    let mut guided: Vec<&Drive> = experiment.drives.iter().filter(|d| d.guided).collect();
+    let fit = |d: &Drive| d.noise_model.identification.fit_percent;
+    guided.sort_by(|a, b| fit(a).total_cmp(&fit(b)));
+    guided.get(guided.len() / 2).copied()
+}
+
+fn axis(label: &str) -> Axis {
+    Axis {
+        label: label.into(),
+        limits: None,
+    }
+}
+
+fn panel(title: &str, label: &str, lines: Vec<Line>) -> Panel {
+    Panel {
+        title: title.into(),
+        y: axis(label),
+        lines,
+    }
+}
+
+fn paths(drive: &Drive) -> Figure {
+    let line = |label: &str, style, points: &[(f64, f64)]| Line {
+        label: label.into(),
+        style,
+        points: points.to_vec(),
+    };
+    let lines = vec![
+        line("measured", 0, &drive.path),
+        line("identified driver", 1, &drive.noise_model.path),
+        line("identified driver, published method", 3, &drive.paper.path),
+    ];
+    Figure {
+        title: format!("Participant {}, guided", drive.participant),
+        x: axis("Distance along the road (m)"),
+        panels: vec![panel("", "Lateral error (m)", lines)],
+        ..Figure::default()
+    }
+}
+
+fn torque(drive: &Drive) -> Figure {
+    let t = &drive.noise_model.identification.traces;
+    let line = |label: &str, style, y: &[f64]| Line {
+        label: label.into(),
+        style,
+        points: t.time_s.iter().copied().zip(y.iter().copied()).collect(),
+    };
+    Figure {
+        title: format!("Participant {}, guided", drive.participant),
+        x: axis("Time (s)"),
+        panels: vec![panel(
+            "",
+            "Driver torque (N.m)",
+            vec![
+                line("measured", 0, &t.measured_nm),
+                line("simulated", 1, &t.simulated_nm),
+            ],
+        )],
+        ..Figure::default()
+    }
+}
+
+fn trajectory_errors(experiment: &Experiment) -> Figure {
+    let line = |label: &str, style, guided: bool, of: fn(&Drive) -> &Finding| Line {
+        label: label.into(),
+        style,
+        points: experiment
+            .drives
+            .iter()
+            .filter(|d| d.guided == guided)
+            .filter_map(|d| Some((f64::from(d.participant), of(d).trajectory_error_m?)))
+            .collect(),
+    };
+    let ends = experiment.drives.iter().map(|d| f64::from(d.participant));
+    let (first, last) = (
+        ends.clone().fold(f64::INFINITY, f64::min),
+        ends.fold(0.0, f64::max),
+    );
+    let [low, mean, high] = experiment.published_trajectory_error_m;
+    let level = |label: &str, style, value| Line {
+        label: label.into(),
+        style,
+        points: vec![(first, value), (last, value)],
+    };
+    let panels = [("Guided", true), ("Manual", false)].map(|(title, guided)| {
+        let mut lines = vec![
+            line("noise model", 0, guided, |d| &d.noise_model),
+            line("published method", 3, guided, |d| &d.paper),
+        ];
+        if guided {
+            lines.push(level("the paper's mean", 1, mean));
+            lines.push(level("the paper's range", 2, low));
+            lines.push(level("the paper's range", 2, high));
+        }
+        panel(title, "Trajectory error (m)", lines)
+    });
+    Figure {
+        x: axis("Participant"),
+        panels: panels.to_vec(),
+        same_y: true,
+        ..Figure::default()
+    }
+}
+
+fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
+    let captions = [
+        "Mean distance between the path of the drive and that of the identified driver without remnant.",
+        "A typical participant: the path of the drive, and of the drivers identified from it.",
+        "The same participant: driver torque, measured and simulated by the default method.",
+    ];
+    let mut blocks: Vec<Block> = figures
+        .into_iter()
+        .zip(captions)
+        .map(|(figure, caption)| Block::Figure {
+            figure,
+            caption: caption.into(),
+        })
+        .collect();
+    blocks.insert(0, Block::Table(trajectory_table(experiment)));
+    let truth = |guided: bool, heading: &str| Section {
+        heading: heading.into(),
+        blocks: vec![Block::Table(truth_table(experiment, guided))],
+    };
+    Report {
+        title: "Fourteen drivers, identified".into(),
+        summary: format!(
+            "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. \
+             Truth beside estimate; a dash where the data do not identify a parameter.",
+            experiment.course, experiment.probe_nm, experiment.seed
+        ),
+        sections: vec![
+            truth(true, "With guidance"),
+            truth(false, "Manual"),
+            Section {
+                heading: "The identified drivers drive again".into(),
+                blocks,
+            },
+        ],
+    }
+}
+
+fn truth_table(experiment: &Experiment, guided: bool) -> Table {
+    let sum = |d: &Drive| d.truth.k_d + haptic_analysis::identify::Muscle::default().k_nms;
+    type Column = (&'static str, fn(&Parameters) -> &Parameter, usize);
+    let columns: [Column; 5] = [
+        ("gain_1", |p| &p.gain_1, 3),
+        ("gain_2", |p| &p.gain_2, 3),
+        ("gain_3", |p| &p.gain_3, 2),
+        ("t_p", |p| &p.t_p, 3),
+        ("K_hg", |p| &p.k_hg, 3),
+    ];
+    let shown = if guided { 5 } else { 4 };
+    let mut headings = vec!["Participant".to_owned(), "Method".to_owned(), "Fit %".to_owned()];
+    for (name, ..) in &columns[..shown] {
+        headings.extend([(*name).to_owned(), format!("{name} error")]);
+    }
+    let mut rows = Vec::new();
+    for drive in experiment.drives.iter().filter(|d| d.guided == guided) {
+        let t = &drive.truth;
+        let truths = [
+            t.a_1 * sum(drive),
+            t.a_2 * sum(drive),
+            t.a_3 * sum(drive),
+            t.t_p,
+            t.k_hg.unwrap_or(0.0),
+        ];
+        let start = |method: &str, fit: f64| {
+            vec![
+                Cell::Text(drive.participant.to_string()),
+                Cell::Text(method.into()),
+                Cell::Number {
+                    value: Some(fit),
+                    decimals: 1,
+                },
+            ]
+        };
+        let mut row = start("truth", t.fitness);
+        for (value, (_, _, decimals)) in truths.into_iter().zip(&columns[..shown]) {
+            row.push(Cell::Number {
+                value: Some(value),
+                decimals: *decimals,
+            });
+            row.push(Cell::Text(String::new()));
+        }
+        rows.push(row);
+        for finding in [&drive.noise_model, &drive.paper] {
+            let mut row = start(finding.identification.method, finding.identification.fit_percent);
+            for (_, parameter, decimals) in &columns[..shown] {
+                let p = parameter(&finding.identification.parameters);
+                // The published method names a number whatever the data say; it is shown as it would be printed.
+                let paper = finding.identification.method == "paper";
+                let value = if paper { p.optimum } else { p.estimate };
+                row.push(Cell::Number {
+                    value,
+                    decimals: *decimals,
+                });
+                row.push(Cell::Number {
+                    value: p.standard_error,
+                    decimals: *decimals,
+                });
+            }
+            rows.push(row);
+        }
+    }
+    Table {
+        caption:
+            "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
+                  come as it would print them, on a bound or not."
+                .into(),
+        columns: headings,
+        rows,
+    }
+}
+
+fn trajectory_table(experiment: &Experiment) -> Table {
+    let [low, mean, high] = experiment.published_trajectory_error_m;
+    let rows = experiment.drives.iter().map(|d| {
+        let number = |value| Cell::Number { value, decimals: 3 };
+        vec![
+            Cell::Text(d.participant.to_string()),
+            Cell::Text(if d.guided { "guided" } else { "manual" }.into()),
+            number(d.noise_model.trajectory_error_m),
+            number(d.paper.trajectory_error_m),
+        ]
+    });
+    Table {
+        caption: format!(
+            "Mean absolute trajectory error, m. The paper's, with guidance: {low} to {high}, mean {mean}."
+        ),
+        columns: ["Participant", "Drive", "Noise model", "Published method"]
+            .map(String::from)
+            .to_vec(),
+        rows: rows.collect(),
+    }
+}

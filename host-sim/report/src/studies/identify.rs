@@ -1,0 +1,364 @@
+//! The files that one identification leaves: measured and simulated torque (as the paper's figure 6), the
+//! residuals, the driver over time, the results, and the report that shows them.
+
+use std::path::Path;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Report, Section, Table, write_json};
+use crate::plot::{Axis, Figure, Line, Panel};
+use haptic_analysis::identify::{History, Identification, autocorrelation};
+use haptic_batch::identify::IdentifiedDrive;
+
+/// Lags of the autocorrelation drawn.
+const LAGS: usize = 60;
+
+/// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputError> {
+    let figures = [
+        ("torque", torque(&drive.results.identification)),
+        ("residuals", residuals(&drive.results.identification)),
+        ("autocorrelation", correlogram(&drive.results.identification)),
+        ("over_time", over_time(drive)),
+    ];
+    for (name, figure) in &figures {
+        write_figure(directory, name, figure)?;
+    }
+    write_json(&directory.join("results.json"), &drive.results)?;
+    write_report(directory, &report(drive, figures.map(|f| f.1)))
+}
+
+fn axis(label: &str) -> Axis {
+    Axis {
+        label: label.into(),
+        limits: None,
+    }
+}
+
+fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Line {
+    Line {
+        label: label.into(),
+        style,
+        points: x.iter().copied().zip(y.iter().copied()).collect(),
+    }
+}
+
+fn over(x: &str, panels: Vec<Panel>) -> Figure {
+    Figure {
+        x: axis(x),
+        panels,
+        ..Figure::default()
+    }
+}
+
+fn torque(found: &Identification) -> Figure {
+    let t = &found.traces;
+    let lines = vec![
+        line("measured", 0, &t.time_s, &t.measured_nm),
+        line("simulated", 1, &t.time_s, &t.simulated_nm),
+    ];
+    over(
+        "Time (s)",
+        vec![Panel {
+            title: String::new(),
+            y: axis("Driver torque (N.m)"),
+            lines,
+        }],
+    )
+}
+
+fn residuals(found: &Identification) -> Figure {
+    let t = &found.traces;
+    let unexplained: Vec<f64> = t
+        .measured_nm
+        .iter()
+        .zip(&t.simulated_nm)
+        .map(|(y, m)| y - m)
+        .collect();
+    let panel = |title: &str, y: &[f64]| Panel {
+        title: title.into(),
+        y: axis("(N.m)"),
+        lines: vec![line("", 0, &t.time_s, y)],
+    };
+    over(
+        "Time (s)",
+        vec![
+            panel("Measured minus simulated", &unexplained),
+            panel("Residual of the loss", &t.residual_nm),
+        ],
+    )
+}
+
+fn correlogram(found: &Identification) -> Figure {
+    let r = autocorrelation(&found.traces.residual_nm, LAGS);
+    let bound = 1.96 / (found.rows as f64).sqrt();
+    let lags: Vec<f64> = (1..=r.len()).map(|k| k as f64).collect();
+    let level = |label: &str, v: f64| line(label, 2, &[1.0, r.len() as f64], &[v, v]);
+    let lines = vec![
+        line("", 0, &lags, &r),
+        level("95 % if white", bound),
+        level("95 % if white", -bound),
+    ];
+    over(
+        "Lag (samples)",
+        vec![Panel {
+            title: String::new(),
+            y: axis("Autocorrelation"),
+            lines,
+        }],
+    )
+}
+
+fn over_time(drive: &IdentifiedDrive) -> Figure {
+    let t = &drive.tracking;
+    let panel = |title: &str, unit: &str, h: &History| {
+        let band = |sign: f64| -> Vec<f64> {
+            h.estimate
+                .iter()
+                .zip(&h.standard_deviation)
+                .map(|(e, s)| e + sign * 2.0 * s)
+                .collect()
+        };
+        let lines = vec![
+            line("two standard deviations", 2, &t.time_s, &band(-1.0)),
+            line("two standard deviations", 2, &t.time_s, &band(1.0)),
+            line("estimate", 0, &t.time_s, &h.estimate),
+        ];
+        Panel {
+            title: title.into(),
+            y: axis(unit),
+            lines,
+        }
+    };
+    over(
+        "Time (s)",
+        vec![
+            panel("K_hg", "(-)", &t.k_hg),
+            panel("gain_1", "(N.m/m)", &t.gain[0]),
+            panel("gain_2", "(N.m/(m.s))", &t.gain[1]),
+            panel("gain_3", "(N.m/rad)", &t.gain[2]),
+            panel("t_p", "(s)", &t.t_p),
+        ],
+    )
+}
+
+fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
+    let found = &drive.results.identification;
+    let [torque, residuals, correlogram, over_time] = figures;
+    let figure = |figure, caption: &str| Block::Figure {
+        figure,
+        caption: caption.into(),
+    };
+    let mut verdict: Vec<Block> = vec![Block::Table(parameters(found))];
+    verdict.extend(found.notes.iter().cloned().map(Block::Text));
+    if !found.combinations.is_empty() {
+        verdict.push(Block::Table(combinations(found)));
+    }
+    verdict.push(Block::Table(correlation(found)));
+    let mut sections = vec![
+        Section {
+            heading: "Parameters".into(),
+            blocks: verdict,
+        },
+        Section {
+            heading: "Fit".into(),
+            blocks: vec![
+                figure(
+                    torque,
+                    "Driver torque, measured and simulated from the inputs alone.",
+                ),
+                Block::Table(Table::of_pairs(["", ""], facts(found))),
+            ],
+        },
+        Section {
+            heading: "Residuals".into(),
+            blocks: vec![
+                figure(
+                    residuals,
+                    "What the driver model leaves over, and what the loss is made of.",
+                ),
+                figure(correlogram, "Autocorrelation of the residuals of the loss."),
+                Block::Table(input_tests(found)),
+            ],
+        },
+        Section {
+            heading: "Over time".into(),
+            blocks: vec![figure(
+                over_time,
+                "The same drive followed by the constrained Kalman filter, for drivers who change.",
+            )],
+        },
+    ];
+    if let Some(again) = &drive.results.drives_again {
+        let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4}"));
+        let pairs = [
+            (
+                "peak lateral error (m)",
+                number(again.metrics.peak_lateral_error_m),
+            ),
+            (
+                "mean absolute lateral error (m)",
+                number(again.metrics.mean_abs_lateral_error_m),
+            ),
+            (
+                "left the road",
+                if again.diverged { "yes".into() } else { "no".into() },
+            ),
+        ];
+        sections.push(Section {
+            heading: "The identified driver on the course".into(),
+            blocks: vec![Block::Table(Table::of_pairs(["", ""], pairs))],
+        });
+    }
+    Report {
+        title: format!("Driver of {}", drive.name),
+        summary: format!(
+            "Method {}, {} rows. The fit of the driver torque is {:.1} %.",
+            found.method, found.rows, found.fit_percent
+        ),
+        sections,
+    }
+}
+
+fn number(value: Option<f64>) -> Cell {
+    Cell::Number { value, decimals: 4 }
+}
+
+fn parameters(found: &Identification) -> Table {
+    let rows = found.parameters.list().into_iter().map(|(name, unit, p)| {
+        let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
+        let verdict = match (p.fixed, p.identified, p.on_bound) {
+            (true, ..) => "given",
+            (_, true, true) => "identified, on a bound",
+            (_, true, false) => "identified",
+            (_, false, true) => "not identified, on a bound",
+            (_, false, false) => "not identified",
+        };
+        vec![
+            Cell::Text(name.into()),
+            Cell::Text(unit.into()),
+            number(p.estimate),
+            number(p.standard_error),
+            number(low),
+            number(high),
+            Cell::Text(verdict.into()),
+        ]
+    });
+    Table {
+        caption: "An estimate is given only where the data identify the parameter.".into(),
+        columns: [
+            "",
+            "Unit",
+            "Estimate",
+            "Standard error",
+            "95 % from",
+            "to",
+            "Verdict",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: rows.collect(),
+    }
+}
+
+fn combinations(found: &Identification) -> Table {
+    let row = |c: &haptic_analysis::identify::Combination| {
+        vec![
+            Cell::Text(c.name.clone()),
+            number(Some(c.estimate)),
+            number(Some(c.standard_error)),
+        ]
+    };
+    Table {
+        caption: "What the data determine instead.".into(),
+        columns: ["Combination", "Estimate", "Standard error"]
+            .map(String::from)
+            .to_vec(),
+        rows: found.combinations.iter().map(row).collect(),
+    }
+}
+
+fn correlation(found: &Identification) -> Table {
+    let names = &found.correlation.names;
+    let row = |(name, values): (&&str, &Vec<Option<f64>>)| {
+        let mut cells = vec![Cell::Text((*name).into())];
+        cells.extend(values.iter().map(|&value| Cell::Number { value, decimals: 3 }));
+        cells
+    };
+    Table {
+        caption: "Correlation of the errors.".into(),
+        columns: std::iter::once(String::new())
+            .chain(names.iter().map(|n| (*n).into()))
+            .collect(),
+        rows: names.iter().zip(&found.correlation.matrix).map(row).collect(),
+    }
+}
+
+fn facts(found: &Identification) -> Vec<(String, String)> {
+    let mut facts = vec![(
+        "Fit of the torque".to_owned(),
+        format!("{:.2} %", found.fit_percent),
+    )];
+    let mut add = |name: &str, text: String| facts.push((name.into(), text));
+    if let Some(fit) = found.fit_percent_predicted {
+        add("Fit of the one-step prediction", format!("{fit:.2} %"));
+    }
+    if let Some(fit) = found.fit_percent_wheel_angle {
+        add("Fit of phi_target to the wheel angle", format!("{fit:.2} %"));
+    }
+    if let Some(r) = found.remnant {
+        if let (Some(corner), Some(sd)) = (r.corner_hz, r.sd_nm) {
+            add("Remnant", format!("{sd:.4} N.m, corner {corner:.3} Hz"));
+        }
+        add("White sensor noise", format!("{:.4} N.m", r.white_sd_nm));
+        add("Prediction error", format!("{:.4} N.m", r.innovation_sd_nm));
+    }
+    let w = found.whiteness;
+    let white = if w.white { "white" } else { "not white" };
+    add(
+        "Residuals",
+        format!(
+            "{white}: Ljung-Box {:.1} over {} lags, p = {:.3}",
+            w.statistic, w.lags, w.p_value
+        ),
+    );
+    for start in &found.starts {
+        add(
+            "Start",
+            format!(
+                "t_p {:.3} s, ended at {:.4} s with loss {:.6e}",
+                start.from_t_p_s, start.to_t_p_s, start.loss
+            ),
+        );
+    }
+    let losses: Vec<String> = found.loss_history.iter().map(|l| format!("{l:.6e}")).collect();
+    add("Loss", losses.join(", "));
+    add("Ended", found.termination.to_string());
+    facts
+}
+
+fn input_tests(found: &Identification) -> Table {
+    let row = |test: &haptic_analysis::identify::InputCorrelation| {
+        let verdict = if test.independent {
+            "independent"
+        } else {
+            "correlated"
+        };
+        vec![
+            Cell::Text(test.input.into()),
+            Cell::Number {
+                value: Some(test.largest_z),
+                decimals: 2,
+            },
+            Cell::Text(verdict.into()),
+        ]
+    };
+    Table {
+        caption: "Residuals against each input of 0 to 1 s before, in standard deviations.".into(),
+        columns: ["Input", "Largest", "Verdict"].map(String::from).to_vec(),
+        rows: found.input_correlation.iter().map(row).collect(),
+    }
+}

@@ -1,0 +1,50 @@
+//! What each study of `haptic-batch` leaves: its figures, its results, and the report that shows them.
+
+pub mod course;
+mod curves;
+pub mod evaluation;
+pub mod experiment;
+mod files;
+pub mod identify;
+pub mod reliance;
+pub mod run;
+
+use crate::document::WriteError;
+use crate::plot::PlotError;
+
+/// Notes as the end of a report's summary.
+fn notes(notes: &[String]) -> String {
+    notes.iter().map(|note| format!("Note: {note}. ")).collect()
+}
+
+/// Why the files of a study could not be made.
+#[derive(Debug)]
+pub enum OutputError {
+    /// A file or directory cannot be written.
+    Write(WriteError),
+    /// A figure cannot be drawn.
+    Plot(PlotError),
+}
+
+impl From<WriteError> for OutputError {
+    fn from(error: WriteError) -> Self {
+        Self::Write(error)
+    }
+}
+
+impl From<PlotError> for OutputError {
+    fn from(error: PlotError) -> Self {
+        Self::Plot(error)
+    }
+}
+
+impl std::fmt::Display for OutputError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Write(error) => error.fmt(f),
+            Self::Plot(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for OutputError {}

@@ -1,0 +1,202 @@
+//! The files that one run leaves: a figure, its time series, its results, and the report that shows them.
+
+use std::path::Path;
+
+use super::files::{write_figure, write_report};
+use super::reliance::panel as reliance_panel;
+use super::{OutputError, curves, notes};
+use crate::document::{
+    Block, Report, Section, Table, definitions_table, write_file, write_json, write_trace_csv,
+};
+use crate::plot::{Axis, Figure, Line, Marker, Panel};
+use haptic_analysis::metrics::DEFINITIONS;
+use haptic_batch::run::SingleRun;
+use haptic_log::Event;
+use haptic_log::trace::Sample;
+use haptic_sim::closed_loop::Ending;
+use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
+
+/// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON), a report (HTML), and the bus if it was
+/// recorded (as `candump -L` does).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
+    let figure = figure(single);
+    write_figure(directory, "run", &figure)?;
+    write_trace_csv(&directory.join("run.csv"), &single.run.trace)?;
+    write_json(&directory.join("results.json"), &single.results)?;
+    write_report(directory, &report(single, figure))?;
+    if !single.bus.is_empty() {
+        write_file(&directory.join("bus.log"), |f| {
+            for (ms, frame) in &single.bus {
+                write!(f, "({:.6}) can0 {:03X}#", f64::from(*ms) * 1e-3, frame.id())?;
+                for byte in frame.data() {
+                    write!(f, "{byte:02X}")?;
+                }
+                writeln!(f)?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+fn figure(single: &SingleRun) -> Figure {
+    let samples = &single.run.trace.samples;
+    let line = |label: &str, style, value: fn(&Sample) -> f64| Line {
+        label: label.into(),
+        style,
+        points: samples.iter().map(|s| (s.s_m, value(s))).collect(),
+    };
+    let panel = |label: &str, lines| Panel {
+        title: String::new(),
+        y: Axis {
+            label: label.into(),
+            limits: None,
+        },
+        lines,
+    };
+    let failed = single
+        .scenario
+        .failure
+        .at_s()
+        .and_then(|t| samples.iter().find(|s| s.time_s >= t));
+    let mut panels = vec![
+        panel("Lateral error (m)", vec![line("", 0, |s| s.lateral_error_m)]),
+        panel(
+            "Wheel angle (deg)",
+            vec![line("", 0, |s| s.wheel_angle_rad.to_degrees())],
+        ),
+        panel(
+            "Torque (N.m)",
+            vec![
+                line("driver", 0, |s| s.driver_torque_nm),
+                line("guidance", 1, |s| s.guidance_torque_nm),
+            ],
+        ),
+    ];
+    if single.scenario.guidance.probe {
+        let place = |time_s: f64| {
+            let next = samples.partition_point(|s| s.time_s < time_s);
+            samples.get(next).or(samples.last()).map_or(0.0, |s| s.s_m)
+        };
+        let truth: Vec<_> = true_reliance(single)
+            .into_iter()
+            .map(|(t, k_hg)| (place(t), k_hg))
+            .collect();
+        panels.push(reliance_panel(
+            String::new(),
+            &single.readings.readings,
+            &truth,
+            place,
+        ));
+    }
+    Figure {
+        title: String::new(),
+        x: Axis {
+            label: "Distance along the road (m)".into(),
+            limits: None,
+        },
+        same_y: false,
+        panels,
+        markers: failed
+            .map(|s| Marker {
+                label: "failure".into(),
+                x: s.s_m,
+            })
+            .into_iter()
+            .collect(),
+        bands: curves::bands(&single.scenario.course),
+    }
+}
+
+/// K_hg over time, s, for as long as there is guidance.
+fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
+    let scenario = &single.scenario;
+    let last_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
+    let end_s = scenario.failure.at_s().map_or(last_s, |t| t.min(last_s));
+    let start = scenario.gains.k_hg;
+    match &scenario.driver_change {
+        Some(change) if change.time_s < end_s => {
+            let t = change.time_s;
+            vec![(0.0, start), (t, start), (t, change.k_hg), (end_s, change.k_hg)]
+        }
+        _ => vec![(0.0, start), (end_s, start)],
+    }
+}
+
+fn report(single: &SingleRun, figure: Figure) -> Report {
+    let (scenario, record) = (&single.scenario, &single.results.record);
+    let metrics = DEFINITIONS.iter().map(|d| {
+        let value = (d.value)(&record.metrics).map_or("-".into(), |value| format!("{value:.4}"));
+        let unit = if d.unit == "1" { "" } else { d.unit };
+        (d.label, format!("{value} {unit}"))
+    });
+    let [from, to] = single.results.window_m;
+    Report {
+        title: "A run under shared steering control".into(),
+        summary: format!(
+            "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
+            scenario.course.name(),
+            scenario.speed_kmh,
+            scenario.driver.t_p,
+            scenario.gains.k_d,
+            scenario.gains.k_hg,
+            scenario.condition,
+            notes(&single.results.notes),
+        ),
+        sections: vec![
+            Section {
+                heading: "Along the road".into(),
+                blocks: vec![
+                    Block::Figure {
+                        figure,
+                        caption: if single.scenario.guidance.probe {
+                            "Lateral error, wheel angle, torques, and what the ECU says of K_hg.".into()
+                        } else {
+                            "Lateral error, wheel angle and torques.".into()
+                        },
+                    },
+                    Block::Events(events(single)),
+                ],
+            },
+            Section {
+                heading: "Metrics".into(),
+                blocks: vec![
+                    Block::Table(Table::of_pairs(["Metric", "Value"], metrics)),
+                    Block::Table(definitions_table()),
+                ],
+            },
+        ],
+    }
+}
+
+fn events(single: &SingleRun) -> Vec<Event> {
+    let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
+    let mut events = single.reported.clone();
+    if let Some(time_s) = single.scenario.failure.at_s().filter(|t| *t <= end_s) {
+        let what = match single.scenario.failure.kind {
+            FailureKind::Input => "The lane preview stops",
+            FailureKind::Torque | FailureKind::None => "The guidance torque drops to zero",
+        };
+        events.push(Event {
+            time_s,
+            what: what.into(),
+        });
+        let noticed_s = time_s + FAILURE_REACTION_S;
+        if noticed_s <= end_s {
+            events.push(Event {
+                time_s: noticed_s,
+                what: "The driver steers as manually".into(),
+            });
+        }
+    }
+    let what = match single.run.ending {
+        Ending::CourseEnd => "The far point reaches the end of the course".into(),
+        Ending::Diverged { s_m } => format!("The run diverged at {s_m:.0} m and was stopped"),
+    };
+    events.push(Event { time_s: end_s, what });
+    events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    events
+}

@@ -1,0 +1,223 @@
+//! What a scenario file may say, and how it is refused.
+
+use super::*;
+
+fn parse(text: &str) -> Result<Scenario, InputError> {
+    Scenario::from_toml("s.toml", text, |name, _| Err(InputError::new(name, "not there")))
+}
+
+#[test]
+fn an_empty_file_is_tables_4_8_and_9() {
+    let s = parse("").unwrap();
+    assert_eq!(s, Scenario::default());
+    let d = s.driver;
+    assert_eq!((d.a1, d.a2, d.a3), (0.1, 0.05, 3.7));
+    assert_eq!((d.t_n, d.t_f, d.t_nms, d.k_nms), (0.3, 1.0, 0.1, 1.0));
+    let g = s.guidance;
+    assert_eq!(
+        (g.controller.k_1, g.controller.a_1, g.controller.a_2),
+        (0.25, 2.0, 0.05)
+    );
+    assert_eq!(
+        (g.controller.a_3, g.controller.a_4, g.t_n, g.t_f),
+        (40.0, 1.0, 0.3, 0.7)
+    );
+    let v = s.vehicle;
+    assert_eq!((v.m, v.i, v.l_f, v.l_r), (1100.0, 2940.0, 1.0, 1.635));
+    assert_eq!(
+        (v.k_f, v.k_r, v.k_s, v.e_t),
+        (53_300.0, 117_000.0, 48_510.0, 0.026)
+    );
+    assert_eq!((v.b_s, v.j_s, v.k_t), (0.57, 0.11, 1.0 / 17.0));
+    assert_eq!((s.gains.k_d, s.gains.k_hg, s.speed_kmh), (3.0, 0.5, 60.0));
+}
+
+#[test]
+fn every_field_can_be_set() {
+    let s = parse(
+        "course = 'paper-course'\nspeed = 80\ncondition = 'high'\nsensors = 'exact'\nseed = 9\n\
+         [driver]\nt_p = 0.3\nK_hg = 0.25\nremnant_sd = 0.1\n[vehicle]\nm = 1500\nI = 3000\n\
+         [guidance]\nK_1 = 0.5\na2 = 0.1\nt_f = 0.8\ntorque_limit_nm = 3\n\
+         [failure]\nkind = 'torque'\ntime = 50",
+    )
+    .unwrap();
+    assert_eq!((s.speed_kmh, s.sensors, s.seed), (80.0, Sensors::Exact, 9));
+    assert_eq!((s.driver.t_p, s.driver.remnant_sd_nm), (0.3, 0.1));
+    assert_eq!(
+        (s.gains.k_d, s.gains.k_hg, s.condition),
+        (2.0, 0.25, Condition::Custom)
+    );
+    assert_eq!((s.vehicle.m, s.vehicle.i), (1500.0, 3000.0));
+    assert_eq!(
+        (
+            s.guidance.controller.k_1,
+            s.guidance.controller.a_2,
+            s.guidance.t_f
+        ),
+        (0.5, 0.1, 0.8)
+    );
+    assert_eq!(s.failure.at_s(), Some(50.0));
+    assert_eq!(
+        parse("condition = 'low'").unwrap().gains,
+        ArmGains { k_d: 4.0, k_hg: 1.0 }
+    );
+    assert_eq!(
+        parse("[driver]\nK_d = 2\nK_hg = 0").unwrap().condition,
+        Condition::High
+    );
+}
+
+#[test]
+fn every_bad_field_is_named_with_its_value_and_range() {
+    let cases = [
+        ("sped = 50", "sped"),
+        ("[driver]\nkd = 3", "kd"),
+        ("[guidance]\nt_x = 3", "t_x"),
+        ("[failure]\nwhen = 3", "when"),
+        ("[vehicle]\nmass = 3", "mass"),
+        ("speed = 0", "speed = 0 km/h is outside 20 to 250 km/h"),
+        ("speed = nan", "speed = NaN"),
+        ("speed = 'fast'", "line 1"),
+        ("speed = 'fast'", "expected a number"),
+        ("seed = -1", "expected a whole number, 0 or more"),
+        ("[[segment]]\nlength = 500", "this is a course, not a scenario"),
+        ("condition = 'custom'", "custom"),
+        ("sensors = 'perfect'", "perfect"),
+        ("[failure]\nkind = 'brakes'", "brakes"),
+        ("[driver]\nt_p = 0", "driver.t_p = 0 s is outside 0.001 to 2 s"),
+        (
+            "[driver]\nK_d = -1",
+            "driver.K_d = -1 N.m/rad is outside 0 to 50 N.m/rad",
+        ),
+        ("[driver]\nremnant_sd = -1", "driver.remnant_sd = -1"),
+        ("[vehicle]\nm = 0", "vehicle.m = 0 kg"),
+        (
+            "[guidance]\nK_1 = 50",
+            "guidance.K_1 = 50 N.m is outside 0 to 4 N.m",
+        ),
+        (
+            "[guidance]\na3 = 1e3",
+            "guidance.a3 = 1000 1/rad is outside 0 to 100 1/rad",
+        ),
+        (
+            "[guidance]\na4 = -1",
+            "guidance.a4 = -1 s/rad is outside 0 to 100 s/rad",
+        ),
+        (
+            "[guidance]\nK_1 = 4\na1 = 9",
+            "guidance: K_1*a1 = 36 N.m/m is outside 0 to 32 N.m/m",
+        ),
+        (
+            "[guidance]\nt_f = 0.05",
+            "guidance.t_f = 0.05 s is outside 0.1 to 3 s",
+        ),
+        (
+            "[vehicle]\nK_t = 0.2\nl_f = 0.1\nl_r = 0.1",
+            "vehicle: K_t/(l_f + l_r) = 1 1/m is outside 0.001 to 0.1 1/m",
+        ),
+        ("[guidance]\nt_n = -0.1", "guidance.t_n = -0.1"),
+        ("[failure]\ntime = -3", "failure.time = -3"),
+        ("[driver_change]\ntime = 3\nK_d = 2", "K_hg"),
+        (
+            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = -1",
+            "driver_change.K_hg = -1",
+        ),
+        (
+            "[guidance]\nprobe_amplitude_nm = 0.31",
+            "guidance.probe_amplitude_nm = 0.31",
+        ),
+        (
+            "[driver]\nt_f = 5\n[guidance]\nt_f = 5.5",
+            "guidance.t_f = 5.5 s is outside 0.1 to 3 s",
+        ),
+    ];
+    for (text, expected) in cases {
+        let error = parse(text).unwrap_err().to_string();
+        assert!(error.starts_with("s.toml: "), "{error}");
+        assert!(
+            error.contains(expected),
+            "{text:?} gave {error:?}, not {expected:?}"
+        );
+    }
+    assert!(
+        parse("course = 'nowhere.toml'")
+            .unwrap_err()
+            .to_string()
+            .starts_with("nowhere.toml: ")
+    );
+}
+
+/// What only guidance could use, and what a manual driver may have all the same.
+#[test]
+fn a_manual_driver_has_nothing_that_needs_guidance() {
+    let manual = |rest: &str| parse(&format!("condition = 'manual'\n{rest}"));
+    for (text, expected) in [
+        ("[failure]\nkind = 'torque'", "failure.kind = \"torque\""),
+        ("[failure]\nkind = 'input'", "failure.kind = \"input\""),
+        ("[driver]\nK_hg = 0.5", "driver.K_hg = 0.5"),
+        ("[guidance]\nprobe = true", "guidance.probe = true"),
+        (
+            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0.25",
+            "driver_change.K_hg = 0.25",
+        ),
+    ] {
+        let error = manual(text).unwrap_err().to_string();
+        assert!(
+            error.starts_with("s.toml: condition = \"manual\"") && error.contains(expected),
+            "{error}"
+        );
+    }
+    let own_arm =
+        manual("[driver]\nK_d = 3\nK_hg = 0\n[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0").unwrap();
+    assert_eq!((own_arm.condition, own_arm.gains.k_d), (Condition::Manual, 3.0));
+}
+
+/// At 60 km/h, 516.7 m less 1 s of look-ahead are 30 s.
+#[test]
+fn what_happens_in_mid_drive_happens_before_the_run_ends() {
+    let after = |failure_s, kind| Scenario {
+        course: Course::from_toml("c", "[[segment]]\nlength = 516.7").unwrap(),
+        failure: Failure {
+            kind,
+            time_s: failure_s,
+        },
+        ..Default::default()
+    };
+    assert!((after(0.0, FailureKind::None).duration_s() - 30.002).abs() < 1e-9);
+    assert_eq!(after(30.0, FailureKind::Torque).check_times(), Ok(()));
+    assert_eq!(after(70.0, FailureKind::None).check_times(), Ok(()));
+    assert_eq!(
+        after(30.1, FailureKind::Input).check_times(),
+        Err("failure.time = 30.1 s is outside 0 to 30 s: the run ends there".into())
+    );
+    let changing = Scenario {
+        driver_change: Some(DriverChange {
+            time_s: 31.0,
+            k_d: 3.0,
+            k_hg: 0.5,
+        }),
+        ..after(0.0, FailureKind::None)
+    };
+    let error = changing.check_times().unwrap_err();
+    assert!(error.starts_with("driver_change.time = 31 s"), "{error}");
+}
+
+#[test]
+fn a_course_with_less_than_a_second_to_drive_is_refused() {
+    let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength = {length}")).unwrap();
+    // 1.0 s of look-ahead and 1 s to drive, at 60 km/h, are 33.333 m.
+    let short = |length| {
+        let scenario = Scenario {
+            course: course(length),
+            ..Default::default()
+        };
+        scenario.check()
+    };
+    assert_eq!(
+        short(33.2),
+        Err("course c is 33.2 m long, but at 60 km/h it needs 33.3 m: 16.7 m of look-ahead (1.00 s) and 1 s to \
+             drive"
+            .into())
+    );
+    assert_eq!(short(33.4), Ok(()));
+}
