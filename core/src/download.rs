@@ -1,6 +1,6 @@
 //! New parameters over the bus: a set arrives field by field, is checked as a whole, and is then somebody's to store.
 //!
-//! A set is one [`ParameterWrite`] for each field, in the order of [`crate::stored`], from the first to the last
+//! A set is one [`ParameterWrite`] for each field, in the order of [`PARAMETERS`], from the first to the last
 //! without another field between. That order tells a lost, repeated or swapped frame; so the counter, which is the
 //! field's number modulo 16, only picks the data ID of the CRC. Every frame must find the ECU in Standby.
 //! [`ParameterStatus`] says what became of it.
@@ -11,17 +11,22 @@
 use crate::bus::Frame;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{Message, ParameterStatus, ParameterWrite, WriteOutcome};
+use crate::config::Config;
 use crate::modes::Mode;
-use crate::params::{Config, Params};
-use crate::stored::{Stored, VALUES, from_values, values};
+use crate::params::{PARAMETERS, Params};
+use crate::stored::Stored;
 
-const _: () = assert!(ParameterWrite::FIELDS == VALUES, "the bus carries every field");
+const VALUES: usize = PARAMETERS.len();
 
 /// The frames that carry a set. Values are rounded to f32.
 #[must_use]
+#[expect(
+    clippy::as_conversions,
+    reason = "rounded to what the bus carries, which saturates to infinity"
+)]
 pub fn frames(params: &Params) -> [Frame; VALUES] {
     let mut index = 0_u8;
-    values(params).map(|value| {
+    params.to_values().map(|value| {
         let write = ParameterWrite {
             index,
             value: value as f32,
@@ -78,7 +83,7 @@ impl Download {
         if self.next < VALUES || self.outcome != WriteOutcome::Receiving {
             return None;
         }
-        let params = from_values(&self.values);
+        let params = Params::from_values(&self.values);
         let is_good = Config::new(&params).is_ok();
         self.outcome = if is_good {
             WriteOutcome::Taken

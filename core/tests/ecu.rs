@@ -7,13 +7,13 @@ mod rig;
 
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use haptic_core::bus::{Frame, Reject};
+use haptic_core::config::Setup;
 use haptic_core::controller::Command;
-use haptic_core::ecu::injection::Region;
+use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::envelope::LimitReason;
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_core::params::Setup;
 use haptic_core::quantity::{Instant, Micros, Radians, Torque};
 use rig::Rig;
 
@@ -829,7 +829,7 @@ fn engaged_from_the_start_for_studies() {
 fn without_a_fault_the_history_is_silent() {
     let mut rig = Rig::paper();
     rig.engage = true;
-    rig.ecu = Ecu::engaged(&Setup::PAPER, rig.now());
+    rig.ecu = InjectedEcu::new(Ecu::engaged(&Setup::PAPER, rig.now()));
     for _ in 0..250 {
         let step = rig.tick();
         assert_eq!((step.command.faults, step.others.len()), (FaultSet::NONE, 0));

@@ -7,11 +7,12 @@
 
 mod rig;
 
-use haptic_core::ecu::injection::Region;
+use haptic_core::config::Setup;
+use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_core::params::{Params, Setup};
+use haptic_core::params::Params;
 use haptic_core::quantity::{Metres, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
@@ -88,7 +89,7 @@ impl Events {
                 // Damaged limits of the monitor.
                 self.reasons.insert(Fault::Monitor);
                 let region = Region::ALL[self.rng.random_range(0..4)];
-                let bit = self.rng.random_range(0..rig.ecu.vital_bits(region));
+                let bit = self.rng.random_range(0..rig.ecu.redundant_bits(region));
                 rig.ecu.flip_bit(region, bit);
             }
             265..300 => {
@@ -122,7 +123,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; 16]) {
     let setup = Setup::new(&params).unwrap();
     let mut rig = Rig::new(Some(&setup), Boot::default());
     rig.clock_start_us = start_us;
-    rig.ecu = Ecu::new(Some(&setup), Boot::default(), rig.now());
+    rig.ecu = InjectedEcu::new(Ecu::new(Some(&setup), Boot::default(), rig.now()));
     let mut watch = Watch::new(limit);
     let mut faults = [0; 16];
     let mut before = FaultSet::NONE;
@@ -150,7 +151,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; 16]) {
             0
         };
         if dead > 1000 {
-            rig.ecu = Ecu::new(Some(&setup), Boot::default(), rig.now());
+            rig.ecu = InjectedEcu::new(Ecu::new(Some(&setup), Boot::default(), rig.now()));
             (rig.motor, rig.heard) = (|t| t, rig::Heard::default());
             (dead, rig.engage) = (0, false);
             watch.restart(&rig);

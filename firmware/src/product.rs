@@ -3,24 +3,29 @@
 //! What is broken does not steer: a panic or a fault brings the torque to zero and resets the processor with
 //! the cause on record; a loop that hangs, or that the monitor does not permit, loses the watchdog. The
 //! controller comes up in Standby, or in the Fault that it had latched, says why on the bus, and locks after three
-//! resets within 10 s.
+//! resets within 10 s, or ten since power-up.
 //!
-//! Its parameters are the newest good set of the flash. Without any it has those built into the image, unless both
-//! copies are damaged: then it locks. A set that comes over the bus is stored at the restart that it causes: the
-//! flash is never touched while the loop runs, since an erase takes longer than the watchdog waits.
+//! Its parameters are the newest good set of the flash. Without any, both copies blank or damaged, it locks and waits
+//! for a set over the bus; an image for the bench (feature `bench`) takes the paper's on a blank flash. A set that comes
+//! over the bus is stored at the restart that it causes: the flash is never touched while the loop runs, since an erase
+//! takes longer than the watchdog waits. At every start a copy that cannot be read is written anew.
+//!
+//! An image that is not as it was built begins in Fault ([`image`]); a chip with other options than the memory map's
+//! locks, and its flash is not touched.
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use haptic_core::bus::messages::{Column, Message, ParameterStatus, ResetCause};
+use haptic_core::config::Setup;
+use haptic_core::controller::Command;
 use haptic_core::download::Download;
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::faults::FaultSet;
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_core::params::Setup;
 
 use crate::boards::{Board, ThisBoard};
 use crate::storage::{self, Found};
-use crate::{analogue, reset, stack};
+use crate::{analogue, image, reset, stack};
 
 /// Steps between two lines of the log: one second.
 const STEPS_PER_REPORT: u32 = 1000;
@@ -37,6 +42,8 @@ struct Counts {
     /// Cycles of the frames received since the last step, and the most that they and a step took.
     receiving: u32,
     worst_cycles: u32,
+    /// Faults that the record of resets holds already.
+    latched: FaultSet,
 }
 
 /// What has to do with parameters.
@@ -59,9 +66,17 @@ impl Service {
 pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot, u32)) -> ! {
     stack::paint();
     let mut board = ThisBoard::start();
-    let boot = reset::boot(board.reset_source());
-    let found = parameters(&mut board);
-    let ecu = begin(ecu, &found, boot);
+    let mut boot = reset::boot(board.reset_source());
+    let image = image::look();
+    boot.latched.insert_if(!image.is_good(), Fault::Memory);
+    let is_sound = image.is_good() && board.has_expected_options();
+    let found = if is_sound {
+        parameters(&mut board)
+    } else {
+        Found::default()
+    };
+    let setup = setup(&found).filter(|_| is_sound);
+    let ecu = begin(ecu, setup.as_ref(), boot);
     let mut service = Service {
         download: Download::NEW,
         mode: Mode::Boot,
@@ -75,6 +90,14 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
         boot.recent_resets,
         found.stored.map_or(0, |stored| stored.sequence)
     );
+    match image {
+        image::State::Whole => {}
+        image::State::Unsealed => defmt::warn!("nobody sealed this image (cargo xtask seal)"),
+        image::State::Damaged => defmt::error!("the image is not as it was built"),
+    }
+    if !board.has_expected_options() {
+        defmt::error!("the chip's options are not those of the memory map: the flash is left alone");
+    }
     board.start_tick();
     board.start_watchdog();
     loop {
@@ -103,23 +126,26 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     }
 }
 
-/// Stores the set that the last run left, if it did, and looks at what there is.
+/// Stores the set that the last run left, if it did, looks at what there is, and repairs it.
 #[inline(never)]
 fn parameters(board: &mut ThisBoard) -> Found {
-    let found = storage::load(board.flash());
-    let Some(params) = reset::take_parameters() else {
-        return found;
-    };
-    if storage::save(board.flash(), &params, found.stored.as_ref()).is_err() {
-        defmt::error!("the parameters could not be stored");
+    let mut found = storage::load(board.flash());
+    if let Some(params) = reset::take_parameters() {
+        if storage::save(board.flash(), &params, found.stored.as_ref()).is_err() {
+            defmt::error!("the parameters could not be stored");
+        }
+        found = storage::load(board.flash());
+    }
+    if storage::repair(board.flash(), &found).is_err() {
+        defmt::error!("a copy of the parameters could not be repaired");
     }
     storage::load(board.flash())
 }
 
 /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
 #[inline(never)]
-fn begin(ecu: &'static mut Option<Ecu>, found: &Found, boot: Boot) -> &'static mut Ecu {
-    ecu.insert(Ecu::new(setup(found).as_ref(), boot, ThisBoard::now()))
+fn begin(ecu: &'static mut Option<Ecu>, setup: Option<&Setup>, boot: Boot) -> &'static mut Ecu {
+    ecu.insert(Ecu::new(setup, boot, ThisBoard::now()))
 }
 
 /// What the controller starts with; None locks it.
@@ -127,7 +153,19 @@ fn setup(found: &Found) -> Option<Setup> {
     match found.stored {
         Some(stored) => Setup::new(&stored.params).ok(),
         None if found.damaged == [true, true] => None,
-        None => Some(Setup::PAPER),
+        // A vehicle that was set up for less must not get the paper's 5 N.m because its flash was erased.
+        None => cfg!(feature = "bench").then_some(Setup::PAPER),
+    }
+}
+
+/// The mode as the download sees it: an ECU that is locked for want of parameters alone takes some.
+fn service_mode(command: &Command) -> Mode {
+    let mut parameters = FaultSet::NONE;
+    parameters.insert(Fault::Parameters);
+    let is_for_parameters = command.faults.common(FaultSet::LOCKING) == parameters;
+    match command.mode {
+        Mode::Locked if is_for_parameters => Mode::Standby,
+        mode => mode,
     }
 }
 
@@ -155,8 +193,11 @@ fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
     if step.permitted {
         board.feed_watchdog();
     }
-    if step.command.faults.intersects(FaultSet::CRITICAL) {
-        reset::latch(step.command.faults.common(FaultSet::CRITICAL));
+    let critical = step.command.faults.common(FaultSet::CRITICAL);
+    if critical != counts.latched {
+        // Once: it stays in the record, whose checks cost more than a look at what was written.
+        counts.latched = critical;
+        reset::latch(critical);
     }
     step
 }
@@ -170,13 +211,13 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
-    service.mode = step.command.mode;
+    service.mode = service_mode(&step.command);
     // The torque is on its way; what follows may take its time.
     let status = counts.steps.is_multiple_of(STEPS_PER_REPORT).then(|| {
         let turn = counts.steps / STEPS_PER_REPORT;
         service.status().encode(turn as u8)
     });
-    for frame in ecu.advise().iter().chain(&status) {
+    for frame in ecu.background_step().iter().chain(&status) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }

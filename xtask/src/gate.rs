@@ -56,7 +56,34 @@ pub(crate) fn run() -> Result<()> {
         "the gate does not see a float operation that is there"
     );
     println!("gate: it finds a panic and a float operation that were put there");
+    injection_leaves_nothing()
+}
+
+/// An ECU without injected faults is the same machine code whether or not Cargo switches the feature on.
+fn injection_leaves_nothing() -> Result<()> {
+    let [without, with] = ["gate", "gate,broken"].map(|features| {
+        let elf = elf_of(&mut gate(features, M4F))?;
+        let sections = tool::output(tool::llvm("llvm-size")?.arg("-A").arg(elf))?;
+        let is_held = |line: &&str| {
+            [".text", ".rodata", ".data", ".bss"]
+                .iter()
+                .any(|name| line.starts_with(name))
+        };
+        Ok::<_, anyhow::Error>(sections.lines().filter(is_held).map(size_of).collect::<Vec<_>>())
+    });
+    let (without, with) = (without?, with?);
+    ensure!(
+        without.len() > 1 && without == with,
+        "fault injection leaves something in the product's ECU: {without:?} without the feature, {with:?} with it"
+    );
+    println!("gate: the feature fault-injection adds nothing to an ECU without it");
     Ok(())
+}
+
+/// Name and size of `.text   1234   0x0`.
+fn size_of(line: &str) -> (String, String) {
+    let mut words = line.split_whitespace().map(str::to_owned);
+    (words.next().unwrap_or_default(), words.next().unwrap_or_default())
 }
 
 fn gate(feature: &str, target: &str) -> std::process::Command {

@@ -11,8 +11,8 @@ use crate::controller::{Column, Input, Inputs, Request};
 use crate::faults::{Fault, FaultSet};
 use crate::law::LaneSample;
 use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
-use crate::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
-use crate::vital::{Guarded, Vital};
+use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use crate::redundant::{Redundant, Words, words};
 
 /// Spans beyond half a wrap of the clock are negative.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
@@ -38,7 +38,7 @@ const HELD: u32 = 1;
 /// A value that no step has seen.
 const NEW: u32 = 2;
 
-impl<T: Vital> Vital for Slot<T> {
+impl<T: Words> Words for Slot<T> {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self {
             e2e: self.e2e.map_words(change),
@@ -58,10 +58,10 @@ impl<T: Vital> Vital for Slot<T> {
     }
 }
 
-impl<T: Vital> Slot<T> {
+impl<T: Words> Slot<T> {
     /// Nothing heard; `value` only fills the place.
-    fn guarded(e2e: ReceiverState, value: T, now: Instant) -> Guarded<Self> {
-        Guarded::new(Self {
+    fn redundant(e2e: ReceiverState, value: T, now: Instant) -> Redundant<Self> {
+        Redundant::new(Self {
             e2e,
             state: LOST,
             invalid: 0,
@@ -103,13 +103,32 @@ pub(super) struct Accepted {
     pub(super) demand: Option<[u8; 8]>,
 }
 
+words! {
+    /// A [`Request`], its flags as words.
+    pub(super) struct RequestWords {
+        engage: u32,
+        authority: Ratio,
+        probe: u32,
+    }
+}
+
+impl From<RequestWords> for Request {
+    fn from(words: RequestWords) -> Self {
+        Self {
+            engage: words.engage != 0,
+            authority: words.authority,
+            probe: words.probe != 0,
+        }
+    }
+}
+
 /// The receivers of all inputs.
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
-    pub(super) lane: Guarded<Slot<LaneSample>>,
-    pub(super) column: Guarded<Slot<Column>>,
-    pub(super) speeds: Guarded<Slot<[Speed; 2]>>,
-    pub(super) request: Guarded<Slot<Request>>,
+    pub(super) lane: Redundant<Slot<LaneSample>>,
+    pub(super) column: Redundant<Slot<Column>>,
+    pub(super) speeds: Redundant<Slot<[Speed; 2]>>,
+    pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
     pub(super) accepted: Accepted,
 }
@@ -126,16 +145,16 @@ impl Receivers {
             driver_torque: Torque::ZERO,
             wheel_angle: Radians::ZERO,
         };
-        let request = Request {
+        let request = RequestWords {
             engage: 0,
-            authority: Gain::ZERO,
+            authority: Ratio::ZERO,
             probe: 0,
         };
         Self {
-            lane: Slot::guarded(e2e, lane, now),
-            column: Slot::guarded(e2e, column, now),
-            speeds: Slot::guarded(e2e, [Speed::ZERO; 2], now),
-            request: Slot::guarded(e2e, request, now),
+            lane: Slot::redundant(e2e, lane, now),
+            column: Slot::redundant(e2e, column, now),
+            speeds: Slot::redundant(e2e, [Speed::ZERO; 2], now),
+            request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::default(),
         }
@@ -199,7 +218,7 @@ impl Receivers {
             }),
             Demand::ID => self.request.change(|slot| {
                 let demand = Demand::decode(&mut slot.e2e, frame)?;
-                let request = Request {
+                let request = RequestWords {
                     engage: u32::from(demand.engage),
                     authority: demand.authority,
                     probe: u32::from(demand.probe),
@@ -213,7 +232,6 @@ impl Receivers {
     }
 
     /// The last lane preview passes for one that came now.
-    #[cfg(feature = "fault-injection")]
     pub(super) fn renew_lane(&mut self, now: Instant) {
         let _ = self.lane.change(|slot| slot.at = now);
     }
@@ -228,7 +246,7 @@ impl Receivers {
             lane,
             column: self.column.change(|slot| slot.take(now))?,
             speeds: self.speeds.change(|slot| slot.take(now))?,
-            request: self.request.change(|slot| slot.take(now))?,
+            request: self.request.change(|slot| slot.take(now).map(Request::from))?,
             faults,
         })
     }

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::evaluate::{DRIVERS_T_P, Results};
 use haptic_analysis::metrics::Window;
+use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 
 use Condition::{High, Low, Manual, Mid};
@@ -77,19 +78,25 @@ fn tolerance(sensors: Sensors) -> (f64, f64) {
 pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
     // The evaluation sets condition, gains, delay and kind of failure by itself, and without a remnant the seed
     // does nothing.
-    let mut comparable = Scenario {
-        sensors: base.sensors,
-        seed: base.seed,
-        ..Scenario::default()
-    };
-    comparable.condition = base.condition;
-    comparable.gains = base.gains;
-    comparable.driver.t_p = base.driver.t_p;
-    comparable.failure = Failure {
-        kind: base.failure.kind,
-        ..comparable.failure
-    };
-    comparable == *base && window == super::record::default_window(&base.course)
+    let paper = Scenario::default();
+    let comparable = base
+        .to_builder()
+        .course(paper.course().clone())
+        .speed_kmh(paper.speed_kmh())
+        .vehicle(*paper.vehicle())
+        .guidance(*paper.guidance())
+        .driver_change(None)
+        .driver(DriverParameters {
+            t_p: base.driver().t_p,
+            ..*paper.driver()
+        })
+        .failure(Failure {
+            kind: base.failure().kind,
+            ..paper.failure()
+        })
+        .build();
+    let comparable = comparable.is_ok_and(|comparable| comparable == *base);
+    comparable && window == super::record::default_window(base.course())
 }
 
 pub(super) fn check(results: &Results) -> Vec<Claim> {

@@ -14,10 +14,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::evaluate::DRIVERS_T_P;
-use haptic_sim::closed_loop::{Run, simulate};
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenario};
+use haptic_sim::simulation::{Run, simulate};
 
 /// Speeds of the study, km/h.
 pub const SPEEDS_KMH: [f64; 9] = [40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0];
@@ -83,7 +83,7 @@ pub struct Results {
 /// Runs every row on all cores; `progress` is called after each.
 ///
 /// # Errors
-/// As [`Scenario::check`]; none of these scenarios meets one.
+/// As [`haptic_sim::scenario::ScenarioBuilder::build`]; none of these scenarios meets one.
 pub fn study(progress: impl Fn() + Sync) -> Result<Results, String> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
@@ -104,24 +104,21 @@ pub fn study(progress: impl Fn() + Sync) -> Result<Results, String> {
 
 fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<Row>, String> {
     let course = stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?;
-    let line = Centreline::new(&course);
     let run = |condition: Condition, kind| {
-        let scenario = Scenario {
-            course: course.clone(),
-            speed_kmh,
-            condition,
-            gains: condition.gains(),
-            driver: DriverParameters {
+        let scenario = Scenario::builder()
+            .course(course.clone())
+            .speed_kmh(speed_kmh)
+            .condition(condition)
+            .driver(DriverParameters {
                 t_p,
                 ..Default::default()
-            },
-            failure: Failure {
+            })
+            .failure(Failure {
                 kind,
                 time_s: FAILURE_S,
-            },
-            ..Default::default()
-        };
-        simulate(&scenario, &line)
+            })
+            .build()?;
+        Ok::<_, String>(simulate(&scenario))
     };
     let manual = run(Condition::Manual, FailureKind::None)?;
     let manual_m = peak_m(&manual, 0.0);
@@ -164,14 +161,17 @@ fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
 fn stretched_curve(k: f64) -> Result<Course, String> {
     let curvature = 1.0 / (300.0 * k * k);
     let (clothoid, arc) = (80.0 * k, 300.0 * k);
-    let toml = format!(
-        "[[segment]]\nlength = {before}\n\
-         [[segment]]\nlength = {clothoid}\ncurvature_start = 0.0\ncurvature_end = {curvature}\n\
-         [[segment]]\nlength = {arc}\ncurvature = {curvature}\n\
-         [[segment]]\nlength = {clothoid}\ncurvature_start = {curvature}\ncurvature_end = 0.0\n\
-         [[segment]]\nlength = {after}\n",
-        before = 120.0 * k,
-        after = LAST_STRAIGHT_M * k,
+    let segments = vec![
+        Segment::straight(120.0 * k),
+        Segment::clothoid(clothoid, 0.0, curvature),
+        Segment::arc(arc, curvature),
+        Segment::clothoid(clothoid, curvature, 0.0),
+        Segment::straight(LAST_STRAIGHT_M * k),
+    ];
+    let course = Course::new(
+        "first curve of paper-course, stretched",
+        DEFAULT_LANE_WIDTH_M,
+        segments,
     );
-    Course::from_toml("first curve of paper-course, stretched", &toml).map_err(|e| e.to_string())
+    course.map_err(|e| e.to_string())
 }

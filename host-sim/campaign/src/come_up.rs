@@ -1,10 +1,10 @@
 //! How the ECU of a row comes up: its parameters, the memory that they lie in, and what it remembers of resets.
 
 use haptic_core::ecu::Boot;
-use haptic_core::lockstep::{self, StartState};
 use haptic_core::params::Params;
 use haptic_core::quantity::Instant;
 use haptic_core::stored::{BYTES, load, save};
+use haptic_lockstep::StartState;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -17,7 +17,7 @@ pub(super) fn come_up(
     scenario: &Scenario,
     now: Instant,
     dice: &mut Xoshiro256PlusPlus,
-) -> (Params, lockstep::Start) {
+) -> (Params, haptic_lockstep::Start) {
     let params = match start {
         Start::Absurd => absurd(),
         _ => scenario.controller_params(),
@@ -33,7 +33,7 @@ pub(super) fn come_up(
         Start::NoParameters | Start::HalfWritten => StartState::WithoutParameters(boot(0)),
         Start::ThirdReset => StartState::Boot(boot(3)),
     };
-    (params, lockstep::Start { state, at: now })
+    (params, haptic_lockstep::Start { state, at: now })
 }
 
 /// Whether the row begins with the ECU in Active.
@@ -50,7 +50,7 @@ fn absurd() -> Params {
         a_3: 8.0,
         a_4: 8.0,
         rate_corner_hz: 60.0,
-        least_speed_mps: 0.5,
+        least_speed_m_per_s: 0.5,
         ..Params::PAPER
     }
 }

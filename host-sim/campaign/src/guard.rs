@@ -7,7 +7,7 @@
 //!
 //! | rule | bound |
 //! |---|---|
-//! | frame | identifier, length, CRC, counter one ahead, codes that exist, spare bits zero |
+//! | frame | identifier, length, CRC, counter one ahead, codes that exist, spare bits zero, classes those of the faults |
 //! | limit | abs(T) <= 5 N.m |
 //! | wind-up | abs(T) grows by at most 4 N.m/s (2 ms at most count for one cycle) |
 //! | reduction | abs(T) falls by at most 8 N.m/s, but for an ECU fault and a driver who overrides |
@@ -51,7 +51,7 @@ const PROBE_NM: f64 = 0.2;
 
 /// Bits of the faults of implausible inputs.
 const IMPLAUSIBLE_FAULTS: u64 = 1 << 2 | 1 << 4 | 1 << 6;
-/// Bit of the fault that two copies of a vital state differ.
+/// Bit of the fault that the two copies of a redundant state differ.
 const MEMORY_FAULT: u64 = 1 << 10;
 
 pub(super) const STANDBY: u64 = 1;
@@ -60,6 +60,15 @@ pub(super) const FADE: u64 = 3;
 pub(super) const HANDOVER: u64 = 4;
 pub(super) const FAULT: u64 = 5;
 pub(super) const LOCKED: u64 = 6;
+
+/// Bits of the faults of class B, of class C, and of class Locked.
+const CLASSES: [u64; 3] = [0x00FF, 0x1F00, 0x6000];
+
+/// The classes that a guidance frame must name with these faults.
+fn classes_of(faults: u64) -> u64 {
+    let present = CLASSES.map(|mask| u64::from(faults & mask != 0));
+    present[0] | present[1] << 1 | present[2] << 2
+}
 
 /// A rule that was broken.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -354,7 +363,12 @@ fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Resul
     if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
         return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
     }
-    if status.limit > 7 || status.mode > LOCKED || status.reset > 6 || status.spare != 0 {
+    if status.limit > 7
+        || status.mode > LOCKED
+        || status.reset > 6
+        || status.spare != 0
+        || status.classes != classes_of(status.faults)
+    {
         return Err(format!("frame: a code that does not exist in {status:?}"));
     }
     match before {

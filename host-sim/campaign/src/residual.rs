@@ -63,10 +63,10 @@ impl Seen {
 /// The checks' sums and last values.
 #[derive(Debug, Clone)]
 pub(super) struct Residual {
-    curvature_gain_1pm: f64,
-    stability_factor_s2pm2: f64,
-    aligning_gain_nms2pm: f64,
-    damping_nms: f64,
+    curvature_gain_per_m: f64,
+    stability_factor_s2_per_m2: f64,
+    aligning_gain_nm_s2_per_m: f64,
+    damping_nm_s: f64,
     speeds_mps: [f64; 2],
     wheel_rad: f64,
     lane: Option<(f64, f64, f64)>,
@@ -96,10 +96,10 @@ impl Residual {
         } = *vehicle;
         let l = l_f + l_r;
         Self {
-            curvature_gain_1pm: k_t / l,
-            stability_factor_s2pm2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
-            aligning_gain_nms2pm: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            damping_nms: b_s,
+            curvature_gain_per_m: k_t / l,
+            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
+            aligning_gain_nm_s2_per_m: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
+            damping_nm_s: b_s,
             speeds_mps: [v_mps; 2],
             wheel_rad: 0.0,
             lane: None,
@@ -117,7 +117,7 @@ impl Residual {
     /// Rate of the direction of movement, rad/s.
     fn turning_rad_s(&self) -> f64 {
         let v = self.speeds_mps[0];
-        v * self.curvature_gain_1pm * self.wheel_rad / (1.0 + self.stability_factor_s2pm2 * v * v)
+        v * self.curvature_gain_per_m * self.wheel_rad / (1.0 + self.stability_factor_s2_per_m2 * v * v)
     }
 
     /// Another step.
@@ -134,8 +134,8 @@ impl Residual {
     pub(super) fn column(&mut self, time_s: f64, driver_nm: f64, wheel_rad: f64, applied_nm: f64) {
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
-            let aligning = self.aligning_gain_nms2pm * self.speeds_mps[0] * self.turning_rad_s();
-            let damped = self.damping_nms * (wheel_rad - self.wheel_rad);
+            let aligning = self.aligning_gain_nm_s2_per_m * self.speeds_mps[0] * self.turning_rad_s();
+            let damped = self.damping_nm_s * (wheel_rad - self.wheel_rad);
             self.momentum_nms = self.momentum_nms * (-dt / MEMORY_S).exp()
                 + (driver_nm + applied_nm - aligning) * dt
                 - damped;

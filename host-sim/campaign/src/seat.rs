@@ -3,9 +3,10 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
+use haptic_core::config::Setup;
+use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::lockstep;
-use haptic_core::params::{Params, Setup};
+use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Torque};
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -19,7 +20,7 @@ use super::senders::{Readings, Senders};
 use super::table::Row;
 use super::wire::{Arrival, Bus};
 use haptic_sim::ecu_events::EcuEvents;
-use haptic_sim::guidance::{Applied, Guidance, View};
+use haptic_sim::guidance::{Actuation, Guidance, Observation};
 use haptic_sim::models::sensors;
 use haptic_sim::scenario::Scenario;
 
@@ -71,7 +72,7 @@ pub(super) struct Seat<'a> {
     end: u32,
     senders: Senders,
     bus: Bus,
-    ecu: Ecu,
+    ecu: InjectedEcu,
     setup: Setup,
     guard: Guard,
     residual: Residual,
@@ -87,7 +88,7 @@ pub(super) struct Seat<'a> {
     /// What has arrived and was not yet received: a step that is lost or late leaves it to the next.
     arrivals: Vec<Arrival>,
     record: Record,
-    start: (Params, lockstep::Start),
+    start: (Params, haptic_lockstep::Start),
     trace: Option<Trace>,
 }
 
@@ -95,7 +96,7 @@ pub(super) struct Seat<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Trace {
     pub(super) params: Params,
-    pub(super) start: lockstep::Start,
+    pub(super) start: haptic_lockstep::Start,
     pub(super) ticks: Vec<Tick>,
 }
 
@@ -128,7 +129,7 @@ impl<'a> Seat<'a> {
         };
         let now = Instant::from_us(clock_base_us);
         let (params, start) = come_up(row.start, scenario, now, &mut dice);
-        let ecu = start.ecu(&params).expect("a checked scenario");
+        let ecu = InjectedEcu::new(start.ecu(&params).expect("a checked scenario"));
         Self {
             row,
             onset,
@@ -139,7 +140,7 @@ impl<'a> Seat<'a> {
             ecu,
             setup: Setup::new(&params).expect("a checked scenario"),
             guard: Guard::new(is_engaged(row.start), clock_base_us),
-            residual: Residual::new(&scenario.vehicle, scenario.speed_mps()),
+            residual: Residual::new(&scenario.vehicle(), scenario.speed_mps()),
             side: if dice.random_bool(0.5) { 1.0 } else { -1.0 },
             dice,
             clock_base_us,
@@ -220,7 +221,7 @@ impl<'a> Seat<'a> {
         }
     }
 
-    fn tell(&mut self, view: &View) {
+    fn tell(&mut self, view: &Observation) {
         let (step, acts) = (view.step, self.acts(view.step));
         let since_s = acts.then(|| self.since(step) as f64 * 1e-3);
         let readings = self
@@ -275,7 +276,7 @@ impl<'a> Seat<'a> {
         received
     }
 
-    fn watch_contradictions(&mut self, view: &View, readings: &Readings) {
+    fn watch_contradictions(&mut self, view: &Observation, readings: &Readings) {
         let time_s = f64::from(view.step) * 1e-3;
         self.residual.at(time_s);
         if let Some(speeds) = readings.speeds_mps {
@@ -320,7 +321,7 @@ impl<'a> Seat<'a> {
             };
             match inside {
                 Inside::Flip(region) if since == 0 => {
-                    let bit = self.dice.random_range(0..self.ecu.vital_bits(*region));
+                    let bit = self.dice.random_range(0..self.ecu.redundant_bits(*region));
                     self.ecu.flip_bit(*region, bit);
                 }
                 Inside::LawForced if since == 0 => {
@@ -342,7 +343,7 @@ impl<'a> Seat<'a> {
                         recent_resets: 1,
                         ..Boot::default()
                     };
-                    self.ecu = Ecu::new(Some(&self.setup), boot, Instant::from_us(now_us));
+                    self.ecu = InjectedEcu::new(Ecu::new(Some(&self.setup), boot, Instant::from_us(now_us)));
                     self.guard.reset(now_us);
                 }
                 _ => {}
@@ -378,55 +379,9 @@ impl<'a> Seat<'a> {
     }
 }
 
-impl Guidance for Seat<'_> {
-    fn looks_at_road(&self, step: u32) -> bool {
-        sensors::camera_looks(step)
-    }
-
-    fn step(&mut self, view: &View) -> Applied {
-        let step = view.step;
-        if step >= self.end {
-            return Applied::default();
-        }
-        self.record.steps = step;
-        let (ticks, count) = self.ticks(step);
-        self.disturb_inside(step, ticks[0]);
-        self.tell(view);
-        for now_us in ticks.into_iter().take(count) {
-            let now = Instant::from_us(now_us);
-            let frames = self.receive(step, now_us);
-            let out = self.ecu.step(now);
-            let advice = self.ecu.advise();
-            if let Some(trace) = &mut self.trace {
-                trace.ticks.push(Tick {
-                    step,
-                    now,
-                    frames,
-                    answer: std::iter::once(out.guidance)
-                        .chain(out.others.iter().copied())
-                        .chain(advice)
-                        .collect(),
-                });
-            }
-            let world_us = u64::from(step) * 1000;
-            self.guard
-                .cycle(step, world_us, now_us, &out.guidance, &out.others);
-            let status = Status::of(&out.guidance);
-            self.commanded_nm = status.torque_nm;
-            self.note(step, &status);
-            self.record.ecu.hear(step, &out.guidance);
-        }
-        if self.since(step) == 0 {
-            self.stuck_nm = self.commanded_nm;
-        }
-        self.delivered_nm = self.motor(step);
-        Applied {
-            torque_nm: self.delivered_nm,
-            limited: false,
-        }
-    }
-
-    fn hand_torque_nm(&mut self, step: u32, arm_torque_nm: f64) -> f64 {
+impl Seat<'_> {
+    /// Torque of a hand on the wheel, N.m, beside that of the driver's arm.
+    pub(super) fn hand_torque_nm(&self, step: u32, arm_torque_nm: f64) -> f64 {
         let since = self.since(step);
         let against = if self.commanded_nm == 0.0 {
             -self.side
@@ -458,6 +413,55 @@ impl Guidance for Seat<'_> {
                 against * torque_nm - arm_torque_nm
             }
             _ => 0.0,
+        }
+    }
+}
+
+impl Guidance for Seat<'_> {
+    fn looks_at_road(&self, step: u32) -> bool {
+        sensors::camera_looks(step)
+    }
+
+    fn step(&mut self, view: &Observation) -> Actuation {
+        let step = view.step;
+        if step >= self.end {
+            return Actuation::default();
+        }
+        self.record.steps = step;
+        let (ticks, count) = self.ticks(step);
+        self.disturb_inside(step, ticks[0]);
+        self.tell(view);
+        for now_us in ticks.into_iter().take(count) {
+            let now = Instant::from_us(now_us);
+            let frames = self.receive(step, now_us);
+            let out = self.ecu.step(now);
+            let background = self.ecu.background_step();
+            if let Some(trace) = &mut self.trace {
+                trace.ticks.push(Tick {
+                    step,
+                    now,
+                    frames,
+                    answer: std::iter::once(out.guidance)
+                        .chain(out.others.iter().copied())
+                        .chain(background)
+                        .collect(),
+                });
+            }
+            let world_us = u64::from(step) * 1000;
+            self.guard
+                .cycle(step, world_us, now_us, &out.guidance, &out.others);
+            let status = Status::of(&out.guidance);
+            self.commanded_nm = status.torque_nm;
+            self.note(step, &status);
+            self.record.ecu.hear(step, &out.guidance);
+        }
+        if self.since(step) == 0 {
+            self.stuck_nm = self.commanded_nm;
+        }
+        self.delivered_nm = self.motor(step);
+        Actuation {
+            torque_nm: self.delivered_nm,
+            limited: false,
         }
     }
 }

@@ -5,13 +5,13 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::injection::{Change, Injection, Signal, Wish};
 use super::wire::MESSAGES;
-use haptic_sim::guidance::View;
+use haptic_sim::guidance::Observation;
 use haptic_sim::models::sensors;
 
 const COLUMN_PERIOD_MS: u32 = 2;
@@ -52,7 +52,7 @@ impl Senders {
     /// What is read in this step, with what is wrong with it; `since_s` the onset if the injections act.
     pub(super) fn read(
         &mut self,
-        view: &View,
+        view: &Observation,
         injections: &[Injection],
         since_s: Option<f64>,
         noise: &mut Xoshiro256PlusPlus,
@@ -114,7 +114,7 @@ impl Senders {
     /// The frames of this step, in order of sending.
     pub(super) fn send(
         &mut self,
-        view: &View,
+        view: &Observation,
         readings: &Readings,
         requested: bool,
         injections: &[Injection],
@@ -145,7 +145,7 @@ impl Senders {
         }
         if let Some(speeds_mps) = readings.speeds_mps {
             let message = Vehicle {
-                speeds: speeds_mps.map(Speed::from_mps),
+                speeds: speeds_mps.map(Speed::from_m_per_s),
             };
             frames.push(message.encode(count(2)));
         }
@@ -153,7 +153,7 @@ impl Senders {
             let counter = count(3);
             let message = Demand {
                 engage: self.wish(requested, injections, acts),
-                authority: Gain::ONE,
+                authority: Ratio::ONE,
                 probe: self.probe,
             };
             frames.push(message.encode(counter));

@@ -18,10 +18,11 @@ use super::seat::{Seat, Trace};
 use super::table::Row;
 use super::verdict::judge;
 use haptic_log::Event;
-use haptic_sim::closed_loop::drive;
-use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::models::sensors::camera_looks;
-use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::scenario::Scenario;
+use haptic_sim::seeds::Stream;
+use haptic_sim::{Action, Simulation};
 
 /// Lateral acceleration in the arc, m/s2: the paper course's first curve at 60 km/h.
 const LATERAL_MPS2: f64 = 0.926;
@@ -39,26 +40,22 @@ const AFTER_MS: u32 = 3200;
 pub struct World {
     drivers: Vec<Driver>,
     /// By speed: curving left and right.
-    roads: Vec<[Road; 2]>,
+    roads: Vec<[Course; 2]>,
     /// On which the heading passes +-pi.
-    turning_road: [Road; 2],
+    turning_road: [Course; 2],
 }
 
-type Road = (Course, Centreline);
-
 /// A straight of 0.5 s, a clothoid of 1 s, and an arc for the rest of a run and the look-ahead.
-fn road(kmh: f64, lateral_mps2: f64, run_ms: u32) -> Road {
+fn road(kmh: f64, lateral_mps2: f64, run_ms: u32) -> Course {
     let v = kmh / 3.6;
-    let toml = format!(
-        "[[segment]]\nlength = {}\n[[segment]]\nlength = {v}\ncurvature_start = 0.0\ncurvature_end = {c}\n\
-         [[segment]]\nlength = {}\ncurvature = {c}\n",
-        0.5 * v,
-        v * (f64::from(run_ms) * 1e-3 + 2.0),
-        c = lateral_mps2 / (v * v),
-    );
-    let course = Course::from_toml("curve of the fault campaign", &toml).expect("in range at these speeds");
-    let line = Centreline::new(&course);
-    (course, line)
+    let curvature_1pm = lateral_mps2 / (v * v);
+    let segments = vec![
+        Segment::straight(0.5 * v),
+        Segment::clothoid(v, 0.0, curvature_1pm),
+        Segment::arc(v * (f64::from(run_ms) * 1e-3 + 2.0), curvature_1pm),
+    ];
+    Course::new("curve of the fault campaign", DEFAULT_LANE_WIDTH_M, segments)
+        .expect("in range at these speeds")
 }
 
 /// When the heading of the turning road passes pi.
@@ -112,7 +109,7 @@ impl World {
 
     /// Runs a row with a seed, and with `traced` keeps what went into the ECU and came out of it.
     pub(super) fn trial(&self, row: &Row, seed: u64, traced: bool) -> (Outcome, Option<Trace>) {
-        let mut dice = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut dice = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
         let driver = &self.drivers[dice.random_range(0..self.drivers.len())];
         let speed = dice.random_range(0..SPEEDS_KMH.len());
         let turns = row.start == Start::HeadingWraps;
@@ -121,7 +118,7 @@ impl World {
         } else {
             (&self.roads[speed], SPEEDS_KMH[speed])
         };
-        let (course, line) = &roads[dice.random_range(0..2)];
+        let course = &roads[dice.random_range(0..2)];
         let drawn_ms = dice.random_range(EARLIEST_ONSET_MS..LATEST_ONSET_MS);
         let onset_ms = if turns {
             turned_ms()
@@ -130,20 +127,21 @@ impl World {
         } else {
             drawn_ms
         };
-        let scenario = Scenario {
-            course: course.clone(),
-            speed_kmh,
-            condition: Condition::Custom,
-            driver: driver.parameters,
-            gains: driver.gains,
-            seed,
-            ..Default::default()
-        };
+        let scenario = Scenario::builder()
+            .course(course.clone())
+            .speed_kmh(speed_kmh)
+            .driver(driver.parameters)
+            .gains(driver.gains)
+            .seed(seed)
+            .build()
+            .expect("in range at these speeds");
         let mut seat = Seat::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, dice);
         if traced {
             seat.keep_trace();
         }
-        let run = catch_unwind(AssertUnwindSafe(|| drive(&scenario, line, &mut seat, &mut ())));
+        let mut simulation = Simulation::with(&scenario, seat);
+        let run = catch_unwind(AssertUnwindSafe(|| drive(&mut simulation)));
+        let mut seat = simulation.into_guidance();
         let trace = seat.take_trace();
         let mut record = seat.into_record();
         if let Err(panic) = run {
@@ -161,7 +159,7 @@ impl World {
         let outcome = Outcome {
             seed,
             driver: driver.name.clone(),
-            speed_kmh: scenario.speed_kmh,
+            speed_kmh: scenario.speed_kmh(),
             onset_ms,
             reported,
             cycles: record.cycles,
@@ -174,6 +172,20 @@ impl World {
             failure: verdict.err(),
         };
         (outcome, trace)
+    }
+}
+
+/// To the end, with the hand on the wheel that the row has.
+fn drive(simulation: &mut Simulation<Seat<'_>>) {
+    loop {
+        let (step, arm_nm) = (simulation.steps(), simulation.arm_torque_nm());
+        let action = Action {
+            hand_torque_nm: simulation.guidance().hand_torque_nm(step, arm_nm),
+            ..Action::default()
+        };
+        if simulation.step(&action).is_none() {
+            break;
+        }
     }
 }
 

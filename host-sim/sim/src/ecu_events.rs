@@ -6,8 +6,8 @@ use haptic_core::bus::messages::{Guidance, Message};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 
-use crate::closed_loop::{Cycle, Observer};
 use crate::models::STEP_S;
+use crate::simulation::Outcome;
 use haptic_log::Event;
 
 /// Listens to an ECU.
@@ -27,6 +27,13 @@ impl EcuEvents {
             mode: None,
             faults: FaultSet::NONE,
             events: Vec::new(),
+        }
+    }
+
+    /// Takes what came of a step.
+    pub fn observe(&mut self, outcome: &Outcome) {
+        if let Some(frame) = outcome.frames_out.first() {
+            self.hear(outcome.observation.step, frame);
         }
     }
 
@@ -60,14 +67,6 @@ impl EcuEvents {
 impl Default for EcuEvents {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-impl Observer for EcuEvents {
-    fn cycle(&mut self, cycle: &Cycle) {
-        if let Some(frame) = cycle.frames_out.first() {
-            self.hear(cycle.view.step, frame);
-        }
     }
 }
 

@@ -6,10 +6,10 @@ use clap::Args;
 use haptic_batch::course::{Sample, Survey, survey};
 use haptic_batch::files::open_course;
 use haptic_report::document::write_file;
+use haptic_report::studies::course as files;
 
 use super::output::Output;
 use super::road::LaneArguments;
-use super::table;
 use super::{BadInput, Outcome, print, print_json, print_notes};
 
 /// Columns and rows of the picture in the terminal; a character holds 2 by 4 dots.
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let survey = survey(&course);
     if let Some(directory) = &arguments.out {
         Output::begin(directory)?
-            .finish(|place| haptic_report::studies::course::write(&survey, &course, place))?;
+            .finish(|place| files::write(&survey, &course, place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if let Some(path) = &arguments.save {
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         eprintln!("Saved: {}", path.display());
     }
     if arguments.json {
-        print_json(&survey)?;
+        print_json(&files::stamped(&survey))?;
     } else {
         print(&readable(&survey))?;
     }
@@ -66,24 +66,7 @@ fn readable(survey: &Survey) -> String {
             road.road, road.lane
         ));
     }
-    let mut lines = vec![
-        ["along the lane's centre", "least", "most", "unit"]
-            .map(String::from)
-            .to_vec(),
-    ];
-    let quantities: [(&str, &str, usize, fn(&Sample) -> f64); 4] = [
-        ("curvature, left positive", "1/m", 5, |s| s.curvature_1pm),
-        ("bank, positive: left edge higher", "rad", 4, |s| s.bank_rad),
-        ("grade, positive uphill", "", 4, |s| s.grade),
-        ("lane width", "m", 3, |s| s.width_m),
-    ];
-    for (name, unit, decimals, of) in quantities {
-        let least = survey.samples.iter().map(of).fold(f64::INFINITY, f64::min);
-        let most = survey.samples.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-        let number = |value: f64| format!("{value:.decimals$}");
-        lines.push(vec![name.into(), number(least), number(most), unit.into()]);
-    }
-    format!("{text}\n\n{}\n{}", table::text(&lines), picture(survey))
+    format!("{text}\n\n{}\n{}", files::table(survey).to_text(), picture(survey))
 }
 
 /// The plan in dots, with one scale for both axes; o marks the start.

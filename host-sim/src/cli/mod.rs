@@ -21,7 +21,7 @@ mod progress;
 mod reliance;
 mod road;
 mod run;
-mod table;
+mod series;
 
 use std::fmt::Display;
 use std::process::ExitCode;

@@ -71,7 +71,7 @@ mod socket {
 
     use embedded_can::{Frame as _, Id};
     use haptic_core::bus::Frame;
-    use haptic_core::lockstep::{RECORD_LEN, from_record, to_record};
+    use haptic_lockstep::{RECORD_LEN, from_record, to_record};
     use socketcan::{CanFrame, CanSocket, Socket};
 
     use super::{Adapter, Channel, PilError};

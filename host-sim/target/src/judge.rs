@@ -5,8 +5,8 @@ use std::sync::mpsc::{Receiver, SyncSender};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, Message};
-use haptic_core::lockstep::{StackUse, StepCost};
 use haptic_core::quantity::Instant;
+use haptic_lockstep::{StackUse, StepCost};
 use serde::Serialize;
 
 use super::answers::Answers;
@@ -89,7 +89,7 @@ impl fmt::Display for Decoded {
     }
 }
 
-/// What the target spent on the ticks of a run, all frames received, the step and the advice: instructions in QEMU,
+/// What the target spent on the ticks of a run, all frames received, the step and the background: instructions in QEMU,
 /// cycles of the core on a board.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Spent {
@@ -99,10 +99,10 @@ pub struct Spent {
     pub worst_step: u64,
     /// The mean.
     pub mean: f64,
-    /// The most of any advice alone: what the controller does after its frames have left.
-    pub worst_advice: u32,
+    /// The most of any background alone: what the controller does after its frames have left.
+    pub worst_background: u32,
     /// Its mean.
-    pub mean_advice: f64,
+    pub mean_background: f64,
 }
 
 /// What the target's counter of cycles tells.
@@ -161,7 +161,7 @@ impl Judge {
         drop(answering);
         let spent = self.report.instructions.as_mut().or(self.report.cycles.as_mut());
         if let Some(spent) = spent {
-            [spent.mean, spent.mean_advice] = total.map(|total| total as f64 / self.report.steps as f64);
+            [spent.mean, spent.mean_background] = total.map(|total| total as f64 / self.report.steps as f64);
         }
         self.answers.end()?;
         if self.report.mismatches == 0 {
@@ -170,7 +170,7 @@ impl Judge {
         Ok(self.report)
     }
 
-    /// Compares one answer. Returns what the step with its advice cost, and the advice alone.
+    /// Compares one answer. Returns what the step with its background cost, and the background alone.
     fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
@@ -204,21 +204,21 @@ impl Judge {
         }
     }
 
-    /// What a step with its advice cost, and the advice alone.
+    /// What a step with its background cost, and the background alone.
     fn account(&mut self, cost: StepCost) -> [u32; 2] {
-        let cycles = [cost.cycles, cost.advice_cycles];
+        let cycles = [cost.cycles, cost.background_cycles];
         let (spent, most) = match self.counter {
             Counter::Nothing => return [0; 2],
             Counter::Instructions => (cycles.map(instructions), &mut self.report.instructions),
             Counter::Cycles => (cycles, &mut self.report.cycles),
         };
         let most = most.get_or_insert_default();
-        let [step, advice] = spent;
-        if step + advice > most.worst {
-            most.worst = step + advice;
+        let [step, background] = spent;
+        if step + background > most.worst {
+            most.worst = step + background;
             most.worst_step = self.report.steps;
         }
-        most.worst_advice = most.worst_advice.max(advice);
-        [step + advice, advice]
+        most.worst_background = most.worst_background.max(background);
+        [step + background, background]
     }
 }

@@ -2,7 +2,7 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::lockstep::{RECORD_LEN, from_record, to_record};
+use haptic_lockstep::{RECORD_LEN, from_record, to_record};
 
 use super::Channel;
 

@@ -6,10 +6,10 @@ use std::net::TcpListener;
 use std::process::ChildStdin;
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::SimTime;
-use haptic_core::lockstep::{StackUse, Start, StepCost, parameter_frames};
 use haptic_core::params::Params;
 use haptic_core::quantity::Instant;
+use haptic_lockstep::SimTime;
+use haptic_lockstep::{StackUse, Start, StepCost, parameter_frames};
 use object::{Object, ObjectSymbol};
 
 use super::answers::Answers;

@@ -1,34 +1,32 @@
 //! What writes parameters, and says which are in use. Only in Standby, and never the torque path's.
 
-use super::{Message, put, unsigned};
-use crate::bus::e2e::Protection;
+#![expect(
+    clippy::as_conversions,
+    reason = "a code is its discriminant, and a field is masked to fewer bits than its type has"
+)]
+
+use super::{Info, Message, info, put, unsigned};
+use crate::params::PARAMETERS;
 
 /// One field of a new set of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterWrite {
-    /// Which field, 0 to 18, in the order of `stored`.
+    /// Which field, in the order of [`PARAMETERS`].
     pub index: u8,
     /// Its value, SI. On the bus as an IEEE 754 binary32.
     pub value: f32,
 }
 
-impl ParameterWrite {
-    /// Fields of a set.
-    pub const FIELDS: usize = 19;
-}
-
 impl Message for ParameterWrite {
-    const ID: u16 = 0x140;
-    const PROTECTION: Protection = Protection::new(0x55);
-    const MAX_DELTA: u8 = 14;
+    const INFO: Info = info::ParameterWrite;
 
     fn pack(&self) -> u64 {
-        put(i64::from(self.index), 12, 5) | put(i64::from(self.value.to_bits()), 32, 32)
+        put(i64::from(self.index), 12, 8) | put(i64::from(self.value.to_bits()), 32, 32)
     }
 
     fn unpack(word: u64) -> Option<Self> {
-        let index = unsigned(word, 12, 5) as u8;
-        (usize::from(index) < Self::FIELDS).then(|| Self {
+        let index = unsigned(word, 12, 8) as u8;
+        (usize::from(index) < PARAMETERS.len()).then(|| Self {
             index,
             value: f32::from_bits(unsigned(word, 32, 32) as u32),
         })
@@ -83,9 +81,7 @@ pub struct ParameterStatus {
 }
 
 impl Message for ParameterStatus {
-    const ID: u16 = 0x320;
-    const PROTECTION: Protection = Protection::new(0x99);
-    const MAX_DELTA: u8 = 2;
+    const INFO: Info = info::ParameterStatus;
 
     fn pack(&self) -> u64 {
         put(i64::from(self.stored), 12, 1)

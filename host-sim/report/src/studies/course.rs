@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::files::{write_figure, write_report};
 use super::{OutputError, curves};
-use crate::document::{Block, Report, Section, Table, write_file, write_json};
-use crate::plot::{Axis, Figure, Line, Panel};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
+use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::course::{Sample, Survey};
 use haptic_sim::models::road::Course;
 
@@ -20,7 +20,7 @@ pub fn write(survey: &Survey, course: &Course, directory: &Path) -> Result<(), O
     let (plan, along) = (plan(survey), along(survey, course));
     write_figure(directory, "plan", &plan)?;
     write_figure(directory, "course", &along)?;
-    write_json(&directory.join("course.json"), survey)?;
+    write_json(&directory.join("course.json"), &stamped(survey))?;
     write_file(&directory.join("course.csv"), |f| {
         writeln!(f, "s_m,x_m,y_m,heading_rad,curvature_1pm,bank_rad,grade,width_m")?;
         for s in &survey.samples {
@@ -33,6 +33,35 @@ pub fn write(survey: &Survey, course: &Course, directory: &Path) -> Result<(), O
         Ok(())
     })?;
     write_report(directory, &report(survey, plan, along))
+}
+
+/// The survey as JSON holds it.
+pub fn stamped(survey: &Survey) -> Stamped<'_, Survey> {
+    Provenance::of(None).stamp(survey)
+}
+
+/// Least and largest values along the lane's centre.
+pub fn table(survey: &Survey) -> Table {
+    let quantities: [(&str, &str, usize, fn(&Sample) -> f64); 4] = [
+        ("Curvature, left positive", "1/m", 5, |s| s.curvature_1pm),
+        ("Bank, positive: left edge higher", "rad", 4, |s| s.bank_rad),
+        ("Grade, positive uphill", "", 4, |s| s.grade),
+        ("Lane width", "m", 3, |s| s.width_m),
+    ];
+    let row = |(name, unit, decimals, of): (&str, &str, usize, fn(&Sample) -> f64)| {
+        let values = || survey.samples.iter().map(of);
+        vec![
+            Cell::Text(name.into()),
+            Cell::number(values().fold(f64::INFINITY, f64::min), decimals),
+            Cell::number(values().fold(f64::NEG_INFINITY, f64::max), decimals),
+            Cell::Text(unit.into()),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: ["Along the lane's centre", "Least", "Most", "Unit"].map(String::from).to_vec(),
+        rows: quantities.into_iter().map(row).collect(),
+    }
 }
 
 fn plan(survey: &Survey) -> Figure {
@@ -56,10 +85,7 @@ fn plan(survey: &Survey) -> Figure {
                 label: "y (m)".into(),
                 limits: around(low, high, height),
             },
-            lines: vec![Line {
-                points,
-                ..Line::default()
-            }],
+            series: vec![Series::line("", 1, points)],
             ..Panel::default()
         }],
         ..Figure::default()
@@ -68,21 +94,16 @@ fn plan(survey: &Survey) -> Figure {
 
 fn along(survey: &Survey, course: &Course) -> Figure {
     let panel = |label: &str, value: fn(&Sample) -> f64| Panel {
-        y: Axis {
-            label: label.into(),
-            limits: None,
-        },
-        lines: vec![Line {
-            points: survey.samples.iter().map(|s| (s.s_m, value(s))).collect(),
-            ..Line::default()
-        }],
-        ..Panel::default()
+        title: String::new(),
+        y: Axis::of(label),
+        series: vec![Series::line(
+            "",
+            1,
+            survey.samples.iter().map(|s| (s.s_m, value(s))).collect(),
+        )],
     };
     Figure {
-        x: Axis {
-            label: "Distance along the lane's centre (m)".into(),
-            limits: None,
-        },
+        x: Axis::of("Distance along the lane's centre (m)"),
         panels: vec![
             panel("Curvature (1/km)", |s| 1e3 * s.curvature_1pm),
             panel("Bank (%), left up", |s| 100.0 * s.bank_rad.tan()),
@@ -95,10 +116,7 @@ fn along(survey: &Survey, course: &Course) -> Figure {
 }
 
 fn report(survey: &Survey, plan: Figure, along: Figure) -> Report {
-    let facts = [
-        ("Length".to_owned(), format!("{:.2} m", survey.length_m)),
-        ("Least lane width".into(), format!("{:.2} m", survey.lane_width_m)),
-    ];
+    let facts = [("Length".to_owned(), format!("{:.2} m", survey.length_m))];
     let roads = survey.roads.iter().map(|road| {
         let direction = if road.along_s { "along" } else { "against" };
         let lane = format!("lane {}, driven {direction} its s", road.lane);
@@ -109,12 +127,14 @@ fn report(survey: &Survey, plan: Figure, along: Figure) -> Report {
         caption: caption.into(),
     };
     Report {
+        provenance: Some(Provenance::of(None)),
         title: "A course".into(),
         summary: format!("{}. {}", survey.course, super::notes(&survey.notes)),
         sections: vec![Section {
             heading: "The centre of the lane".into(),
             blocks: vec![
                 Block::Table(Table::of_pairs(["What", "Value"], facts.into_iter().chain(roads))),
+                Block::Table(table(survey)),
                 figure(plan, "Seen from above, in the frame of the file."),
                 figure(
                     along,

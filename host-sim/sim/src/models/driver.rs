@@ -10,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use super::STEP_S;
-use crate::input::in_range;
+use crate::input::{RangeError, in_range};
 
 /// Tables 4 and 8. The gains of the arm depend on the condition and are given apart ([`ArmGains`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +74,7 @@ impl DriverParameters {
     ///
     /// # Errors
     /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), RangeError> {
         in_range("a1", self.a1, 0.0..=10.0, "rad/m")?;
         in_range("a2", self.a2, 0.0..=10.0, "rad/(m.s)")?;
         in_range("a3", self.a3, 0.0..=100.0, "")?;

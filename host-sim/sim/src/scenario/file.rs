@@ -3,20 +3,23 @@
 //! are checked by the scenario itself.
 
 use haptic_core::params::Params;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, Sensors};
+use super::{
+    Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, ScenarioBuilder,
+    Sensors,
+};
 use crate::input::{InputError, parse_toml};
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::{Course, LaneChoice, PAPER_COURSE};
+use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
 use crate::models::vehicle::VehicleParameters;
 
-/// Parses a scenario, unchecked but for its course.
+/// Parses a scenario; only its course is checked.
 pub(super) fn parse(
     name: &str,
     text: &str,
     course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
-) -> Result<Scenario, InputError> {
+) -> Result<ScenarioBuilder, InputError> {
     let file: ScenarioFile = parse_toml(name, text).map_err(|error| {
         if Course::from_toml(name, text).is_ok() {
             let hint = "this is a course, not a scenario: a scenario names it with `course = \"FILE\"`";
@@ -28,11 +31,12 @@ pub(super) fn parse(
         road: file.road.clone(),
         lane: file.lane,
     };
-    let course = if file.course == PAPER_COURSE {
-        choice.check_none(PAPER_COURSE)?;
-        Course::paper()
-    } else {
-        course(&file.course, &choice)?
+    let course = match &file.course {
+        CourseField::Named(path) if path != PAPER_COURSE => course(path, &choice)?,
+        built_in => {
+            choice.check_none(name)?;
+            built_in.own(name)?
+        }
     };
     let DriverFile {
         a1,
@@ -52,19 +56,12 @@ pub(super) fn parse(
         k_d: k_d.unwrap_or(named.k_d),
         k_hg: k_hg.unwrap_or(named.k_hg),
     };
-    let condition = match file.condition {
-        Condition::Manual => Condition::Manual,
-        _ => [Condition::High, Condition::Mid, Condition::Low]
-            .into_iter()
-            .find(|c| c.gains() == gains)
-            .unwrap_or(Condition::Custom),
-    };
     let g = file.guidance;
-    Ok(Scenario {
-        course,
-        speed_kmh: file.speed,
-        condition,
-        driver: DriverParameters {
+    Ok(Scenario::builder()
+        .course(course)
+        .speed_kmh(file.speed)
+        .condition(file.condition)
+        .driver(DriverParameters {
             a1,
             a2,
             a3,
@@ -75,10 +72,10 @@ pub(super) fn parse(
             k_nms,
             remnant_sd_nm: file.driver.remnant_sd,
             remnant_corner_hz: file.driver.remnant_corner,
-        },
-        gains,
-        vehicle: file.vehicle,
-        guidance: GuidanceParameters {
+        })
+        .gains(gains)
+        .vehicle(file.vehicle)
+        .guidance(GuidanceParameters {
             controller: Params {
                 k_1: g.k_1,
                 a_1: g.a1,
@@ -89,7 +86,7 @@ pub(super) fn parse(
                 torque_limit_nm: g.torque_limit_nm,
                 wind_up_nm_per_s: g.wind_up_nm_per_s,
                 reduction_nm_per_s: g.reduction_nm_per_s,
-                least_speed_mps: g.least_speed_mps,
+                least_speed_m_per_s: g.least_speed_m_per_s,
                 probe_amplitude_nm: g.probe_amplitude_nm,
                 probe_frequency_hz: g.probe_frequency_hz,
                 // What the controller takes for granted, whatever the driver is.
@@ -101,19 +98,190 @@ pub(super) fn parse(
             t_n: g.t_n,
             t_f: g.t_f,
             probe: g.probe,
+        })
+        .sensors(file.sensors)
+        .failure(file.failure)
+        .driver_change(file.driver_change)
+        .seed(file.seed))
+}
+
+/// A scenario as the text of a file that needs no other file: the course stands in it. Read again it is the same
+/// scenario, bit for bit.
+pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
+    let super::Values {
+        course,
+        speed_kmh,
+        manual: _,
+        driver: d,
+        gains,
+        vehicle,
+        guidance,
+        sensors,
+        failure,
+        driver_change,
+        seed,
+    } = &scenario.values;
+    let built_in = *course == Course::paper();
+    let c = guidance.controller;
+    toml::to_string(&ScenarioFile {
+        course: if built_in {
+            CourseField::Named(PAPER_COURSE.into())
+        } else {
+            CourseField::Whole(InlineCourse::of(course))
         },
-        sensors: file.sensors,
-        failure: file.failure,
-        driver_change: file.driver_change,
-        seed: file.seed,
+        road: None,
+        lane: None,
+        speed: *speed_kmh,
+        condition: match scenario.condition() {
+            // The gains say the rest.
+            Condition::Custom => Condition::Mid,
+            named => named,
+        },
+        sensors: *sensors,
+        seed: *seed,
+        driver: DriverFile {
+            a1: d.a1,
+            a2: d.a2,
+            a3: d.a3,
+            t_p: d.t_p,
+            t_n: d.t_n,
+            t_f: d.t_f,
+            t_nms: d.t_nms,
+            k_nms: d.k_nms,
+            k_d: Some(gains.k_d),
+            k_hg: Some(gains.k_hg),
+            remnant_sd: d.remnant_sd_nm,
+            remnant_corner: d.remnant_corner_hz,
+        },
+        vehicle: *vehicle,
+        guidance: GuidanceFile {
+            k_1: c.k_1,
+            a1: c.a_1,
+            a2: c.a_2,
+            a3: c.a_3,
+            a4: c.a_4,
+            t_n: guidance.t_n,
+            t_f: guidance.t_f,
+            rate_corner_hz: c.rate_corner_hz,
+            torque_limit_nm: c.torque_limit_nm,
+            wind_up_nm_per_s: c.wind_up_nm_per_s,
+            reduction_nm_per_s: c.reduction_nm_per_s,
+            least_speed_m_per_s: c.least_speed_m_per_s,
+            probe: guidance.probe,
+            probe_amplitude_nm: c.probe_amplitude_nm,
+            probe_frequency_hz: c.probe_frequency_hz,
+        },
+        failure: *failure,
+        driver_change: *driver_change,
     })
 }
 
-#[derive(Deserialize)]
+/// A course by its name, or the course itself.
+#[derive(Deserialize, Serialize)]
+#[serde(
+    untagged,
+    expecting = "the name of a course, or a [course] with name, lane_width and [[course.segment]]"
+)]
+enum CourseField {
+    Named(String),
+    Whole(InlineCourse),
+}
+
+/// A course as it stands in a scenario file.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct InlineCourse {
+    name: String,
+    #[serde(default)]
+    lane_width: f64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    segment: Vec<InlineSegment>,
+    /// The text of an OpenDRIVE file in the place of the other two: a lane that is not made of segments.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    opendrive: Option<String>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct InlineSegment {
+    length: f64,
+    curvature_start: f64,
+    curvature_end: f64,
+    #[serde(default)]
+    bank_start: f64,
+    #[serde(default)]
+    bank_end: f64,
+    #[serde(default)]
+    grade_start: f64,
+    #[serde(default)]
+    grade_end: f64,
+}
+
+#[derive(Serialize)]
+struct CourseText<'a> {
+    lane_width: f64,
+    segment: &'a [InlineSegment],
+}
+
+impl CourseField {
+    /// The course that needs no file: the built-in one, or one that stands in the scenario.
+    fn own(&self, scenario: &str) -> Result<Course, InputError> {
+        match self {
+            Self::Named(_) => Ok(Course::paper()),
+            Self::Whole(inline) => inline.checked(scenario),
+        }
+    }
+}
+
+impl InlineCourse {
+    fn of(course: &Course) -> Self {
+        let segment = |s: &Segment| InlineSegment {
+            length: s.length_m,
+            curvature_start: s.curvature_start_1pm,
+            curvature_end: s.curvature_end_1pm,
+            bank_start: s.bank_rad[0],
+            bank_end: s.bank_rad[1],
+            grade_start: s.grade[0],
+            grade_end: s.grade[1],
+        };
+        if !course.is_of_segments() {
+            return Self {
+                name: course.name().into(),
+                lane_width: course.lane_width_m(),
+                segment: Vec::new(),
+                opendrive: Some(course.to_opendrive()),
+            };
+        }
+        Self {
+            name: course.name().into(),
+            lane_width: course.lane_width_m(),
+            segment: course.segments().iter().map(segment).collect(),
+            opendrive: None,
+        }
+    }
+
+    /// The course, checked as one from a file of its own.
+    fn checked(&self, file: &str) -> Result<Course, InputError> {
+        if let Some(text) = &self.opendrive {
+            return Course::from_opendrive(&self.name, text, &LaneChoice::default())
+                .map_err(|e| InputError::new(file, format!("course: {e}")));
+        }
+        let text = CourseText {
+            lane_width: self.lane_width,
+            segment: &self.segment,
+        };
+        let text = toml::to_string(&text).map_err(|e| InputError::new(file, e))?;
+        Course::from_toml(&self.name, &text).map_err(|e| InputError::new(file, format!("course: {e}")))
+    }
+}
+
+#[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct ScenarioFile {
-    course: String,
+    course: CourseField,
+    #[serde(skip_serializing_if = "Option::is_none")]
     road: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     lane: Option<i32>,
     speed: f64,
     condition: Condition,
@@ -129,7 +297,7 @@ struct ScenarioFile {
 impl Default for ScenarioFile {
     fn default() -> Self {
         Self {
-            course: PAPER_COURSE.into(),
+            course: CourseField::Named(PAPER_COURSE.into()),
             road: None,
             lane: None,
             speed: DEFAULT_SPEED_KMH,
@@ -145,7 +313,7 @@ impl Default for ScenarioFile {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct DriverFile {
     a1: f64,
@@ -196,7 +364,7 @@ impl Default for DriverFile {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct GuidanceFile {
     #[serde(rename = "K_1", alias = "k_1")]
@@ -215,7 +383,8 @@ struct GuidanceFile {
     torque_limit_nm: f64,
     wind_up_nm_per_s: f64,
     reduction_nm_per_s: f64,
-    least_speed_mps: f64,
+    #[serde(alias = "least_speed_mps")]
+    least_speed_m_per_s: f64,
     probe: bool,
     probe_amplitude_nm: f64,
     probe_frequency_hz: f64,
@@ -241,7 +410,7 @@ impl Default for GuidanceFile {
             torque_limit_nm: c.torque_limit_nm,
             wind_up_nm_per_s: c.wind_up_nm_per_s,
             reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_mps: c.least_speed_mps,
+            least_speed_m_per_s: c.least_speed_m_per_s,
             probe,
             probe_amplitude_nm: c.probe_amplitude_nm,
             probe_frequency_hz: c.probe_frequency_hz,

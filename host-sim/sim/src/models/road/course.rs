@@ -6,13 +6,15 @@
 //! where the left edge is the higher one) and `grade` (rise per distance). All may jump between segments (an arc
 //! without a clothoid); heading never does.
 
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use serde::Deserialize;
 
+use super::Centreline;
 use super::opendrive::{self, LaneChoice, RoadUsed};
 use super::piece::Piece;
-use crate::input::{InputError, in_range, parse_toml};
+use crate::input::{InputError, RangeError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
 pub const PAPER_COURSE: &str = "paper-course";
@@ -24,14 +26,15 @@ const MIN_SEGMENT_M: f64 = 0.01;
 const MAX_COURSE_M: f64 = 200_000.0;
 /// Lane widths of roads, m. The lower end clears the vehicle's 1.7 m.
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=10.0;
-const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
+/// Width of a lane unless a course has its own, m: the paper's.
+pub const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
 /// Banks of a course file, rad: far beyond the 8 % of public roads.
 const BANK_RAD: std::ops::RangeInclusive<f64> = -0.3..=0.3;
 /// Grades of a course file.
 const GRADE: std::ops::RangeInclusive<f64> = -0.3..=0.3;
 
 /// A part of a road whose curvature, bank and grade are linear in arc length.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
     /// Arc length, m.
     pub length_m: f64,
@@ -46,7 +49,7 @@ pub struct Segment {
 }
 
 /// A checked course: every segment finite, within range, and at least one of them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Course {
     name: String,
     lane_width_m: f64,
@@ -55,7 +58,38 @@ pub struct Course {
     pieces: Option<Arc<[Piece]>>,
     roads: Vec<RoadUsed>,
     notes: Vec<String>,
+    /// Made when first asked for, and shared with every clone.
+    centreline: Arc<OnceLock<Arc<Centreline>>>,
 }
+
+impl PartialEq for Course {
+    fn eq(&self, other: &Self) -> bool {
+        let of = |course: &Self| (course.name.clone(), course.lane_width_m);
+        of(self) == of(other) && self.segments == other.segments && self.pieces == other.pieces
+    }
+}
+
+/// Why there is no such course.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum CourseError {
+    /// A value out of range; of a segment, with its number from 1.
+    Range(Option<usize>, RangeError),
+    /// No segment at all.
+    Empty,
+}
+
+impl fmt::Display for CourseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range(Some(number), error) => write!(f, "segment {number}: {error}"),
+            Self::Range(None, error) => error.fmt(f),
+            Self::Empty => f.write_str("a course needs at least one [[segment]]"),
+        }
+    }
+}
+
+impl std::error::Error for CourseError {}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -91,41 +125,30 @@ impl Course {
     /// The paper prints no numbers for its figure 5; this course is this project's own, made so that t = 70 s
     /// at 60 km/h falls 6.7 m into the first arc, as the paper's failure needs.
     pub fn paper() -> Self {
-        let straight = |length_m| Segment {
-            length_m,
-            ..Segment::default()
-        };
+        // Every caller's is a clone, so that its curve is made once.
+        static PAPER: LazyLock<Course> = LazyLock::new(Course::make_paper);
+        PAPER.clone()
+    }
+
+    fn make_paper() -> Self {
         let curve = |curvature_1pm: f64, clothoid_m, arc_m| {
             [
-                Segment {
-                    length_m: clothoid_m,
-                    curvature_end_1pm: curvature_1pm,
-                    ..Segment::default()
-                },
-                Segment {
-                    length_m: arc_m,
-                    curvature_start_1pm: curvature_1pm,
-                    curvature_end_1pm: curvature_1pm,
-                    ..Segment::default()
-                },
-                Segment {
-                    length_m: clothoid_m,
-                    curvature_start_1pm: curvature_1pm,
-                    ..Segment::default()
-                },
+                Segment::clothoid(clothoid_m, 0.0, curvature_1pm),
+                Segment::arc(arc_m, curvature_1pm),
+                Segment::clothoid(clothoid_m, curvature_1pm, 0.0),
             ]
         };
-        let mut segments = vec![straight(1080.0)];
+        let mut segments = vec![Segment::straight(1080.0)];
         segments.extend(curve(1.0 / 300.0, 80.0, 300.0));
-        segments.push(straight(200.0));
+        segments.push(Segment::straight(200.0));
         segments.extend(curve(-1.0 / 400.0, 80.0, 250.0));
-        segments.push(straight(200.0));
+        segments.push(Segment::straight(200.0));
         segments.extend(curve(1.0 / 600.0, 100.0, 400.0));
-        segments.push(straight(400.0));
+        segments.push(Segment::straight(400.0));
         Self::of_segments(PAPER_COURSE, DEFAULT_LANE_WIDTH_M, segments)
     }
 
-    pub(super) fn of_segments(name: &str, lane_width_m: f64, segments: Vec<Segment>) -> Self {
+    pub(super) fn of_segments(name: impl Into<String>, lane_width_m: f64, segments: Vec<Segment>) -> Self {
         Self {
             name: name.into(),
             lane_width_m,
@@ -133,15 +156,14 @@ impl Course {
             pieces: None,
             roads: Vec::new(),
             notes: Vec::new(),
+            centreline: Arc::default(),
         }
     }
 
     /// A lane's centre in fine pieces; `segments` sum it up for pictures.
     pub(super) fn of_pieces(name: &str, pieces: Vec<Piece>, segments: Vec<Segment>) -> Self {
-        let narrowest = pieces
-            .iter()
-            .flat_map(|p| p.width_m)
-            .fold(f64::INFINITY, f64::min);
+        let widths = pieces.iter().flat_map(|piece| piece.width_m);
+        let narrowest = widths.fold(f64::INFINITY, f64::min);
         Self {
             pieces: Some(pieces.into()),
             ..Self::of_segments(name, narrowest, segments)
@@ -152,15 +174,38 @@ impl Course {
         Self { roads, notes, ..self }
     }
 
+    /// A course from its segments, in order of arc length. `name` stands for it in results and errors.
+    ///
+    /// # Errors
+    /// No segment; a lane width, a length or a curvature out of range; a course that is too long.
+    pub fn new(
+        name: impl Into<String>,
+        lane_width_m: f64,
+        segments: Vec<Segment>,
+    ) -> Result<Self, CourseError> {
+        let whole = |e| CourseError::Range(None, e);
+        in_range("lane_width", lane_width_m, LANE_WIDTH_M, "m").map_err(whole)?;
+        if segments.is_empty() {
+            return Err(CourseError::Empty);
+        }
+        for (i, segment) in segments.iter().enumerate() {
+            segment.check().map_err(|e| CourseError::Range(Some(i + 1), e))?;
+        }
+        let course = Self::of_segments(name, lane_width_m, segments);
+        let length_m = course.length_m();
+        in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(whole)?;
+        Ok(course)
+    }
+
     /// A lane of an OpenDRIVE file's text; `name` stands for the file in errors and results.
     ///
     /// # Errors
     /// What is broken, missing or not supported, by road and element.
     pub fn from_opendrive(name: &str, text: &str, choice: &LaneChoice) -> Result<Self, InputError> {
-        let fail = |e: String| InputError::new(name, e);
-        let course = opendrive::read(name, text, choice).map_err(fail)?;
+        let course = opendrive::read(name, text, choice).map_err(|e| InputError::new(name, e))?;
         let length_m = course.length_m();
-        in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(fail)?;
+        let fits = in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m");
+        fits.map_err(|e| InputError::new(name, e))?;
         Ok(course)
     }
 
@@ -177,27 +222,13 @@ impl Course {
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
         let file: CourseFile = parse_toml(name, text)?;
         let fail = |e: String| InputError::new(name, e);
-        in_range("lane_width", file.lane_width, LANE_WIDTH_M, "m").map_err(fail)?;
-        if file.segment.is_empty() {
-            return Err(InputError::new(name, "a course needs at least one [[segment]]"));
-        }
-        let mut segments = Vec::with_capacity(file.segment.len());
-        for (i, segment) in file.segment.iter().enumerate() {
-            segments.push(
-                segment
-                    .checked()
-                    .map_err(|e| fail(format!("segment {}: {e}", i + 1)))?,
-            );
-        }
-        let course = Self::of_segments(name, file.lane_width, segments);
-        in_range(
-            "course length",
-            course.length_m(),
-            MIN_SEGMENT_M..=MAX_COURSE_M,
-            "m",
-        )
-        .map_err(fail)?;
-        Ok(course)
+        let segments = file.segment.iter().enumerate().map(|(i, segment)| {
+            segment
+                .parsed()
+                .map_err(|e| fail(format!("segment {}: {e}", i + 1)))
+        });
+        let segments = segments.collect::<Result<_, _>>()?;
+        Self::new(name, file.lane_width, segments).map_err(|e| InputError::new(name, e))
     }
 
     /// `paper-course`, or the name the course was loaded under.
@@ -216,6 +247,11 @@ impl Course {
         &self.segments
     }
 
+    /// Whether the segments are all there is to the course.
+    pub fn is_of_segments(&self) -> bool {
+        self.pieces.is_none()
+    }
+
     pub(super) fn pieces(&self) -> Option<&[Piece]> {
         self.pieces.as_deref()
     }
@@ -230,6 +266,12 @@ impl Course {
         &self.notes
     }
 
+    /// The course as a curve, made once for it and all its clones.
+    pub fn centreline(&self) -> Arc<Centreline> {
+        let made = self.centreline.get_or_init(|| Arc::new(Centreline::new(self)));
+        Arc::clone(made)
+    }
+
     /// Arc length of the whole centreline, m.
     pub fn length_m(&self) -> f64 {
         match &self.pieces {
@@ -237,58 +279,75 @@ impl Course {
             None => self.segments.iter().map(|s| s.length_m).sum(),
         }
     }
-
-    /// Whether any part of the course is banked or climbs.
-    pub fn is_flat(&self) -> bool {
-        match &self.pieces {
-            Some(pieces) => pieces
-                .iter()
-                .all(|p| p.bank_rad == [0.0; 2] && p.grade == [0.0; 2]),
-            None => self
-                .segments
-                .iter()
-                .all(|s| s.bank_rad == [0.0; 2] && s.grade == [0.0; 2]),
-        }
-    }
 }
 
-/// A quantity of a segment: `NAME` for all of it, or `NAME_start` and `NAME_end`.
-fn ends(
-    name: &str,
-    unit: &str,
-    range: std::ops::RangeInclusive<f64>,
-    [constant, start, end]: [Option<f64>; 3],
-) -> Result<[f64; 2], String> {
-    match (constant, start, end) {
-        (None, None, None) => Ok([0.0; 2]),
-        (Some(value), None, None) => in_range(name, value, range, unit).map(|()| [value; 2]),
-        (None, Some(start), Some(end)) => {
-            in_range(&format!("{name}_start"), start, range.clone(), unit)?;
-            in_range(&format!("{name}_end"), end, range, unit)?;
-            Ok([start, end])
+impl Segment {
+    /// A straight.
+    pub fn straight(length_m: f64) -> Self {
+        Self::arc(length_m, 0.0)
+    }
+
+    /// A piece of constant curvature.
+    pub fn arc(length_m: f64, curvature_1pm: f64) -> Self {
+        Self::clothoid(length_m, curvature_1pm, curvature_1pm)
+    }
+
+    /// A piece whose curvature goes from one value to another.
+    pub fn clothoid(length_m: f64, curvature_start_1pm: f64, curvature_end_1pm: f64) -> Self {
+        Self {
+            length_m,
+            curvature_start_1pm,
+            curvature_end_1pm,
+            bank_rad: [0.0; 2],
+            grade: [0.0; 2],
         }
-        (Some(_), _, _) => Err(format!(
-            "give either `{name}` or `{name}_start` and `{name}_end`, not both"
-        )),
-        (None, ..) => Err(format!("`{name}_start` and `{name}_end` go together")),
+    }
+
+    /// The same with a bank (rad, positive where the left edge is the higher one) and a grade (rise per distance),
+    /// each at the start and at the end.
+    #[must_use]
+    pub fn with_surface(self, bank_rad: [f64; 2], grade: [f64; 2]) -> Self {
+        Self { bank_rad, grade, ..self }
+    }
+
+    fn check(&self) -> Result<(), RangeError> {
+        in_range("length", self.length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
+        let curvature = [self.curvature_start_1pm, self.curvature_end_1pm];
+        let curvature_range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
+        for (quantity, [start, end], range, unit) in [
+            ("curvature", curvature, curvature_range, "1/m"),
+            ("bank", self.bank_rad, BANK_RAD, "rad"),
+            ("grade", self.grade, GRADE, ""),
+        ] {
+            let constant = start.to_bits() == end.to_bits();
+            let name = |end: &str| if constant { quantity.into() } else { format!("{quantity}_{end}") };
+            in_range(&name("start"), start, range.clone(), unit)?;
+            in_range(&name("end"), end, range, unit)?;
+        }
+        Ok(())
     }
 }
 
 impl SegmentFile {
-    fn checked(&self) -> Result<Segment, String> {
-        in_range("length", self.length, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
+    fn parsed(&self) -> Result<Segment, String> {
         let curvature = [self.curvature, self.curvature_start, self.curvature_end];
-        let range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
-        let [start, end] = ends("curvature", "1/m", range, curvature)?;
         let bank = [self.bank, self.bank_start, self.bank_end];
         let grade = [self.grade, self.grade_start, self.grade_end];
-        Ok(Segment {
-            length_m: self.length,
-            curvature_start_1pm: start,
-            curvature_end_1pm: end,
-            bank_rad: ends("bank", "rad", BANK_RAD, bank)?,
-            grade: ends("grade", "", GRADE, grade)?,
-        })
+        let [start, end] = ends("curvature", curvature)?;
+        let segment = Segment::clothoid(self.length, start, end);
+        Ok(segment.with_surface(ends("bank", bank)?, ends("grade", grade)?))
+    }
+}
+
+/// A quantity of a segment: `NAME` for all of it, or `NAME_start` and `NAME_end`.
+fn ends(name: &str, given: [Option<f64>; 3]) -> Result<[f64; 2], String> {
+    match given {
+        [constant, None, None] => Ok([constant.unwrap_or(0.0); 2]),
+        [None, Some(start), Some(end)] => Ok([start, end]),
+        [Some(_), ..] => Err(format!(
+            "give either `{name}` or `{name}_start` and `{name}_end`, not both"
+        )),
+        [None, ..] => Err(format!("`{name}_start` and `{name}_end` go together")),
     }
 }
 

@@ -9,7 +9,7 @@ mod course;
 mod opendrive;
 mod piece;
 
-pub use centreline::{Centreline, Foot, Tracker};
-pub use course::{Course, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};
+pub use centreline::{Centreline, Projection, Tracker};
+pub use course::{Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};
 pub use opendrive::{LaneChoice, RoadUsed};
 pub use piece::{Pose, Surface};

@@ -1,12 +1,12 @@
 //! State that must survive a bit flip: kept twice, the second copy inverted.
 //!
-//! A vital struct holds integers and quantities only, so every bit pattern of it is a valid value and
+//! A struct of [`words!`](self) holds integers and quantities only, so every bit pattern of it is a valid value and
 //! whatever a flip makes of it can be read, compared and refused. Not here: what a refusal leads to.
 
 use core::hint::black_box;
 
 /// A value made of 32-bit words, each of which may hold any bits.
-pub trait Vital: Copy + PartialEq {
+pub trait Words: Copy + PartialEq {
     /// The value with every word changed, in the order of the fields.
     #[must_use]
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self;
@@ -22,7 +22,7 @@ pub trait Vital: Copy + PartialEq {
     }
 }
 
-impl Vital for u32 {
+impl Words for u32 {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         change(self)
     }
@@ -32,7 +32,7 @@ impl Vital for u32 {
     }
 }
 
-impl Vital for i32 {
+impl Words for i32 {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         change(self.cast_unsigned()).cast_signed()
     }
@@ -42,7 +42,7 @@ impl Vital for i32 {
     }
 }
 
-impl<T: Vital, const N: usize> Vital for [T; N] {
+impl<T: Words, const N: usize> Words for [T; N] {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         self.map(|item| item.map_words(change))
     }
@@ -53,37 +53,37 @@ impl<T: Vital, const N: usize> Vital for [T; N] {
     }
 }
 
-/// Declares a struct of vital fields, laid out as it is written, without padding.
-macro_rules! vital {
+/// Declares a struct of such fields, laid out as it is written, without padding.
+macro_rules! words {
     ($(#[$doc:meta])* $vis:vis struct $name:ident { $($(#[$field_doc:meta])* $field_vis:vis $field:ident: $type:ty,)* }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         #[repr(C)]
         $vis struct $name { $($(#[$field_doc])* $field_vis $field: $type,)* }
 
-        impl $crate::vital::Vital for $name {
+        impl $crate::redundant::Words for $name {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
-                Self { $($field: $crate::vital::Vital::map_words(self.$field, change),)* }
+                Self { $($field: $crate::redundant::Words::map_words(self.$field, change),)* }
             }
 
             #[inline]
             fn is_inverse_of(&self, other: &Self) -> bool {
-                true $(& $crate::vital::Vital::is_inverse_of(&self.$field, &other.$field))*
+                true $(& $crate::redundant::Words::is_inverse_of(&self.$field, &other.$field))*
             }
         }
     };
 }
-pub(crate) use vital;
+pub(crate) use words;
 
 /// A value and its inverted copy.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
-pub struct Guarded<T> {
+pub struct Redundant<T> {
     value: T,
     inverted: T,
 }
 
-impl<T: Vital> Guarded<T> {
+impl<T: Words> Redundant<T> {
     /// Both copies.
     #[must_use]
     pub fn new(value: T) -> Self {

@@ -4,13 +4,13 @@ use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
 use haptic_core::ecu::Boot;
 use haptic_core::faults::Fault;
-use haptic_core::lockstep::{
-    PARAMETERS, StackUse, Start, StartState, StepCost, from_record, parameter_frames, set_parameter,
-    to_record,
-};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Micros};
+use haptic_lockstep::{
+    PARAMETERS, SimTime, StackUse, Start, StartState, StepCost, from_record, parameter_frames, set_parameter,
+    to_record,
+};
 
 fn frame(id: u16, bytes: &[u8]) -> Frame {
     Frame::new(id, bytes).unwrap()
@@ -70,14 +70,18 @@ fn starts() {
     let mut latched = boot;
     latched.latched.insert(Fault::Monitor);
     for (state, bytes, mode) in [
-        (StartState::Boot(boot), [0, 1, 2, 0, 1, 2, 3, 4], Mode::Standby),
+        (StartState::Boot(boot), [0x44, 0, 0, 0, 1, 2, 3, 4], Mode::Standby),
         (
             StartState::WithoutParameters(boot),
-            [1, 1, 2, 0, 1, 2, 3, 4],
+            [0x45, 0, 0, 0, 1, 2, 3, 4],
             Mode::Locked,
         ),
-        // The monitor's bit is 9: the second of those of class C.
-        (StartState::Boot(latched), [0, 1, 2, 2, 1, 2, 3, 4], Mode::Fault),
+        // The monitor's bit is 9.
+        (
+            StartState::Boot(latched),
+            [0x44, 0, 2, 0, 1, 2, 3, 4],
+            Mode::Fault,
+        ),
         // Engaged without any input hands over in its first step.
         (StartState::Engaged, [2, 0, 0, 0, 1, 2, 3, 4], Mode::Handover),
     ] {
@@ -105,17 +109,26 @@ fn starts() {
         frame(0x7EF, &[0; 7]),
         frame(0x7EE, &[0; 8]),
         frame(0x7EF, &[3, 0, 0, 0, 0, 0, 0, 0]),
-        frame(0x7EF, &[0, 7, 0, 0, 0, 0, 0, 0]),
+        frame(0x7EF, &[7 << 2, 0, 0, 0, 0, 0, 0, 0]),
     ] {
         assert_eq!(Start::decode(&none), None, "{none:?}");
     }
 }
 
 #[test]
+fn simulated_time() {
+    let time = SimTime(Instant::from_us(0xFEDC_BA98));
+    assert_eq!(time.encode(), frame(0x7F0, &[0x98, 0xBA, 0xDC, 0xFE, 0, 0, 0, 0]));
+    assert_eq!(SimTime::decode(&time.encode()), Some(time));
+    assert_eq!(SimTime::decode(&frame(0x7F1, time.encode().data())), None);
+    assert_eq!(SimTime::decode(&frame(0x7F0, &[0; 7])), None);
+}
+
+#[test]
 fn costs() {
     let cost = StepCost {
         cycles: 0x0403_0201,
-        advice_cycles: 0x0807_0605,
+        background_cycles: 0x0807_0605,
     };
     assert_eq!(cost.encode(), frame(0x7F1, &[1, 2, 3, 4, 5, 6, 7, 8]));
     assert_eq!(StepCost::decode(&cost.encode()), Some(cost));

@@ -1,4 +1,4 @@
-//! The advisory part of a step: the estimate of the driver's reliance, and the telemetry that reports it with
+//! The advisory part of a step: the live estimate of K_hg, and the telemetry that reports it with
 //! the probe. The ECU fills it in every step; it works when the torque is already on its way.
 //!
 //! It moves nothing, so that it may use f32, and its state is not kept twice: a flipped bit spoils an
@@ -6,8 +6,8 @@
 
 use crate::bus::Frame;
 use crate::bus::messages::{Message, Telemetry};
+use crate::estimator::{Estimator, EstimatorState, Sample};
 use crate::quantity::Torque;
-use crate::reliance::{Reliance, RelianceState, Sample};
 
 /// Telemetry comes every so many steps, or up to [`PATIENCE`] later.
 const TURN: u32 = 20;
@@ -16,10 +16,10 @@ const PATIENCE: u32 = 3;
 
 /// What the last step left to think about, and what came of it so far.
 #[derive(Debug, Clone)]
-pub(crate) struct Advice {
-    estimator: Reliance,
+pub(crate) struct Background {
+    estimator: Estimator,
     /// While there is a probe.
-    reliance: Option<RelianceState>,
+    k_hg: Option<EstimatorState>,
     /// What the last step saw, and the one before.
     samples: [Option<Sample>; 2],
     probe: Option<Torque>,
@@ -28,12 +28,12 @@ pub(crate) struct Advice {
     due: bool,
 }
 
-impl Advice {
+impl Background {
     /// Nothing seen yet.
-    pub(crate) const fn new(estimator: Reliance) -> Self {
+    pub(crate) const fn new(estimator: Estimator) -> Self {
         Self {
             estimator,
-            reliance: None,
+            k_hg: None,
             samples: [None; 2],
             probe: None,
             steps: 0,
@@ -49,10 +49,11 @@ impl Advice {
 
     /// The work for one step, and the telemetry when it is its turn. A step that took a new sample has decoded and
     /// checked it: the estimator gets it one step later, and the telemetry stands back for up to [`PATIENCE`].
+    #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]
     pub(crate) fn step(&mut self) -> Option<Frame> {
         let [new, sample] = &self.samples;
         let mut is_free = new.is_none();
-        match (&mut self.reliance, self.probe) {
+        match (&mut self.k_hg, self.probe) {
             (Some(state), Some(_)) => self.estimator.step(state, sample.as_ref()),
             // To begin is work enough for a step.
             (none, Some(_)) => {
@@ -71,7 +72,7 @@ impl Advice {
         now.then(|| {
             let telemetry = Telemetry {
                 probe: self.probe,
-                reliance: self.reliance.as_ref().and_then(RelianceState::reading),
+                k_hg: self.k_hg.as_ref().and_then(EstimatorState::reading),
             };
             telemetry.encode(turn as u8)
         })
