@@ -8,14 +8,14 @@ use super::guidance_file::GuidanceFile;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors};
 use crate::input::{InputError, parse_toml};
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::{Course, PAPER_COURSE, Segment};
+use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario; only its course is checked.
 pub(super) fn parse(
     name: &str,
     text: &str,
-    course: impl FnOnce(&str) -> Result<Course, InputError>,
+    course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
 ) -> Result<ScenarioBuilder, InputError> {
     let file: ScenarioFile = parse_toml(name, text).map_err(|error| {
         if Course::from_toml(name, text).is_ok() {
@@ -24,10 +24,16 @@ pub(super) fn parse(
         }
         error
     })?;
+    let choice = LaneChoice {
+        road: file.road.clone(),
+        lane: file.lane,
+    };
     let course = match &file.course {
-        CourseField::Named(built_in) if built_in == PAPER_COURSE => Course::paper(),
-        CourseField::Named(path) => course(path)?,
-        CourseField::Whole(inline) => inline.checked(name)?,
+        CourseField::Named(path) if path != PAPER_COURSE => course(path, &choice)?,
+        built_in => {
+            choice.check_none(name)?;
+            built_in.own(name)?
+        }
     };
     let DriverFile {
         a_1,
@@ -95,6 +101,8 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         } else {
             CourseField::Whole(InlineCourse::of(course))
         },
+        road: None,
+        lane: None,
         speed: *speed_kmh,
         condition: match scenario.condition() {
             // The gains say the rest.
@@ -140,8 +148,13 @@ enum CourseField {
 #[serde(deny_unknown_fields)]
 struct InlineCourse {
     name: String,
+    #[serde(default)]
     lane_width: f64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     segment: Vec<InlineSegment>,
+    /// The text of an OpenDRIVE file in the place of the other two: a lane that is not made of segments.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    opendrive: Option<String>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -150,6 +163,14 @@ struct InlineSegment {
     length: f64,
     curvature_start: f64,
     curvature_end: f64,
+    #[serde(default)]
+    bank_start: f64,
+    #[serde(default)]
+    bank_end: f64,
+    #[serde(default)]
+    grade_start: f64,
+    #[serde(default)]
+    grade_end: f64,
 }
 
 #[derive(Serialize)]
@@ -158,22 +179,49 @@ struct CourseText<'a> {
     segment: &'a [InlineSegment],
 }
 
+impl CourseField {
+    /// The course that needs no file: the built-in one, or one that stands in the scenario.
+    fn own(&self, scenario: &str) -> Result<Course, InputError> {
+        match self {
+            Self::Named(_) => Ok(Course::paper()),
+            Self::Whole(inline) => inline.checked(scenario),
+        }
+    }
+}
+
 impl InlineCourse {
     fn of(course: &Course) -> Self {
         let segment = |s: &Segment| InlineSegment {
             length: s.length_m,
             curvature_start: s.curvature_start_1pm,
             curvature_end: s.curvature_end_1pm,
+            bank_start: s.bank_rad[0],
+            bank_end: s.bank_rad[1],
+            grade_start: s.grade[0],
+            grade_end: s.grade[1],
         };
+        if !course.is_of_segments() {
+            return Self {
+                name: course.name().into(),
+                lane_width: course.lane_width_m(),
+                segment: Vec::new(),
+                opendrive: Some(course.to_opendrive()),
+            };
+        }
         Self {
             name: course.name().into(),
             lane_width: course.lane_width_m(),
             segment: course.segments().iter().map(segment).collect(),
+            opendrive: None,
         }
     }
 
     /// The course, checked as one from a file of its own.
     fn checked(&self, file: &str) -> Result<Course, InputError> {
+        if let Some(text) = &self.opendrive {
+            return Course::from_opendrive(&self.name, text, &LaneChoice::default())
+                .map_err(|e| InputError::new(file, format!("course: {e}")));
+        }
         let text = CourseText {
             lane_width: self.lane_width,
             segment: &self.segment,
@@ -187,6 +235,10 @@ impl InlineCourse {
 #[serde(default, deny_unknown_fields)]
 struct ScenarioFile {
     course: CourseField,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    road: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lane: Option<i32>,
     speed: f64,
     condition: Condition,
     sensors: Sensors,
@@ -202,6 +254,8 @@ impl Default for ScenarioFile {
     fn default() -> Self {
         Self {
             course: CourseField::Named(PAPER_COURSE.into()),
+            road: None,
+            lane: None,
             speed: DEFAULT_SPEED_KMH,
             condition: Condition::Mid,
             sensors: Sensors::default(),
