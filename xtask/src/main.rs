@@ -16,6 +16,7 @@ mod qemu;
 mod size;
 mod speed;
 mod tool;
+mod wheel;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -65,6 +66,8 @@ enum Command {
     Run(boards::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
+    /// Builds the Python wheel into target/dist, and says what it weighs and links.
+    Wheel(wheel::Options),
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -95,6 +98,7 @@ fn main() -> ExitCode {
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
+        Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed),
             ..
