@@ -7,9 +7,9 @@ use haptic_core::config::Setup;
 use super::guidance_file::in_words_of_the_file;
 use super::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, SPEED_KMH, Scenario,
-    Sensors, Values,
+    Sensors, Values, file,
 };
-use crate::input::{RangeError, in_range};
+use crate::input::{InputError, RangeError, in_range};
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::road::Course;
 use crate::models::vehicle::VehicleParameters;
@@ -90,6 +90,19 @@ impl From<ScenarioError> for String {
 }
 
 impl ScenarioBuilder {
+    /// The values in the text of a scenario file, not yet checked against their ranges; `name` and `course` as in
+    /// [`Scenario::from_toml`].
+    ///
+    /// # Errors
+    /// A syntax error (with its line), an unknown field (by name); what `course` says.
+    pub fn from_toml(
+        name: &str,
+        text: &str,
+        course: impl FnOnce(&str) -> Result<Course, InputError>,
+    ) -> Result<Self, InputError> {
+        file::parse(name, text, course)
+    }
+
     /// The road.
     pub fn course(mut self, course: Course) -> Self {
         self.values.course = course;

@@ -274,7 +274,7 @@ impl Scenario {
         text: &str,
         course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
-        let builder = file::parse(name, text, course)?;
+        let builder = ScenarioBuilder::from_toml(name, text, course)?;
         builder.build().map_err(|e| InputError::new(name, e))
     }
 
