@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_analysis::identify::Muscle;
-use haptic_batch::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
+use haptic_batch::experiment::{
+    Drive, Experiment, POPULATION, Plan, Repetitions, Spoiled, experiment, repeat, spoiled,
+};
 
 use super::output::Output;
 use super::participants::Participants;
@@ -31,6 +33,13 @@ pub(super) struct Arguments {
     /// default method against the truth
     #[arg(long, value_name = "N", conflicts_with = "out", value_parser = clap::value_parser!(u32).range(1..))]
     repetitions: Option<u32>,
+    /// Instead: spoil N guided drives of each participant as real logs are (noise, outliers, gaps, hands off, wrong
+    /// scales, delays and signs), and count the values that are called identified and are wrong; needs a --probe
+    #[arg(long, value_name = "N", conflicts_with_all = ["out", "repetitions"], value_parser = clap::value_parser!(u32).range(1..))]
+    spoiled: Option<u32>,
+    /// Of --spoiled: only the ways whose name holds this
+    #[arg(long, value_name = "TEXT", default_value = "", requires = "spoiled")]
+    only: String,
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/experiment")]
     out: PathBuf,
@@ -60,6 +69,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         return Ok(Outcome::Good);
     }
+    if let Some(seeds) = arguments.spoiled {
+        return run_spoiled(arguments, &plan, seeds);
+    }
     let output = Output::begin(&arguments.out)?;
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
@@ -77,6 +89,82 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(Outcome::Good)
+}
+
+fn run_spoiled(arguments: &Arguments, plan: &Plan, seeds: u32) -> Result<Outcome, BadInput> {
+    let ways = POPULATION
+        .iter()
+        .filter(|(name, _)| name.contains(&arguments.only))
+        .count();
+    if ways == 0 {
+        let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
+        return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
+    }
+    let bar = progress::bar(
+        ways as u64 * plan.participants.len() as u64 * u64::from(seeds),
+        "drives",
+    );
+    let result = spoiled(plan, seeds, &arguments.only, || bar.inc(1))?;
+    bar.finish_and_clear();
+    if arguments.json {
+        print_json(&result)?;
+    } else {
+        print(&spoiled_table(&result))?;
+    }
+    Ok(if result.broken.is_empty() {
+        Outcome::Good
+    } else {
+        Outcome::Failed
+    })
+}
+
+fn spoiled_table(result: &Spoiled) -> String {
+    let headings = [
+        "spoiled by",
+        "drives",
+        "refuted",
+        "identified",
+        "wrong",
+        "95 %",
+        "gain_1",
+        "gain_2",
+        "gain_3",
+        "t_p/s",
+        "K_hg",
+        "K_hg read",
+        "cause named most",
+    ];
+    let mut lines = vec![headings.map(String::from).to_vec()];
+    for l in &result.lines {
+        let mut cells = vec![
+            l.spoiled_by.to_owned(),
+            l.drives.to_string(),
+            l.refuted.to_string(),
+            l.identified.to_string(),
+            l.lies.to_string(),
+            number(l.coverage, 3),
+        ];
+        cells.extend(l.rms.iter().map(|&x| number(Some(x), 4)));
+        cells.push(l.k_hg_read.to_string());
+        cells.push(
+            l.cause
+                .as_ref()
+                .map_or_else(String::new, |(cause, n)| format!("{n}: {cause}")),
+        );
+        lines.push(cells);
+    }
+    let mut text = format!(
+        "{} drives of each participant; wrong: called identified, and more than 4 standard errors and 10 % (15 ms, 0.05) \
+         off; RMS errors by parameter, refuted or not\n\n{}\n{} wrong of {} identified",
+        result.seeds,
+        table::text(&lines),
+        result.lies,
+        result.identified
+    );
+    for broken in &result.broken {
+        text.push_str(&format!("\nNOT KEPT: {broken}"));
+    }
+    text
 }
 
 fn readable(result: &Experiment) -> String {

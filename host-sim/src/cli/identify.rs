@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::{Identification, Options, open_recording};
+use haptic_analysis::identify::{Identification, Options, Preflight, open_recording};
 use haptic_batch::identify::{IdentifiedDrive, Method, identify};
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
@@ -27,10 +27,26 @@ pub(super) struct Arguments {
     /// Prediction errors with a disturbance model, or the published way
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
-    /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms);
-    /// may be repeated
+    /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
+    /// how much a column is late, s: t_h_late, t_d_late); may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
+    /// Estimate what is otherwise taken as known: k_nms, t_nms, t_h_late, t_d_late, in a range if one is given, such as
+    /// t_nms=0.06..0.15; may be repeated
+    #[arg(long, value_name = "NAME[=LOW..HIGH]")]
+    estimate: Vec<String>,
+    /// Use the log from this time on, s; may be repeated with --to for several stretches
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    from: Vec<f64>,
+    /// Use the log up to this time, s
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    to: Vec<f64>,
+    /// Take the lane signals as they are: no camera noise is estimated and removed
+    #[arg(long)]
+    exact_lane: bool,
+    /// Use every row: hands off, standstill and lane changes are not looked for
+    #[arg(long)]
+    whole: bool,
     /// Let the identified driver drive this course (TOML, or paper-course)
     #[arg(long, value_name = "FILE")]
     course: Option<PathBuf>,
@@ -52,7 +68,13 @@ enum MethodArgument {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let options = Options::given(arguments.manual, &arguments.fix)?;
+    let mut options = Options::given(arguments.manual, &arguments.fix)?;
+    for what in &arguments.estimate {
+        options.estimate(what)?;
+    }
+    options.between(&arguments.from, &arguments.to)?;
+    options.lane_noise = !arguments.exact_lane;
+    options.leave_out = !arguments.whole;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
@@ -87,6 +109,21 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.fit_percent,
         parameters(found)
     );
+    if let Some(preflight) = &found.preflight {
+        text.insert_str(0, &format!("{}\n", table::text(&in_the_log(preflight))));
+    }
+    for r in &found.refuted {
+        text.push_str(&format!(
+            "\nREFUTED: {}\n  because {}\n  likeliest cause: {}\n  cure: {}\n",
+            r.assumption, r.evidence, r.cause, r.cure
+        ));
+    }
+    if !found.assumed.is_empty() {
+        text.push_str("\nAssumed, for the log cannot show it:\n");
+        for assumed in &found.assumed {
+            text.push_str(&format!("  {assumed}\n"));
+        }
+    }
     if !found.combinations.is_empty() {
         let mut lines = vec![
             ["determined instead", "estimate", "std error"]
@@ -129,6 +166,15 @@ fn readable(drive: &IdentifiedDrive) -> String {
     text
 }
 
+/// What was found in the log, and what was done about it.
+fn in_the_log(p: &Preflight) -> Vec<Vec<String>> {
+    let mut lines = vec![["in the log", "found", "done"].map(String::from).to_vec()];
+    for [what, found, done] in p.findings() {
+        lines.push(vec![what, found, done]);
+    }
+    lines
+}
+
 fn parameters(found: &Identification) -> String {
     let headings = [
         "parameter",
@@ -140,7 +186,8 @@ fn parameters(found: &Identification) -> String {
         "verdict",
     ];
     let mut lines = vec![headings.map(String::from).to_vec()];
-    for (name, unit, p) in found.parameters.list() {
+    let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
+    for (name, unit, p) in found.parameters.list().into_iter().chain(beyond) {
         let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
         let identified = if p.fixed {
             "given"
@@ -160,6 +207,11 @@ fn parameters(found: &Identification) -> String {
         ]);
     }
     table::text(&lines)
+}
+
+/// Unit of what is usually taken as known.
+fn unit_of(name: &str) -> &'static str {
+    if name == "k_nms" { "N.m/rad" } else { "s" }
 }
 
 fn correlation(found: &Identification) -> String {

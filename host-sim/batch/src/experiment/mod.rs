@@ -15,6 +15,7 @@
 mod participants;
 mod recorder;
 mod repetitions;
+mod spoiled;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -22,6 +23,7 @@ use serde::Serialize;
 pub use participants::{Participant, PublishedDriver, participants};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
+pub use spoiled::{POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
@@ -155,6 +157,17 @@ fn driven(
     truth: &PublishedDriver,
     centreline: &Centreline,
 ) -> Result<Driven, String> {
+    driven_by(plan, number, truth, centreline, |_| {})
+}
+
+/// The same, with something about the drive changed by `change`.
+fn driven_by(
+    plan: &Plan,
+    number: u32,
+    truth: &PublishedDriver,
+    centreline: &Centreline,
+    change: impl Fn(&mut Scenario),
+) -> Result<Driven, String> {
     let guided = truth.k_hg.is_some();
     let seed = plan
         .seed
@@ -166,6 +179,7 @@ fn driven(
     } else {
         REMNANT_MANUAL_NM
     };
+    change(&mut scenario);
     let mut recorder = Recorder::new(true);
     let run = closed_loop::observe(&scenario, centreline, &mut |cycle: &Cycle| recorder.cycle(cycle))?;
     Ok(Driven {
