@@ -13,6 +13,9 @@ use haptic_batch::identify::IdentifiedDrive;
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
 
+/// Highest value of the delay's profile that is drawn.
+const HIGHEST: f64 = 40.0;
+
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
 /// # Errors
@@ -23,6 +26,7 @@ pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputErro
         ("residuals", residuals(&drive.results.identification)),
         ("autocorrelation", correlogram(&drive.results.identification)),
         ("over_time", over_time(drive)),
+        ("delay_profile", delay_profile(&drive.results.identification)),
     ];
     for (name, figure) in &figures {
         write_figure(directory, name, figure)?;
@@ -46,6 +50,35 @@ fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Line {
     }
 }
 
+/// A line that is broken where the rows are.
+fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Line> {
+    let step = x.get(1).map_or(0.0, |second| 1.5 * (second - x[0]));
+    let mut out = Vec::new();
+    let mut from = 0;
+    for k in 1..=x.len() {
+        if k == x.len() || x[k] - x[k - 1] > step {
+            out.push(line(label, style, &x[from..k], &y[from..k]));
+            from = k;
+        }
+    }
+    out
+}
+
+/// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %.
+fn delay_profile(found: &Identification) -> Figure {
+    let profile = &found.delay_profile;
+    let (x, y): (Vec<f64>, Vec<f64>) = profile.iter().map(|&[t_p, d]| (t_p, d.min(HIGHEST))).unzip();
+    let ends = [x.first().copied().unwrap_or(0.0), x.last().copied().unwrap_or(1.0)];
+    over(
+        "t_p (s)",
+        vec![Panel {
+            title: String::new(),
+            y: axis("-2 log likelihood above the optimum"),
+            lines: vec![line("profile", 0, &x, &y), line("95 %", 2, &ends, &[3.84, 3.84])],
+        }],
+    )
+}
+
 fn over(x: &str, panels: Vec<Panel>) -> Figure {
     Figure {
         x: axis(x),
@@ -56,10 +89,12 @@ fn over(x: &str, panels: Vec<Panel>) -> Figure {
 
 fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
-    let lines = vec![
-        line("measured", 0, &t.time_s, &t.measured_nm),
-        line("simulated", 1, &t.time_s, &t.simulated_nm),
-    ];
+    let mut lines = pieces("measured", 0, &t.time_s, &t.measured_nm);
+    lines.extend(pieces("simulated", 1, &t.time_s, &t.simulated_nm));
+    // What was left out, on the zero line, by its reason.
+    for l in found.preflight.iter().flat_map(|p| &p.left_out) {
+        lines.push(line(&format!("left out: {}", l.reason), 2, &[l.from_s, l.to_s], &[0.0, 0.0]));
+    }
     over(
         "Time (s)",
         vec![Panel {
@@ -145,20 +180,49 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     )
 }
 
-fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
+fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
     let found = &drive.results.identification;
-    let [torque, residuals, correlogram, over_time] = figures;
+    let [torque, residuals, correlogram, over_time, delay_profile] = figures;
     let figure = |figure, caption: &str| Block::Figure {
         figure,
         caption: caption.into(),
     };
-    let mut verdict: Vec<Block> = vec![Block::Table(parameters(found))];
+    let mut verdict: Vec<Block> = Vec::new();
+    for r in &found.refuted {
+        verdict.push(Block::Text(format!(
+            "Refuted: {}, because {}. Likeliest cause: {}. Cure: {}.",
+            r.assumption, r.evidence, r.cause, r.cure
+        )));
+    }
+    verdict.push(Block::Table(parameters(found)));
+    verdict.push(figure(
+        delay_profile,
+        "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
+    ));
+    if !found.assumed.is_empty() {
+        verdict.push(Block::Text(format!(
+            "Assumed, for the log cannot show it: {}.",
+            found.assumed.join("; ")
+        )));
+    }
     verdict.extend(found.notes.iter().cloned().map(Block::Text));
     if !found.combinations.is_empty() {
         verdict.push(Block::Table(combinations(found)));
     }
     verdict.push(Block::Table(correlation(found)));
-    let mut sections = vec![
+    let mut sections = Vec::new();
+    if let Some(preflight) = &found.preflight {
+        let rows = preflight.findings().into_iter().map(|row| row.map(Cell::Text).to_vec());
+        sections.push(Section {
+            heading: "In the log".into(),
+            blocks: vec![Block::Table(Table {
+                caption: "What was found in the log, and what was done about it.".into(),
+                columns: ["", "Found", "Done"].map(String::from).to_vec(),
+                rows: rows.collect(),
+            })],
+        });
+    }
+    sections.extend([
         Section {
             heading: "Parameters".into(),
             blocks: verdict,
@@ -191,7 +255,7 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
                 "The same drive followed by the constrained Kalman filter, for drivers who change.",
             )],
         },
-    ];
+    ]);
     if let Some(again) = &drive.results.drives_again {
         let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4}"));
         let pairs = [
