@@ -6,14 +6,13 @@
 
 use std::time::Instant;
 
-use haptic_sim::closed_loop::{Run, simulate};
-use haptic_sim::models::road::Centreline;
 use haptic_sim::scenario::Scenario;
+use haptic_sim::simulation::{Run, simulate};
 
 /// One run. A function of its own so that callgrind can count what is below it.
 #[inline(never)]
-fn one_run(scenario: &Scenario, centreline: &Centreline) -> Run {
-    simulate(scenario, centreline).expect("the default scenario is good")
+fn one_run(scenario: &Scenario) -> Run {
+    simulate(scenario)
 }
 
 fn main() {
@@ -30,12 +29,12 @@ fn main() {
         }
     };
     let scenario = Scenario::default();
-    let centreline = Centreline::new(&scenario.course);
+    let _built = scenario.course().centreline();
     let mut wall_seconds = f64::INFINITY;
     let mut steps = 0;
     for _ in 0..repeat {
         let start = Instant::now();
-        let run = one_run(&scenario, &centreline);
+        let run = one_run(&scenario);
         wall_seconds = wall_seconds.min(start.elapsed().as_secs_f64());
         assert!(!run.diverged(), "a run that diverged is no measure");
         steps = run.steps;

@@ -7,24 +7,23 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Column, Guidance, LanePreview, Message};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
-use haptic_sim::closed_loop::{Cycle, Run, drive, observe, simulate};
 use haptic_sim::guidance::FloatLaw;
-use haptic_sim::models::road::{Centreline, Course};
-use haptic_sim::scenario::{Condition, FailureKind, Scenario, Sensors};
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::Course;
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
+use haptic_sim::simulation::{Outcome, Run, Simulation, observe, simulate};
 
 fn scenario(condition: Condition, t_p: f64, sensors: Sensors) -> Scenario {
-    let mut scenario = Scenario {
-        condition,
-        gains: condition.gains(),
-        sensors,
-        ..Scenario::default()
+    let driver = DriverParameters {
+        t_p,
+        ..Default::default()
     };
-    scenario.driver.t_p = t_p;
-    scenario
+    let scenario = Scenario::builder().condition(condition).driver(driver);
+    scenario.sensors(sensors).build().unwrap()
 }
 
 fn run(scenario: &Scenario) -> Run {
-    simulate(scenario, &Centreline::new(&scenario.course)).unwrap()
+    simulate(scenario)
 }
 
 /// Rows of `tests/data/NAME`: t_s, s_m, lateral_error_m, guidance_torque_nm, driver_torque_nm, wheel_angle_rad,
@@ -96,8 +95,12 @@ fn whole_curves_are_those_of_an_independent_program() {
     ];
     for (name, condition, t_p, failure) in cases {
         for sensors in [Sensors::Exact, Sensors::Paper] {
-            let mut scenario = scenario(condition, t_p, sensors);
-            scenario.failure.kind = failure;
+            let nominal = scenario(condition, t_p, sensors);
+            let failure = Failure {
+                kind: failure,
+                ..nominal.failure()
+            };
+            let scenario = nominal.to_builder().failure(failure).build().unwrap();
             let [lateral, torque, angle] = differences(&run(&scenario), name);
             println!("{name} {sensors:?}: {lateral:.5} m, {torque:.5} N.m, {angle:.6} rad");
             // Measured: 0.04 mm and 0.05 mN.m with exact sensors (the reference differentiates without a filter,
@@ -120,15 +123,12 @@ fn whole_curves_are_those_of_an_independent_program() {
 fn on_a_second_course_the_shipping_controller_drives_as_a_float_one() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/country-road.toml");
     let course = haptic_batch::files::load_course(&path).unwrap();
-    let line = Centreline::new(&course);
     for t_p in [0.1, 0.3, 0.5] {
         for condition in [Condition::High, Condition::Mid, Condition::Low] {
-            let scenario = Scenario {
-                course: course.clone(),
-                ..scenario(condition, t_p, Sensors::Exact)
-            };
-            let shipping = simulate(&scenario, &line).unwrap();
-            let float = drive(&scenario, &line, &mut FloatLaw::new(Params::PAPER), &mut ());
+            let scenario = scenario(condition, t_p, Sensors::Exact).to_builder();
+            let scenario = scenario.course(course.clone()).build().unwrap();
+            let shipping = simulate(&scenario);
+            let float = Simulation::with(&scenario, FloatLaw::new(Params::PAPER)).run();
             assert!(!float.diverged() && shipping.trace.samples.len() == float.trace.samples.len());
             let pairs = shipping.trace.samples.iter().zip(&float.trace.samples);
             let worst = pairs
@@ -146,11 +146,8 @@ fn a_run_that_leaves_its_lane_for_good_is_flagged_and_finite() {
     let slow = run(&scenario(Condition::Manual, 0.5, Sensors::Paper));
     assert!(!slow.diverged());
     for condition in [Condition::Manual, Condition::Low] {
-        let fast = Scenario {
-            speed_kmh: 120.0,
-            ..scenario(condition, 0.5, Sensors::Paper)
-        };
-        let fast = run(&fast);
+        let fast = scenario(condition, 0.5, Sensors::Paper).to_builder();
+        let fast = run(&fast.speed_kmh(120.0).build().unwrap());
         assert!(fast.diverged());
         let last = fast.trace.samples.last().unwrap();
         assert!(
@@ -177,13 +174,7 @@ fn a_road_that_cannot_be_followed_is_flagged() {
     // A radius of 10 m at 60 km/h asks for 28 m/s2.
     let text = "[[segment]]\nlength = 50\n[[segment]]\nlength = 100\ncurvature = 0.1";
     let course = Course::from_toml("hairpin", text).unwrap();
-    assert!(
-        run(&Scenario {
-            course,
-            ..Scenario::default()
-        })
-        .diverged()
-    );
+    assert!(run(&Scenario::builder().course(course).build().unwrap()).diverged());
 }
 
 #[test]
@@ -211,20 +202,24 @@ fn the_torque_applied_is_the_one_in_the_guidance_frame() {
     let scenario = scenario(Condition::High, 0.3, Sensors::Paper);
     let mut actuator = ReceiverState::TRUSTED;
     let (mut lane_frames, mut column_frames, mut answers) = (0, 0, 0);
-    let mut watch = |cycle: &Cycle| {
-        let seconds = f64::from(cycle.view.step) * 1e-3;
-        lane_frames += cycle
+    let watch = |outcome: &Outcome| {
+        let seconds = f64::from(outcome.observation.step) * 1e-3;
+        lane_frames += outcome
             .frames_in
             .iter()
             .filter(|f| f.id() == LanePreview::ID)
             .count();
-        column_frames += cycle.frames_in.iter().filter(|f| f.id() == Column::ID).count();
-        answers += cycle.frames_out.iter().filter(|f| f.id() == Guidance::ID).count();
-        let guidance = Guidance::decode(&mut actuator, &cycle.frames_out[0]).unwrap();
+        column_frames += outcome.frames_in.iter().filter(|f| f.id() == Column::ID).count();
+        answers += outcome
+            .frames_out
+            .iter()
+            .filter(|f| f.id() == Guidance::ID)
+            .count();
+        let guidance = Guidance::decode(&mut actuator, &outcome.frames_out[0]).unwrap();
         assert_eq!(guidance.mode, Mode::Active, "at {seconds} s");
-        assert_eq!(guidance.torque.nm(), cycle.applied_torque_nm, "at {seconds} s");
+        assert_eq!(guidance.torque.nm(), outcome.applied_torque_nm, "at {seconds} s");
     };
-    let run = observe(&scenario, &Centreline::new(&scenario.course), &mut watch).unwrap();
+    let run = observe(&scenario, watch);
     assert_eq!(answers, run.steps as usize);
     assert_eq!(lane_frames, (run.steps as usize * 120).div_ceil(1000));
     assert_eq!(column_frames, (run.steps as usize).div_ceil(2));
@@ -233,8 +228,11 @@ fn the_torque_applied_is_the_one_in_the_guidance_frame() {
 #[test]
 fn after_a_torque_failure_nothing_guides_and_the_driver_takes_a_second_to_notice() {
     let nominal = scenario(Condition::High, 0.1, Sensors::Exact);
-    let mut failed = nominal.clone();
-    failed.failure.kind = FailureKind::Torque;
+    let failure = Failure {
+        kind: FailureKind::Torque,
+        ..nominal.failure()
+    };
+    let failed = nominal.to_builder().failure(failure).build().unwrap();
     let (nominal, failed) = (run(&nominal), run(&failed));
     let at = |run: &Run, time_s: f64| run.trace.samples[(time_s * 200.0).round() as usize];
     assert_eq!(
@@ -262,12 +260,11 @@ fn after_a_torque_failure_nothing_guides_and_the_driver_takes_a_second_to_notice
 #[test]
 fn a_seed_fixes_a_noisy_run() {
     let noisy = |seed| {
-        let mut scenario = Scenario {
-            seed,
-            ..scenario(Condition::Mid, 0.1, Sensors::Paper)
+        let driver = DriverParameters {
+            remnant_sd_nm: 0.1,
+            ..Default::default()
         };
-        scenario.driver.remnant_sd_nm = 0.1;
-        run(&scenario)
+        run(&Scenario::builder().driver(driver).seed(seed).build().unwrap())
     };
     let first = noisy(1);
     assert_eq!(first, noisy(1));

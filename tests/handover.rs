@@ -1,24 +1,20 @@
 //! A failed input is no failed guidance: the ECU that hands over its last trusted torque within 2 s, against
 //! published figures of an independent float64 model that does the same, and against the sudden loss.
 
-use haptic_sim::closed_loop::simulate;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::road::{Centreline, Course};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario};
+use haptic_sim::simulation::simulate;
 
 /// Peak lateral error in the first curve of the paper's course, with a failure at 70 s.
-fn peak_m(line: &Centreline, t_p: f64, kind: FailureKind) -> f64 {
-    let scenario = Scenario {
-        condition: Condition::High,
-        gains: Condition::High.gains(),
-        driver: DriverParameters {
+fn peak_m(t_p: f64, kind: FailureKind) -> f64 {
+    let scenario = Scenario::builder()
+        .condition(Condition::High)
+        .driver(DriverParameters {
             t_p,
             ..Default::default()
-        },
-        failure: Failure { kind, time_s: 70.0 },
-        ..Default::default()
-    };
-    let run = simulate(&scenario, line).unwrap();
+        })
+        .failure(Failure { kind, time_s: 70.0 });
+    let run = simulate(&scenario.build().unwrap());
     assert!(!run.diverged());
     let in_curve = |s: &&haptic_log::trace::Sample| (1080.0..=1740.0).contains(&s.s_m);
     let errors = run.trace.samples.iter().filter(in_curve);
@@ -26,12 +22,11 @@ fn peak_m(line: &Centreline, t_p: f64, kind: FailureKind) -> f64 {
 }
 
 #[test]
-fn a_handover_keeps_the_relying_driver_near_where_he_was() {
-    let line = Centreline::new(&Course::paper());
+fn a_handover_keeps_the_relying_driver_near_where_they_were() {
     // t_p, peak with the torque faded over 2 s, peak with the torque lost: float64 model, exact sensors.
     for (t_p, faded_m, lost_m) in [(0.1, 0.149, 0.441), (0.3, 0.143, 0.470), (0.5, 0.221, 0.618)] {
-        let handover = peak_m(&line, t_p, FailureKind::Input);
-        let loss = peak_m(&line, t_p, FailureKind::Torque);
+        let handover = peak_m(t_p, FailureKind::Input);
+        let loss = peak_m(t_p, FailureKind::Torque);
         // 10 % is what the paper's sensors may cost; here they notice 30 ms late as well.
         assert!(
             (handover / faded_m - 1.0).abs() < 0.1,

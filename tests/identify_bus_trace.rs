@@ -7,36 +7,35 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use haptic_analysis::identify::{Options, identify_with_noise_model, open_recording};
-use haptic_sim::closed_loop::{self, Cycle};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::road::Centreline;
-use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::scenario::{GuidanceParameters, Scenario};
+use haptic_sim::simulation::{self, Outcome};
 
 /// What candump would have written, and the driver's e_theta at each millisecond.
 static DRIVE: LazyLock<(String, Vec<f64>)> = LazyLock::new(|| {
-    let mut scenario = Scenario {
-        driver: DriverParameters {
+    let mut guidance = GuidanceParameters {
+        probe: true,
+        ..Default::default()
+    };
+    guidance.controller.probe_amplitude_nm = 0.2;
+    let scenario = Scenario::builder()
+        .driver(DriverParameters {
             t_p: 0.15,
             remnant_sd_nm: 0.07,
             ..DriverParameters::default()
-        },
-        gains: ArmGains { k_d: 3.0, k_hg: 0.4 },
-        condition: Condition::Custom,
-        seed: 5,
-        ..Scenario::default()
-    };
-    scenario.guidance.probe = true;
-    scenario.guidance.controller.probe_amplitude_nm = 0.2;
-    record(&scenario)
+        })
+        .gains(ArmGains { k_d: 3.0, k_hg: 0.4 })
+        .seed(5)
+        .guidance(guidance);
+    record(&scenario.build().unwrap())
 });
 
 fn record(scenario: &Scenario) -> (String, Vec<f64>) {
     let (mut text, mut seen) = (String::new(), Vec::new());
-    let road = Centreline::new(&scenario.course);
-    let watch = &mut |cycle: &Cycle| {
-        seen.push(cycle.seen.e_theta_rad);
-        let time_s = 1_700_000_000.0 + f64::from(cycle.view.step) * 1e-3;
-        for frame in cycle.frames_in.iter().chain(cycle.frames_out) {
+    let watch = |outcome: &Outcome| {
+        seen.push(outcome.preview.e_theta_rad);
+        let time_s = 1_700_000_000.0 + f64::from(outcome.observation.step) * 1e-3;
+        for frame in outcome.frames_in.iter().chain(outcome.frames_out) {
             write!(text, "({time_s:.6}) can0 {:03X}#", frame.id()).unwrap();
             for byte in frame.data() {
                 write!(text, "{byte:02X}").unwrap();
@@ -44,7 +43,7 @@ fn record(scenario: &Scenario) -> (String, Vec<f64>) {
             text.push('\n');
         }
     };
-    closed_loop::observe(scenario, &road, watch).unwrap();
+    simulation::observe(scenario, watch);
     (text, seen)
 }
 

@@ -2,36 +2,26 @@
 //! refuse, and whether its standard errors are right.
 
 use haptic_analysis::identify::{Identification, Options, Parameter, identify_with_noise_model};
-use haptic_batch::experiment::{Plan, PublishedDriver, Recorder, experiment, participants, repeat};
-use haptic_sim::closed_loop::{self, Cycle};
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::road::{Centreline, Course};
-use haptic_sim::scenario::{Condition, Scenario, Sensors};
+use haptic_batch::experiment::{Plan, Recorder, experiment, repeat};
+use haptic_sim::participants::{PublishedDriver, participants};
+use haptic_sim::scenario::{GuidanceParameters, Scenario, Sensors};
+use haptic_sim::simulation;
 use rayon::prelude::*;
 
 /// One guided drive with a probe, without remnant, logged exactly.
 fn identified_without_noise(driver: &PublishedDriver) -> Identification {
-    let mut scenario = Scenario {
-        driver: DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
-            ..DriverParameters::default()
-        },
-        gains: ArmGains {
-            k_d: driver.k_d,
-            k_hg: driver.k_hg.unwrap(),
-        },
-        condition: Condition::Custom,
-        sensors: Sensors::Exact,
-        ..Scenario::default()
+    let mut guidance = GuidanceParameters {
+        probe: true,
+        ..Default::default()
     };
-    scenario.guidance.probe = true;
-    scenario.guidance.controller.probe_amplitude_nm = 0.2;
+    guidance.controller.probe_amplitude_nm = 0.2;
+    let scenario = Scenario::builder()
+        .driver(driver.parameters())
+        .gains(driver.gains())
+        .sensors(Sensors::Exact)
+        .guidance(guidance);
     let mut recorder = Recorder::new(false);
-    let road = Centreline::new(&Course::paper());
-    closed_loop::observe(&scenario, &road, &mut |cycle: &Cycle| recorder.cycle(cycle)).unwrap();
+    simulation::observe(&scenario.build().unwrap(), |outcome| recorder.observe(outcome));
     identify_with_noise_model(&recorder.into_log(), &Options::default())
 }
 

@@ -15,38 +15,40 @@ type Arrows = &'static [(&'static str, &'static [&'static str])];
 #[rustfmt::skip]
 const CORE: Arrows = &[
     ("actuator", &["quantity"]),
-    ("advice", &["bus", "quantity", "reliance"]),
-    ("bus", &["envelope", "faults", "modes", "quantity", "reliance", "vital"]),
-    ("controller", &["envelope", "faults", "law", "modes", "params", "plausibility", "probe", "quantity", "ramp", "vital"]),
-    ("download", &["bus", "modes", "params", "stored"]),
-    ("ecu", &["actuator", "advice", "bus", "controller", "envelope", "faults", "law", "modes", "monitor", "params", "plausibility", "quantity", "reliance", "vital"]),
-    ("envelope", &["quantity", "vital"]),
+    ("background", &["bus", "estimator", "quantity"]),
+    // The codes of limits, modes and faults, and the names of the parameters that it carries.
+    ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity", "redundant"]),
+    ("config", &["envelope", "estimator", "law", "monitor", "params", "plausibility", "probe", "quantity", "redundant"]),
+    ("controller", &["config", "envelope", "faults", "injection", "law", "modes", "plausibility", "probe", "quantity", "ramp", "redundant"]),
+    ("download", &["bus", "config", "modes", "params", "stored"]),
+    ("ecu", &["actuator", "background", "bus", "config", "controller", "envelope", "estimator", "faults", "injection", "law", "modes", "monitor", "plausibility", "quantity", "redundant"]),
+    ("envelope", &["quantity", "redundant"]),
+    ("estimator", &["quantity", "sine"]),
     ("faults", &["quantity"]),
-    ("law", &["quantity", "vital"]),
-    ("lockstep", &["bus", "ecu", "faults", "params", "quantity", "stored"]),
-    // Nothing of the rest but the way memory is guarded.
-    ("monitor", &["vital"]),
-    ("params", &["envelope", "law", "monitor", "plausibility", "probe", "quantity", "reliance", "vital"]),
+    ("injection", &["quantity"]),
+    ("law", &["quantity", "redundant"]),
+    // Nothing of the rest but how its memory is kept.
+    ("monitor", &["redundant"]),
     // A rate of change, the law's input, is all that it takes.
-    ("plausibility", &["law", "quantity", "vital"]),
-    ("probe", &["quantity", "sine", "vital"]),
-    ("quantity", &["vital"]),
-    ("ramp", &["quantity", "vital"]),
-    ("reliance", &["quantity", "sine"]),
-    ("stored", &["params"]),
+    ("plausibility", &["law", "quantity", "redundant"]),
+    ("probe", &["quantity", "redundant", "sine"]),
+    ("quantity", &["redundant"]),
+    ("ramp", &["quantity", "redundant"]),
+    ("stored", &["config", "params"]),
 ];
 
 /// Which of our packages each package of the workspace may depend on, without its tests.
 #[rustfmt::skip]
 const PACKAGES: Arrows = &[
     ("core", &[]),
-    ("firmware", &["haptic-core"]),
+    ("firmware", &["haptic-core", "haptic-lockstep"]),
+    ("firmware/lockstep", &["haptic-core"]),
     ("host-sim/log", &[]),
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
-    ("host-sim/target", &["haptic-core"]),
-    ("host-sim/campaign", &["haptic-core", "haptic-log", "haptic-sim", "haptic-target"]),
+    ("host-sim/target", &["haptic-core", "haptic-lockstep"]),
+    ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
 ];
 

@@ -5,12 +5,12 @@
 //! with it, and how closely, is this test's own: peak and mean from the traces, and the tolerances.
 
 use haptic_batch::claims::TABLE;
-use haptic_batch::evaluate::{Results, evaluate};
+use haptic_batch::evaluate::{EvaluationResults, evaluate};
 use haptic_core::params::Params;
-use haptic_sim::closed_loop::{Run, drive};
 use haptic_sim::guidance::{FloatLaw, NoGuidance};
-use haptic_sim::models::road::Centreline;
-use haptic_sim::scenario::{Condition, FailureKind, Scenario, Sensors};
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
+use haptic_sim::{Run, Simulation};
 
 /// Peak and mean |e| over the first curve, by this test's own arithmetic.
 fn figures(run: &Run) -> [f64; 2] {
@@ -52,11 +52,8 @@ fn misses(share: f64, floor_m: f64, found: impl Fn(f64, Condition, FailureKind) 
     misses
 }
 
-fn shipping(sensors: Sensors) -> Results {
-    let base = Scenario {
-        sensors,
-        ..Scenario::default()
-    };
+fn shipping(sensors: Sensors) -> EvaluationResults {
+    let base = Scenario::builder().sensors(sensors).build().unwrap();
     let evaluation = evaluate(&base, None, || ()).unwrap();
     assert_eq!(evaluation.results.runs.len(), 30);
     // The metrics are the ones that this test computes from the traces.
@@ -69,7 +66,7 @@ fn shipping(sensors: Sensors) -> Results {
     evaluation.results
 }
 
-fn from(results: &Results) -> impl Fn(f64, Condition, FailureKind) -> [f64; 2] {
+fn from(results: &EvaluationResults) -> impl Fn(f64, Condition, FailureKind) -> [f64; 2] {
     |t_p, condition, failure| {
         let metrics = results.record(t_p, condition, failure).unwrap().metrics;
         [metrics.peak_lateral_error_m, metrics.mean_abs_lateral_error_m].map(Option::unwrap)
@@ -79,18 +76,20 @@ fn from(results: &Results) -> impl Fn(f64, Condition, FailureKind) -> [f64; 2] {
 #[test]
 fn the_models_with_a_float_controller_give_the_table() {
     let base = Scenario::default();
-    let line = Centreline::new(&base.course);
     let found = |t_p, condition: Condition, failure| {
-        let mut scenario = Scenario {
-            condition,
-            gains: condition.gains(),
-            ..base.clone()
+        let driver = DriverParameters {
+            t_p,
+            ..*base.driver()
         };
-        scenario.driver.t_p = t_p;
-        scenario.failure.kind = failure;
+        let failure = Failure {
+            kind: failure,
+            ..base.failure()
+        };
+        let scenario = base.to_builder().condition(condition).driver(driver);
+        let scenario = scenario.failure(failure).build().unwrap();
         figures(&match condition {
-            Condition::Manual => drive(&scenario, &line, &mut NoGuidance, &mut ()),
-            _ => drive(&scenario, &line, &mut FloatLaw::new(Params::PAPER), &mut ()),
+            Condition::Manual => Simulation::with(&scenario, NoGuidance).run(),
+            _ => Simulation::with(&scenario, FloatLaw::new(Params::PAPER)).run(),
         })
     };
     // The table has four digits, and its plant was stepped at 0.2 ms by a method with an error of its own.
@@ -128,9 +127,6 @@ fn the_shipping_controller_over_the_bus_stays_within_ten_percent_and_keeps_the_o
 
 #[test]
 fn the_claims_speak_of_the_paper_as_it_was_run_only() {
-    let base = Scenario {
-        speed_kmh: 61.0,
-        ..Scenario::default()
-    };
+    let base = Scenario::builder().speed_kmh(61.0).build().unwrap();
     assert_eq!(evaluate(&base, None, || ()).unwrap().results.claims, []);
 }

@@ -10,9 +10,9 @@ use std::process::{Command, Stdio};
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::ecu::Boot;
-use haptic_core::lockstep::{Start, StartState};
 use haptic_core::params::Params;
-use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_lockstep::{Start, StartState};
 use haptic_target::{Channel, Machine, Pil, PilError, Report, Target, image};
 
 /// xorshift64: the same frames in every run.
@@ -41,7 +41,7 @@ struct World {
 }
 
 impl World {
-    const SPEED_MPS: f64 = 20.0;
+    const SPEED_M_PER_S: f64 = 20.0;
     const STIFFNESS_NM_PER_RAD: f64 = 5.18;
     /// Rate of the heading per wheel angle.
     const TURNING_1PS: f64 = 0.262;
@@ -53,7 +53,7 @@ impl World {
         let driver_torque = Torque::from_nm(weaving - 0.2 * self.offset_m - 4.0 * self.heading_rad);
         let wheel_rad = (driver_torque.nm() + self.motor.nm()) / Self::STIFFNESS_NM_PER_RAD;
         self.heading_rad += 1e-3 * Self::TURNING_1PS * wheel_rad;
-        self.offset_m += 1e-3 * Self::SPEED_MPS * self.heading_rad;
+        self.offset_m += 1e-3 * Self::SPEED_M_PER_S * self.heading_rad;
 
         let mut frames = Vec::new();
         let in_cycle = k % 8000;
@@ -78,11 +78,11 @@ impl World {
             frames.push(column.encode((k / 2) as u8));
         }
         if k.is_multiple_of(10) {
-            let speeds = [Speed::from_mps(Self::SPEED_MPS); 2];
+            let speeds = [Speed::from_m_per_s(Self::SPEED_M_PER_S); 2];
             frames.push(Vehicle { speeds }.encode((k / 10) as u8));
             let demand = Demand {
                 engage: in_cycle > 2500,
-                authority: Gain::from_si(1.0),
+                authority: Ratio::from_si(1.0),
                 probe: in_cycle > 3000,
             };
             frames.push(demand.encode((k / 10) as u8));
@@ -134,11 +134,11 @@ fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u
         let step = ecu.step(now);
         world.motor = step.command.torque;
         guiding += u32::from(step.command.torque != Torque::ZERO);
-        let advice = ecu.advise();
+        let background = ecu.background_step();
         let answer: Vec<Frame> = [step.guidance]
             .into_iter()
             .chain(step.others)
-            .chain(advice)
+            .chain(background)
             .collect();
         pil.tick(now, &frames, &answer).unwrap();
     }
@@ -266,7 +266,7 @@ fn reading_the_reliance_costs_less_than_400_instructions_a_step() {
     };
     let (report, _) = run(&target, 7_900, &Params::PAPER, &Params::PAPER);
     assert_eq!(report.mismatches, 0);
-    let worst = report.instructions.expect("counted").worst_advice;
+    let worst = report.instructions.expect("counted").worst_background;
     // 151 are those of a telemetry frame alone: more shows that there was a probe to read.
     assert!((200..400).contains(&worst), "{worst}");
 }

@@ -10,7 +10,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::bus::slcan;
-use haptic_core::quantity::{Gain, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 
 /// `Guidance_Mode` of the DBC file.
 const ACTIVE: u64 = 2;
@@ -164,7 +164,7 @@ fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
     if k.is_multiple_of(10) {
         frames.push(
             Vehicle {
-                speeds: [Speed::from_mps(20.0); 2],
+                speeds: [Speed::from_m_per_s(20.0); 2],
             }
             .encode((k / 10) as u8),
         );
@@ -172,7 +172,7 @@ fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
         frames.push(
             Demand {
                 engage,
-                authority: Gain::from_si(1.0),
+                authority: Ratio::from_si(1.0),
                 probe: false,
             }
             .encode((k / 10) as u8),

@@ -2,10 +2,9 @@
 //! envelope clips the probe is `unclipped`'s question.)
 
 use haptic_batch::reliance::{Plan, study};
-use haptic_sim::closed_loop::{self, Cycle};
 use haptic_sim::models::driver::ArmGains;
-use haptic_sim::models::road::Centreline;
-use haptic_sim::scenario::Scenario;
+use haptic_sim::scenario::{GuidanceParameters, Scenario};
+use haptic_sim::simulation;
 
 /// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`host-sim reliance` has 20 seeds.)
 #[test]
@@ -39,17 +38,15 @@ fn all_participants_are_read_live() {
 #[test]
 fn the_probe_is_off_by_default() {
     let torque = |amplitude_nm: f64| {
-        let mut scenario = Scenario {
-            gains: ArmGains { k_d: 3.0, k_hg: 0.5 },
-            ..Scenario::default()
-        };
-        scenario.guidance.controller.probe_amplitude_nm = amplitude_nm;
-        let road = Centreline::new(&scenario.course);
+        let mut guidance = GuidanceParameters::default();
+        guidance.controller.probe_amplitude_nm = amplitude_nm;
+        let scenario = Scenario::builder()
+            .gains(ArmGains { k_d: 3.0, k_hg: 0.5 })
+            .guidance(guidance);
         let mut torque = Vec::new();
-        closed_loop::observe(&scenario, &road, &mut |cycle: &Cycle| {
-            torque.push(cycle.applied_torque_nm)
-        })
-        .unwrap();
+        simulation::observe(&scenario.build().unwrap(), |outcome| {
+            torque.push(outcome.applied_torque_nm)
+        });
         torque
     };
     assert_eq!(torque(0.0), torque(0.2));

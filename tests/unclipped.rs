@@ -1,66 +1,55 @@
 //! The envelope is for faults: no limit touches the torque in ordinary driving, with or without the probe.
 
 use haptic_batch::evaluate::DRIVERS_T_P;
-use haptic_batch::experiment::{REMNANT_GUIDED_NM, participants};
-use haptic_sim::closed_loop::{Cycle, observe};
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::road::{Centreline, Course};
+use haptic_batch::experiment::REMNANT_GUIDED_NM;
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::participants::participants;
 use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::simulation::observe;
 
 /// The paper's nominal runs, and the participants of table 6 with the remnant that brings their fit into the paper's
 /// range.
 fn everyone() -> Vec<(String, Scenario)> {
     let nominal = DRIVERS_T_P.iter().flat_map(|t_p| {
         [Condition::High, Condition::Mid, Condition::Low].map(|condition| {
-            let mut scenario = Scenario {
-                condition,
-                gains: condition.gains(),
-                ..Scenario::default()
+            let driver = DriverParameters {
+                t_p: *t_p,
+                ..Default::default()
             };
-            scenario.driver.t_p = *t_p;
-            (format!("t_p {t_p} s, {condition}"), scenario)
+            let scenario = Scenario::builder().condition(condition).driver(driver);
+            (format!("t_p {t_p} s, {condition}"), scenario.build().unwrap())
         })
     });
     let identified = participants().into_iter().map(|participant| {
         let driver = participant.guided;
-        let scenario = Scenario {
-            condition: Condition::Custom,
-            gains: ArmGains {
-                k_d: driver.k_d,
-                k_hg: driver.k_hg.unwrap(),
-            },
-            driver: DriverParameters {
-                a1: driver.a_1,
-                a2: driver.a_2,
-                a3: driver.a_3,
-                t_p: driver.t_p,
+        let scenario = Scenario::builder()
+            .gains(driver.gains())
+            .driver(DriverParameters {
                 remnant_sd_nm: REMNANT_GUIDED_NM,
-                ..DriverParameters::default()
-            },
-            ..Scenario::default()
-        };
-        (format!("participant {}", participant.number), scenario)
+                ..driver.parameters()
+            });
+        let name = format!("participant {}", participant.number);
+        (name, scenario.build().unwrap())
     });
     nominal.chain(identified).collect()
 }
 
 /// Steps in which a limit acted. The probe is in the torque, so it is in what would be limited.
-fn limited(scenario: &Scenario, road: &Centreline) -> usize {
+fn limited(scenario: &Scenario) -> usize {
     let (mut steps, mut limited) = (0, 0);
-    let run = observe(scenario, road, &mut |cycle: &Cycle| {
+    let run = observe(scenario, |outcome| {
         steps += 1;
-        limited += usize::from(cycle.given.limited);
+        limited += usize::from(outcome.decided.limited);
     });
-    assert!(!run.unwrap().diverged());
+    assert!(!run.diverged());
     assert!(steps > 190_000, "a whole run, not {steps} steps");
     limited
 }
 
 #[test]
 fn no_limit_acts_in_nominal_runs() {
-    let road = Centreline::new(&Course::paper());
     for (who, scenario) in everyone() {
-        assert_eq!(limited(&scenario, &road), 0, "{who}");
+        assert_eq!(limited(&scenario), 0, "{who}");
     }
 }
 
@@ -69,18 +58,19 @@ fn no_limit_acts_in_nominal_runs() {
 /// guidance itself steeper; there a step in ten thousand may be clipped.
 #[test]
 fn the_probe_is_hardly_clipped() {
-    let road = Centreline::new(&Course::paper());
     for (amplitude_nm, frequency_hz, nominal, guided) in [(0.2, 2.5, 0, 20), (0.3, 1.85, 2000, 2000)] {
         let mut most = 0;
-        for (who, mut scenario) in everyone() {
-            scenario.guidance.probe = true;
-            scenario.guidance.controller.probe_amplitude_nm = amplitude_nm;
-            scenario.guidance.controller.probe_frequency_hz = frequency_hz;
-            let allowed = match scenario.condition {
+        for (who, scenario) in everyone() {
+            let mut guidance = *scenario.guidance();
+            guidance.probe = true;
+            guidance.controller.probe_amplitude_nm = amplitude_nm;
+            guidance.controller.probe_frequency_hz = frequency_hz;
+            let scenario = scenario.to_builder().guidance(guidance).build().unwrap();
+            let allowed = match scenario.condition() {
                 Condition::Custom => guided,
                 _ => nominal,
             };
-            let limited = limited(&scenario, &road);
+            let limited = limited(&scenario);
             most = most.max(limited);
             assert!(
                 limited <= allowed,

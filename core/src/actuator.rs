@@ -37,20 +37,28 @@ impl Actuator {
 
     /// Takes the command of the last step; `false` when the motor has been away from what it was told for
     /// more than 10 ms. Without a measurement there is nothing to say: its silence is a fault of the column.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn obeys(&mut self, commanded: Torque) -> bool {
         self.commanded[self.oldest % COMMANDS] = commanded;
         self.oldest = self.oldest.wrapping_add(1);
         if self.fresh > 0 {
             self.fresh = self.fresh.saturating_sub(1);
-            let (low, high) = self
-                .commanded
-                .iter()
-                .fold((commanded, commanded), |(low, high), t| {
-                    (low.min(*t), high.max(*t))
-                });
-            let near = self.delivered >= low.plus(MARGIN.opposite()) && self.delivered <= high.plus(MARGIN);
-            self.astray = if near { 0 } else { self.astray.saturating_add(1) };
+            let is_obedient = self.is_within(commanded, commanded) || {
+                let range = |(low, high): (Torque, Torque), t: &Torque| (low.min(*t), high.max(*t));
+                let (low, high) = self.commanded.iter().fold((commanded, commanded), range);
+                self.is_within(low, high)
+            };
+            self.astray = if is_obedient {
+                0
+            } else {
+                self.astray.saturating_add(1)
+            };
         }
         self.astray <= PATIENCE
+    }
+
+    /// Whether the torque delivered is no further than the margin from commands between `low` and `high`.
+    fn is_within(&self, low: Torque, high: Torque) -> bool {
+        self.delivered >= low.plus(MARGIN.opposite()) && self.delivered <= high.plus(MARGIN)
     }
 }

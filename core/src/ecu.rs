@@ -7,19 +7,20 @@ mod receivers;
 
 use heapless::Vec;
 
-use crate::advice::Advice;
+use crate::background::Background;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use crate::bus::{Frame, Reject};
+use crate::config::{Config, Setup};
 use crate::controller::{Command, Controller, ControllerState, Input, Inputs};
 use crate::envelope::LimitReason;
+use crate::estimator::Sample;
 use crate::faults::{Fault, FaultSet, History};
+use crate::injection::{Injection, NoInjection};
 use crate::modes::Mode;
 use crate::monitor::{Evidence, Monitor, MonitorState};
-use crate::params::{Config, Setup};
 use crate::quantity::{Instant, Torque};
-use crate::reliance::Sample;
-use crate::vital::{Guarded, vital};
+use crate::redundant::{Redundant, words};
 use receivers::Receivers;
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -49,9 +50,9 @@ pub struct Step {
     pub permitted: bool,
 }
 
-vital! {
+words! {
     /// What the ECU must not lose to a flipped bit, beside its receivers.
-    struct Vitals {
+    struct Memory {
         /// The torque applied since the last step.
         applied: Torque,
         /// [`Fault`] bits found outside the controller.
@@ -63,11 +64,11 @@ vital! {
     }
 }
 
-impl Vitals {
+impl Memory {
     fn new(faults: FaultSet, now: Instant) -> Self {
         Self {
             applied: Torque::ZERO,
-            faults: u32::from(faults.bits()),
+            faults: faults.bits(),
             last_step: now,
             steps: 0,
             monitor: MonitorState::NEW,
@@ -80,15 +81,13 @@ impl Vitals {
 pub struct Ecu {
     controller: Controller,
     state: ControllerState,
-    monitor: Guarded<Monitor>,
-    vitals: Guarded<Vitals>,
+    monitor: Redundant<Monitor>,
+    memory: Redundant<Memory>,
     receivers: Receivers,
     history: History,
     reset: ResetCause,
     warned_at: Option<u32>,
-    advice: Advice,
-    #[cfg(feature = "fault-injection")]
-    injected: injection::Injected,
+    background: Background,
 }
 
 /// Warnings and lines of the fault history come every so many steps.
@@ -141,15 +140,13 @@ impl Ecu {
         Self {
             controller: Controller::new(setup.config),
             state,
-            monitor: Guarded::new(setup.monitor),
-            vitals: Guarded::new(Vitals::new(faults, now)),
+            monitor: Redundant::new(setup.monitor),
+            memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: History::new(now),
             reset: boot.reset,
             warned_at: None,
-            advice: Advice::new(setup.reliance),
-            #[cfg(feature = "fault-injection")]
-            injected: injection::Injected::default(),
+            background: Background::new(setup.estimator),
         }
     }
 
@@ -164,25 +161,33 @@ impl Ecu {
 
     /// One step of the 1 kHz loop.
     pub fn step(&mut self, now: Instant) -> Step {
-        #[cfg(feature = "fault-injection")]
-        if self.injected.lane_never_ages {
+        self.step_with(now, &NoInjection)
+    }
+
+    #[inline(always)]
+    fn step_with<I: Injection>(&mut self, now: Instant, injection: &I) -> Step {
+        if injection.lane_never_ages() {
             self.receivers.renew_lane(now);
         }
-        let (mut v, mut inputs) = match (self.vitals.get(), self.receivers.take(now)) {
-            (Some(vitals), Some(inputs)) => (*vitals, inputs),
+        let (mut v, mut inputs) = match (self.memory.get(), self.receivers.take(now)) {
+            (Some(memory), Some(inputs)) => (*memory, inputs),
             _ => self.begin_anew(now),
         };
         let steps = v.steps;
-        let mut faults = FaultSet::from_bits(v.faults as u16);
+        // One whose limits are damaged permits nothing.
+        let monitor = self.monitor.get();
+        let mut faults = FaultSet::from_bits(v.faults);
         faults.insert_if(!self.receivers.actuator.obeys(v.applied), Fault::Actuator);
         faults.insert_if(
-            steps % SELF_TEST == 1 && !self.monitor_refuses_nonsense(steps / SELF_TEST),
+            steps % SELF_TEST == 1 && !passes_self_test(monitor, steps / SELF_TEST, injection),
             Fault::SelfTest,
         );
-        faults.insert_if(self.monitor.get().is_none(), Fault::Memory);
+        faults.insert_if(monitor.is_none(), Fault::Memory);
         inputs.faults = inputs.faults.union(faults);
         let applied = v.applied;
-        let mut command = self.controller.step(&mut self.state, now, applied, &inputs);
+        let mut command = self
+            .controller
+            .step_with(&mut self.state, now, applied, &inputs, injection);
         command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
@@ -195,7 +200,7 @@ impl Ecu {
             guidance: guidance.bytes(),
             elapsed_us: now.since(v.last_step).us(),
         };
-        let permitted = self.permits(&mut v.monitor, &evidence);
+        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
         if !permitted {
             faults.insert(Fault::Monitor);
             command = Command {
@@ -208,11 +213,11 @@ impl Ecu {
             };
             guidance = self.guidance(&command, steps);
         }
-        v.faults = u32::from(faults.bits());
+        v.faults = faults.bits();
         v.applied = command.torque;
         v.last_step = now;
         v.steps = steps.wrapping_add(1);
-        self.vitals.set(v);
+        self.memory.set(v);
         let sample = match inputs.column {
             Input::New(column) => Some(Sample {
                 at: now,
@@ -222,7 +227,7 @@ impl Ecu {
             }),
             _ => None,
         };
-        self.advice.take(sample, command.probe);
+        self.background.take(sample, command.probe);
         self.history.step(now, command.faults);
         let others = self.others(&command, steps);
         Step {
@@ -233,15 +238,15 @@ impl Ecu {
         }
     }
 
-    /// The advisory part of a step, to be called once after its frames have left: the telemetry frame, when it
+    /// The background part of a step, to be called once after its frames have left: the telemetry frame, when it
     /// is its turn. In f32, and without effect on any torque.
-    pub fn advise(&mut self) -> Option<Frame> {
-        self.advice.step()
+    pub fn background_step(&mut self) -> Option<Frame> {
+        self.background.step()
     }
 
-    /// The vital state is damaged: nothing of it can be used. What comes in its place knows nothing but the
+    /// The redundant state is damaged: nothing of it can be used. What comes in its place knows nothing but the
     /// memory fault, which latches.
-    fn begin_anew(&mut self, now: Instant) -> (Vitals, Inputs) {
+    fn begin_anew(&mut self, now: Instant) -> (Memory, Inputs) {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         self.state = ControllerState::new(now);
@@ -253,9 +258,10 @@ impl Ecu {
             request: Input::Lost,
             faults: FaultSet::NONE,
         };
-        (Vitals::new(faults, now), inputs)
+        (Memory::new(faults, now), inputs)
     }
 
+    #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]
     fn guidance(&self, command: &Command, steps: u32) -> Frame {
         Guidance {
             torque: command.torque,
@@ -269,6 +275,10 @@ impl Ecu {
     }
 
     /// A warning in the step that needs it, then one each turn; a line of the fault history each turn.
+    #[expect(
+        clippy::as_conversions,
+        reason = "a counter is cut to its four bits; there are at most 32 lines"
+    )]
     fn others(&mut self, command: &Command, steps: u32) -> Vec<Frame, 2> {
         let mut frames = Vec::new();
         let due = |since: u32| steps.wrapping_sub(since).is_multiple_of(TURN);
@@ -302,31 +312,10 @@ impl Ecu {
         frames
     }
 
-    /// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are
-    /// damaged refuses everything.
-    fn monitor_refuses_nonsense(&self, turn: u32) -> bool {
-        self.monitor.get().is_none_or(|monitor| {
-            let (mut state, guidance) = monitor.nonsense(turn);
-            let evidence = Evidence {
-                lane: None,
-                column: None,
-                demand: None,
-                guidance: &guidance,
-                elapsed_us: 1000,
-            };
-            !self.permits(&mut state, &evidence)
-        })
-    }
-
-    /// Asks the monitor. One whose limits are damaged permits nothing.
-    fn permits(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
-        #[cfg(feature = "fault-injection")]
-        if (self.injected.monitor_passes)(evidence.guidance) {
-            return true;
-        }
-        self.monitor
-            .get()
-            .is_some_and(|monitor| monitor.step(state, evidence))
+    /// Whether the vehicle stands, by both of its speeds; not when they are unknown.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        self.receivers.stands()
     }
 
     /// The configuration in use, if its copies agree.
@@ -334,4 +323,31 @@ impl Ecu {
     pub fn config(&self) -> Option<Config> {
         self.controller.config()
     }
+}
+
+/// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are damaged
+/// refuses everything.
+fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injection: &I) -> bool {
+    monitor.is_none_or(|monitor| {
+        let (mut state, guidance) = monitor.self_test_vector(turn);
+        let evidence = Evidence {
+            lane: None,
+            column: None,
+            demand: None,
+            guidance: &guidance,
+            elapsed_us: 1000,
+        };
+        !permits(Some(monitor), &mut state, &evidence, injection)
+    })
+}
+
+/// Asks the monitor. One whose limits are damaged permits nothing.
+fn permits<I: Injection>(
+    monitor: Option<&Monitor>,
+    state: &mut MonitorState,
+    evidence: &Evidence<'_>,
+    injection: &I,
+) -> bool {
+    injection.monitor_passes(evidence.guidance)
+        || monitor.is_some_and(|monitor| monitor.step(state, evidence))
 }

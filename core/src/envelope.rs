@@ -12,12 +12,13 @@
 //! | reduction | abs(T) falls by at most 8 N.m/s, a rounding toward zero included |
 //! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
-use crate::quantity::{Gain, Instant, Micros, Torque, per_second_times, product};
-use crate::vital::vital;
+use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second_times, product};
+use crate::redundant::words;
 
 /// Which limit held the torque back.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum LimitReason {
     /// No limit acted.
     #[default]
@@ -56,25 +57,25 @@ impl LimitReason {
     }
 }
 
-vital! {
+words! {
     /// Limits of the torque; immutable once validated by [`crate::params`].
     pub struct Envelope {
         /// L.
         pub(crate) absolute: Torque,
         /// Growth per second.
-        pub(crate) wind_up: Torque,
+        pub(crate) wind_up: TorqueRate,
         /// Fall per second.
-        pub(crate) reduction: Torque,
+        pub(crate) reduction: TorqueRate,
         /// Growth per [`WINDOW`].
         pub(crate) window: Torque,
         /// Opposing driver torque at which the bound begins to shrink.
         pub(crate) override_from: Torque,
         /// How fast it shrinks, N.m per N.m.
-        pub(crate) override_slope: Gain,
+        pub(crate) override_slope: Ratio,
     }
 }
 
-vital! {
+words! {
     /// The anchor of the window; everything else is handed in.
     pub struct EnvelopeState {
         anchor: Torque,
@@ -152,7 +153,7 @@ impl Envelope {
     /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
-        let step = |rate: Torque| Torque::from_wide(per_second_times(i64::from(rate.bits()), elapsed));
+        let step = |rate: TorqueRate| Torque::from_wide(per_second_times(i64::from(rate.bits()), elapsed));
         let growth = step(self.wind_up);
         let fall = step(self.reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
         // Judged in the frame where the applied torque is positive.

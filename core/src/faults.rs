@@ -1,89 +1,182 @@
 //! What can be wrong, and its short history on the ECU.
+//!
+//! [`faults!`](self) below is the one list of faults. One more fault is one more line of it, with the next free code;
+//! its class decides what the ECU does. `core/tests/dbc.rs` then asks for its names in `core/haptic.dbc`, and
+//! `core/tests/faults.rs` for its row in `docs/safety.md`.
 
 use crate::quantity::{Instant, Micros};
 
-/// A fault, by its bit in the status frame. Classes as in `docs/safety.md`.
+/// What a fault leads to (`docs/safety.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Fault {
+#[non_exhaustive]
+pub enum Class {
+    /// An input failed: the torque is handed over.
+    B,
+    /// The computation, memory, timing or output failed: no torque until the next power-up.
+    C,
+    /// The ECU must not leave Boot.
+    Locked,
+}
+
+/// Since when an input has been wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Since {
+    /// Its age says so, or it does not matter.
+    Known,
+    /// It arrives, but cannot be true: nobody knows since when.
+    Unknown,
+}
+
+/// Declares the faults: `code Name: class, since when;`. The code is the fault's bit in the fault word.
+macro_rules! faults {
+    ($($(#[$doc:meta])* $code:literal $name:ident: $class:ident, $since:ident;)*) => {
+        /// A fault, by its bit in the fault word. More will come.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u8)]
+        #[non_exhaustive]
+        pub enum Fault {
+            $($(#[$doc])* $name = $code,)*
+        }
+
+        impl Fault {
+            /// How many faults there are.
+            pub const COUNT: usize = [$($code),*].len();
+
+            /// Every fault, in the order of the bits.
+            pub const ALL: [Self; Self::COUNT] = [$(Self::$name),*];
+
+            /// What it leads to.
+            #[must_use]
+            pub const fn class(self) -> Class {
+                match self {
+                    $(Self::$name => Class::$class,)*
+                }
+            }
+
+            const fn since(self) -> Since {
+                match self {
+                    $(Self::$name => Since::$since,)*
+                }
+            }
+
+            /// The fault of a code on the bus.
+            #[must_use]
+            pub const fn from_code(code: i64) -> Option<Self> {
+                match code {
+                    $($code => Some(Self::$name),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+faults! {
     /// B: no usable lane preview for 30 ms.
-    LaneTimeout = 0,
+    0 LaneTimeout: B, Known;
     /// B: the lane preview's sender does not vouch for it.
-    LaneInvalid = 1,
+    1 LaneInvalid: B, Known;
     /// B: the lateral error does not move as yaw error, wheel and speed say it must.
-    LaneImplausible = 2,
+    2 LaneImplausible: B, Unknown;
     /// B: no usable driver torque and wheel angle for 30 ms.
-    ColumnTimeout = 3,
+    3 ColumnTimeout: B, Known;
     /// B: driver torque and wheel angle do not belong together.
-    ColumnImplausible = 4,
+    4 ColumnImplausible: B, Unknown;
     /// B: no usable speed for 30 ms.
-    SpeedTimeout = 5,
+    5 SpeedTimeout: B, Known;
     /// B: the two speeds differ by 2 m/s or more.
-    SpeedImplausible = 6,
+    6 SpeedImplausible: B, Unknown;
     /// B: no usable command for 30 ms.
-    CommandTimeout = 7,
+    7 CommandTimeout: B, Known;
     /// C: steps late or missing.
-    Deadline = 8,
+    8 Deadline: C, Known;
     /// C: the monitor disagreed with a command.
-    Monitor = 9,
-    /// C: two copies of a vital state differ.
-    Memory = 10,
+    9 Monitor: C, Known;
+    /// C: the two copies of a redundant state differ.
+    10 Memory: C, Known;
     /// C: the torque delivered is not the torque commanded.
-    Actuator = 11,
+    11 Actuator: C, Known;
     /// C: the monitor passed a command that it has to refuse.
-    SelfTest = 12,
+    12 SelfTest: C, Known;
     /// Locked: no good copy of the parameters.
-    Parameters = 13,
-    /// Locked: three resets within 10 s.
-    ResetLoop = 14,
+    13 Parameters: Locked, Known;
+    /// Locked: three resets within 10 s, or ten since power-up.
+    14 ResetLoop: Locked, Known;
+    /// B: lane previews arrive, and for 30 ms each is too far from the last one used to be true.
+    15 LaneStep: B, Known;
+    /// B: speeds arrive, and for 30 ms each is too far from the last one used to be true.
+    16 SpeedStep: B, Known;
+    /// B: another node sends under an identifier of this ECU; for a second after the last such frame.
+    17 OwnIdentifier: B, Known;
 }
 
-impl Fault {
-    /// Every fault, in the order of the bits.
-    pub const ALL: [Self; 15] = [
-        Self::LaneTimeout,
-        Self::LaneInvalid,
-        Self::LaneImplausible,
-        Self::ColumnTimeout,
-        Self::ColumnImplausible,
-        Self::SpeedTimeout,
-        Self::SpeedImplausible,
-        Self::CommandTimeout,
-        Self::Deadline,
-        Self::Monitor,
-        Self::Memory,
-        Self::Actuator,
-        Self::SelfTest,
-        Self::Parameters,
-        Self::ResetLoop,
-    ];
-}
+// The word has 32 bits, and a fault's code is its place in the list.
+#[expect(clippy::as_conversions, clippy::indexing_slicing, reason = "at compile time")]
+const _: () = {
+    assert!(Fault::COUNT <= 32, "the fault word is full");
+    let mut i = 0;
+    while i < Fault::COUNT {
+        assert!(Fault::ALL[i] as usize == i, "codes count up from 0");
+        i += 1;
+    }
+};
 
-/// A set of faults.
+/// A set of faults: the fault word, one bit for each.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct FaultSet(u16);
+pub struct FaultSet(u32);
 
 impl FaultSet {
     /// No fault.
     pub const NONE: Self = Self(0);
     /// Every input fault (class B).
-    pub const INPUT: Self = Self(0x00FF);
-    /// Inputs that arrive, but cannot be true: since when is unknown.
-    pub const IMPLAUSIBLE: Self = Self(0x0054);
+    pub const INPUT: Self = Self::of(Class::B);
     /// Every fault of class C.
-    pub const CRITICAL: Self = Self(0x1F00);
+    pub const CRITICAL: Self = Self::of(Class::C);
     /// What forbids to leave Boot.
-    pub const LOCKING: Self = Self(0x6000);
+    pub const LOCKING: Self = Self::of(Class::Locked);
+    /// Inputs that arrive, but cannot be true: since when is unknown.
+    #[expect(clippy::indexing_slicing, reason = "at compile time")]
+    pub const IMPLAUSIBLE: Self = {
+        let (mut set, mut i) = (0, 0);
+        while i < Fault::COUNT {
+            if matches!(Fault::ALL[i].since(), Since::Unknown) {
+                set |= Self::bit(Fault::ALL[i]);
+            }
+            i += 1;
+        }
+        Self(set)
+    };
+    /// Every fault that has a name.
+    const NAMED: u32 = Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0;
 
-    /// The set with these bits; bit 15 names no fault and is dropped.
+    /// Every fault of a class.
     #[must_use]
-    pub const fn from_bits(bits: u16) -> Self {
-        Self(bits & 0x7FFF)
+    #[expect(
+        clippy::as_conversions,
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        reason = "the index stays below the count"
+    )]
+    pub const fn of(class: Class) -> Self {
+        let (mut set, mut i) = (0, 0);
+        while i < Fault::COUNT {
+            if Fault::ALL[i].class() as u8 == class as u8 {
+                set |= Self::bit(Fault::ALL[i]);
+            }
+            i += 1;
+        }
+        Self(set)
+    }
+
+    /// The set with these bits; those that name no fault are dropped.
+    #[must_use]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits & Self::NAMED)
     }
 
     /// One bit for each fault.
     #[must_use]
-    pub const fn bits(self) -> u16 {
+    pub const fn bits(self) -> u32 {
         self.0
     }
 
@@ -135,8 +228,9 @@ impl FaultSet {
         Self(self.0 & !other.0)
     }
 
-    const fn bit(fault: Fault) -> u16 {
-        1_u16.wrapping_shl(fault as u32)
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+    const fn bit(fault: Fault) -> u32 {
+        1_u32.wrapping_shl(fault as u32)
     }
 }
 
@@ -149,6 +243,8 @@ pub struct Record {
     pub count: u8,
     /// Seconds since it last appeared, saturating.
     pub age_s: u16,
+    /// Whether it is there now.
+    pub present: bool,
 }
 
 /// How often each fault appeared since power-up, and when last.
@@ -157,9 +253,9 @@ pub struct Record {
 #[derive(Debug, Clone)]
 pub struct History {
     /// How often, by fault.
-    counts: [u8; 15],
+    counts: [u8; Fault::COUNT],
     /// In which second, by fault. A step counts one second on, and no age.
-    seen_s: [u32; 15],
+    seen_s: [u32; Fault::COUNT],
     present: FaultSet,
     /// Appeared since power-up.
     ever: FaultSet,
@@ -176,8 +272,8 @@ impl History {
     #[must_use]
     pub const fn new(now: Instant) -> Self {
         Self {
-            counts: [0; 15],
-            seen_s: [0; 15],
+            counts: [0; Fault::COUNT],
+            seen_s: [0; Fault::COUNT],
             present: FaultSet::NONE,
             ever: FaultSet::NONE,
             seconds: 0,
@@ -212,6 +308,7 @@ impl History {
     }
 
     /// Every fault that ever appeared, in the order of the bits.
+    #[expect(clippy::as_conversions, reason = "at most 65,535")]
     pub fn records(&self) -> impl Iterator<Item = Record> {
         let lines = self.counts.iter().zip(&self.seen_s);
         let records = Fault::ALL.into_iter().zip(lines);
@@ -221,6 +318,7 @@ impl History {
                 fault,
                 count: *count,
                 age_s: self.seconds.saturating_sub(*seen_s).min(u32::from(u16::MAX)) as u16,
+                present: self.present.contains(fault),
             })
     }
 }

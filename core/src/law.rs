@@ -16,11 +16,12 @@
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
 use crate::quantity::{
-    Gain, Instant, Metres, Micros, Radians, Torque, per_second_times, saturate, shift_round,
+    Instant, Metres, Micros, Radians, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
+    TorquePerTurningRate, per_second_times, saturate, shift_round,
 };
-use crate::vital::vital;
+use crate::redundant::words;
 
-vital! {
+words! {
     /// Lane errors at the guidance's own points (t'_n = 0.3 s, t'_f = 0.7 s), ISO 8855: positive asks for a
     /// positive (left) torque.
     #[derive(Default)]
@@ -34,23 +35,23 @@ vital! {
     }
 }
 
-vital! {
+words! {
 /// Coefficients of the law; immutable once validated by [`crate::params`].
 pub struct Law {
-    /// K_1*a1', N.m/m.
-    pub(crate) e_y: Gain,
-    /// K_1*a2', N.m.s/m.
-    pub(crate) e_y_rate: Gain,
-    /// K_1*a3', N.m/rad.
-    pub(crate) e_theta: Gain,
-    /// K_1*a4', N.m.s/rad.
-    pub(crate) e_theta_rate: Gain,
+    /// K_1*a1'.
+    pub(crate) e_y: TorquePerLength,
+    /// K_1*a2'.
+    pub(crate) e_y_rate: TorquePerSpeed,
+    /// K_1*a3'.
+    pub(crate) e_theta: TorquePerAngle,
+    /// K_1*a4'.
+    pub(crate) e_theta_rate: TorquePerTurningRate,
     /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner.
     pub(crate) tau: u32,
 }
 }
 
-vital! {
+words! {
     /// What the law remembers: the last sample and the filtered rates.
     pub struct LawState {
         /// 0 before the first sample.
@@ -133,14 +134,14 @@ impl Law {
         let now = |error: i32, rate: i32| {
             shift_round(i64::from(error), 4).saturating_add(per_second_times(i64::from(rate), age))
         };
-        let term = |gain: Gain, value: i64| i64::from(gain.bits()).saturating_mul(value);
-        let sum = term(self.e_y, now(state.last.e_y.bits(), state.e_y_rate))
-            .saturating_add(term(self.e_y_rate, i64::from(state.e_y_rate)))
+        let term = |gain: i32, value: i64| i64::from(gain).saturating_mul(value);
+        let sum = term(self.e_y.bits(), now(state.last.e_y.bits(), state.e_y_rate))
+            .saturating_add(term(self.e_y_rate.bits(), i64::from(state.e_y_rate)))
             .saturating_add(term(
-                self.e_theta,
+                self.e_theta.bits(),
                 now(state.last.e_theta.bits(), state.e_theta_rate),
             ))
-            .saturating_add(term(self.e_theta_rate, i64::from(state.e_theta_rate)));
+            .saturating_add(term(self.e_theta_rate.bits(), i64::from(state.e_theta_rate)));
         Torque::from_bits(saturate(shift_round(sum, RATE_BITS)))
     }
 }

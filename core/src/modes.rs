@@ -87,6 +87,39 @@ impl Mode {
         }
     }
 
+    /// The mode after all that was raised in one step: the most urgent event that changes the mode decides.
+    #[must_use]
+    pub fn after_all(self, raised: Events) -> Self {
+        let changing = raised.0 & self.changing().0;
+        Event::from_code(changing.checked_ilog2()).map_or(self, |event| self.after(event))
+    }
+
+    /// The events that change the mode, from the table.
+    #[expect(
+        clippy::as_conversions,
+        clippy::indexing_slicing,
+        reason = "the table is built at compile time, and a mode has a place in it"
+    )]
+    const fn changing(self) -> Events {
+        const CHANGING: [Events; Mode::ALL.len()] = {
+            let mut all = [Events(0); Mode::ALL.len()];
+            let mut mode = 0;
+            while mode < all.len() {
+                let mut event = 0;
+                while event < Event::ALL.len() {
+                    if Mode::ALL[mode].after(Event::ALL[event]) as u8 != mode as u8 {
+                        all[mode].0 |= 1 << event;
+                    }
+                    event += 1;
+                }
+                mode += 1;
+            }
+            all
+        };
+        // A mode has a place in the table of all modes, so that there is no bounds check to panic.
+        CHANGING[self as usize]
+    }
+
     /// Whether the mode may have a torque at all.
     #[must_use]
     pub const fn may_have_torque(self) -> bool {
@@ -94,7 +127,40 @@ impl Mode {
     }
 }
 
+/// Some events, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Events(u32);
+
+impl Events {
+    /// One event.
+    #[must_use]
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+    pub const fn of(event: Event) -> Self {
+        Self(1 << event as u32)
+    }
+
+    /// Adds an event if it was raised.
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+    pub const fn insert_if(&mut self, raised: bool, event: Event) {
+        self.0 |= (raised as u32) << event as u32;
+    }
+}
+
 impl Event {
+    /// The event of a bit's place.
+    const fn from_code(code: Option<u32>) -> Option<Self> {
+        Some(match code {
+            Some(0) => Self::BootPassed,
+            Some(1) => Self::Engage,
+            Some(2) => Self::Faded,
+            Some(3) => Self::Disengage,
+            Some(4) => Self::InputLost,
+            Some(5) => Self::BootRejected,
+            Some(6) => Self::Critical,
+            _ => return None,
+        })
+    }
+
     /// Every event, least urgent first.
     pub const ALL: [Self; 7] = [
         Self::BootPassed,

@@ -21,44 +21,46 @@
 
 use crate::law::LaneSample;
 use crate::quantity::{
-    FRAC_BITS, Gain, Instant, Metres, Micros, Radians, Speed, Torque, per_second_times, product, saturate,
+    AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
+    StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRatePerAngle,
+    per_second_times, product, saturate,
 };
-use crate::vital::vital;
+use crate::redundant::words;
 
-vital! {
+words! {
     /// The vehicle as the checks know it; immutable once validated by [`crate::params`].
     pub struct Plausibility {
-        /// K_t/l: front wheel angle per wheel angle, over the wheelbase, 1/m.
-        pub(crate) curvature_gain: Gain,
+        /// K_t/l: front wheel angle per wheel angle, over the wheelbase.
+        pub(crate) curvature_gain: CurvaturePerAngle,
         /// Stability factor A of the steady-state bicycle, in 2^-24 s2/m2.
-        pub(crate) stability_factor: Gain,
+        pub(crate) stability_factor: StabilityFactor,
         /// Aligning torque on the column per lateral acceleration, N.m per m/s2.
-        pub(crate) aligning_gain: Gain,
+        pub(crate) aligning_gain: TorquePerAcceleration,
         /// B_s, N.m.s/rad.
-        pub(crate) column_damping: Gain,
+        pub(crate) column_damping: TorquePerTurningRate,
         /// t'_f, s.
-        pub(crate) far_time: Gain,
+        pub(crate) far_time: Seconds,
         /// Margin of the lane check, m.
-        pub(crate) lane_margin: Gain,
+        pub(crate) lane_margin: Metres,
         /// Margin of the column check, N.m.s.
-        pub(crate) column_margin: Gain,
+        pub(crate) column_margin: AngularImpulse,
     }
 }
 
-vital! {
+words! {
     /// Sums and last samples.
     pub struct PlausibilityState {
         speed: Speed,
         wheel: Radians,
         /// Rate of the direction of movement per wheel angle at this speed, 1/s.
-        turning_gain: Gain,
+        turning_gain: TurningRatePerAngle,
         has_lane: u32,
         lane: LaneSample,
-        lane_predicted: Gain,
-        lane_seen: Gain,
+        lane_predicted: Metres,
+        lane_seen: Metres,
         has_column: u32,
         column_at: Instant,
-        column_sum: Gain,
+        column_sum: AngularImpulse,
     }
 }
 
@@ -67,18 +69,18 @@ impl PlausibilityState {
     pub const NEW: Self = Self {
         speed: Speed::ZERO,
         wheel: Radians::ZERO,
-        turning_gain: Gain::ZERO,
+        turning_gain: TurningRatePerAngle::ZERO,
         has_lane: 0,
         lane: LaneSample {
             e_y: Metres::ZERO,
             e_theta: Radians::ZERO,
             at: Instant::from_us(0),
         },
-        lane_predicted: Gain::ZERO,
-        lane_seen: Gain::ZERO,
+        lane_predicted: Metres::ZERO,
+        lane_seen: Metres::ZERO,
         has_column: 0,
         column_at: Instant::from_us(0),
-        column_sum: Gain::ZERO,
+        column_sum: AngularImpulse::ZERO,
     };
 
     /// chi_dot, the rate of the direction of movement, 2^-24 rad/s.
@@ -100,12 +102,12 @@ impl PlausibilityState {
 
     /// The lane was lost: what comes next has no past.
     pub fn forget_lane(&mut self) {
-        (self.has_lane, self.lane_predicted, self.lane_seen) = (0, Gain::ZERO, Gain::ZERO);
+        (self.has_lane, self.lane_predicted, self.lane_seen) = (0, Metres::ZERO, Metres::ZERO);
     }
 
     /// The column was lost.
     pub fn forget_column(&mut self) {
-        (self.has_column, self.column_sum) = (0, Gain::ZERO);
+        (self.has_column, self.column_sum) = (0, AngularImpulse::ZERO);
     }
 }
 
@@ -115,9 +117,9 @@ const LANE_STEP: Metres = Metres::from_m(0.3);
 /// Likewise for the yaw error: 0.1 rad in 8.3 ms would be 12 rad/s.
 const YAW_STEP: Radians = Radians::from_rad(0.1);
 /// Largest honest change of a speed between two messages: 1 m/s in 10 ms is 10 g.
-const SPEED_STEP: Speed = Speed::from_mps(1.0);
+const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
 /// Two sources that differ by this much are not both right.
-const SPEED_SPREAD: Speed = Speed::from_mps(2.0);
+const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 
 /// Whether a new lane sample is no further from the last than a vehicle can move.
 #[must_use]
@@ -148,7 +150,7 @@ impl Plausibility {
         let slip = (i64::from(self.stability_factor.bits()).saturating_mul(product(v, v))) >> FRAC_BITS;
         let divisor = slip.saturating_add(1 << FRAC_BITS);
         let gain = (i64::from(self.curvature_gain.bits()).saturating_mul(i64::from(v))).checked_div(divisor);
-        state.turning_gain = Gain::from_wide(gain.unwrap_or(0));
+        state.turning_gain = TurningRatePerAngle::from_wide(gain.unwrap_or(0));
     }
 
     /// Takes driver torque, wheel angle and the guidance torque applied; `false` when they cannot belong
@@ -173,7 +175,7 @@ impl Plausibility {
                 .saturating_sub(aligning);
             let damped = i64::from(self.column_damping.bits()).saturating_mul(moved) >> FRAC_BITS;
             let change = per_second_times(torque, dt).saturating_sub(damped);
-            state.column_sum = leak(state.column_sum, change, dt);
+            state.column_sum = AngularImpulse::from_wide(leak(state.column_sum.bits(), change, dt));
         }
         (state.has_column, state.column_at, state.wheel) = (1, now, wheel);
         i64::from(state.column_sum.bits()).abs() <= i64::from(self.column_margin.bits())
@@ -189,8 +191,8 @@ impl Plausibility {
             let turned = (far.saturating_mul(i64::from(state.turning()))) >> FRAC_BITS;
             let predicted = per_second_times(heading.saturating_sub(turned), dt);
             let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.e_y.bits()));
-            state.lane_predicted = leak(state.lane_predicted, predicted, dt);
-            state.lane_seen = leak(state.lane_seen, seen, dt);
+            state.lane_predicted = Metres::from_wide(leak(state.lane_predicted.bits(), predicted, dt));
+            state.lane_seen = Metres::from_wide(leak(state.lane_seen.bits(), seen, dt));
         }
         (state.has_lane, state.lane) = (1, sample);
         let (predicted, missing) = state.missing();
@@ -201,14 +203,14 @@ impl Plausibility {
 
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
-    pub fn used(state: &PlausibilityState) -> (Metres, Gain) {
+    pub fn used(state: &PlausibilityState) -> (Metres, AngularImpulse) {
         (Metres::from_wide(state.missing().1), state.column_sum)
     }
 }
 
-/// A leaking sum: `sum + change - sum*dt/(1 s)`.
-fn leak(sum: Gain, change: i64, dt: Micros) -> Gain {
-    let sum = i64::from(sum.bits());
+/// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.
+fn leak(sum: i32, change: i64, dt: Micros) -> i64 {
+    let sum = i64::from(sum);
     let kept = sum.saturating_sub(per_second_times(sum, dt));
-    Gain::from_wide(kept.saturating_add(change))
+    kept.saturating_add(change)
 }

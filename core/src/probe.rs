@@ -10,13 +10,13 @@
 //! most: the torque must not jump because time did.
 //!
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
-//! word on the sum), and what the answer tells ([`crate::reliance`]).
+//! word on the sum), and what the answer tells ([`crate::estimator`]).
 
 use crate::quantity::{Micros, Torque, shift_round};
+use crate::redundant::words;
 use crate::sine::sine;
-use crate::vital::vital;
 
-vital! {
+words! {
     /// Amplitude and frequency; immutable once validated by [`crate::params`].
     pub struct Probe {
         /// Amplitude; zero means that there is no probe.
@@ -26,7 +26,7 @@ vital! {
     }
 }
 
-vital! {
+words! {
     /// Phase and gain.
     pub struct ProbeState {
         phase: u32,

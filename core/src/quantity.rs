@@ -8,24 +8,31 @@
 //!
 //! Not here: ranges that make sense for a signal. Those belong to the bus messages and the parameters.
 
-use fixed::types::I8F24;
+#![expect(
+    clippy::as_conversions,
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    reason = "the one file where SI values become bits: `as` saturates from floats, and widens integers"
+)]
 
-use crate::vital::Vital;
+use core::fmt;
+
+use crate::redundant::Words;
 
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $from:ident, $get:ident, $unit:literal) => {
         $(#[$doc])*
         /// Format I8F24: LSB 2^-24, range -128 to 128 (exclusive).
-        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-        pub struct $name(I8F24);
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $name(i32);
 
         impl $name {
             /// Zero.
-            pub const ZERO: Self = Self(I8F24::ZERO);
+            pub const ZERO: Self = Self(0);
             /// The least value, -128.
-            pub const MIN: Self = Self(I8F24::MIN);
+            pub const MIN: Self = Self(i32::MIN);
             /// The largest value, 128 - 2^-24.
-            pub const MAX: Self = Self(I8F24::MAX);
+            pub const MAX: Self = Self(i32::MAX);
 
             #[doc = concat!("From ", $unit, ": rounds to nearest, saturates at the ends of the range.")]
             #[must_use]
@@ -36,13 +43,13 @@ macro_rules! quantity {
             #[doc = concat!("The value in ", $unit, " (exact).")]
             #[must_use]
             pub const fn $get(self) -> f64 {
-                self.0.to_bits() as f64 / ONE as f64
+                self.0 as f64 / ONE as f64
             }
 
             /// As f32, rounded to nearest: for what is advisory only.
             #[must_use]
             pub const fn to_f32(self) -> f32 {
-                self.0.to_bits() as f32 * (1.0 / ONE as f32)
+                self.0 as f32 * (1.0 / ONE as f32)
             }
 
             /// So many times itself, saturating: from counts of a converter, itself being one of them.
@@ -58,7 +65,7 @@ macro_rules! quantity {
             }
 
             pub(crate) const fn from_bits(bits: i32) -> Self {
-                Self(I8F24::from_bits(bits))
+                Self(bits)
             }
 
             /// From a count of 2^-24, saturating.
@@ -67,11 +74,17 @@ macro_rules! quantity {
             }
 
             pub(crate) const fn bits(self) -> i32 {
-                self.0.to_bits()
+                self.0
             }
         }
 
-        impl Vital for $name {
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.debug_tuple(stringify!($name)).field(&self.$get()).finish()
+            }
+        }
+
+        impl Words for $name {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
                 Self::from_bits(self.bits().map_words(change))
             }
@@ -97,7 +110,7 @@ quantity!(
 );
 quantity!(
     /// A speed along the road, m/s, forward positive.
-    Speed, from_mps, mps, "metres per second"
+    Speed, from_m_per_s, m_per_s, "metres per second"
 );
 quantity!(
     /// A torque on the steering column, N.m, positive turns left.
@@ -125,11 +138,55 @@ impl Torque {
 }
 
 quantity!(
-    /// A gain or a margin, in the SI units that its field gives it.
-    Gain, from_si, si, "SI units"
+    /// A rate of a torque, N.m/s.
+    TorqueRate, from_nm_per_s, nm_per_s, "newton metres per second"
+);
+quantity!(
+    /// A torque summed over time, N.m.s.
+    AngularImpulse, from_nm_s, nm_s, "newton metre seconds"
+);
+quantity!(
+    /// A torque per length, N.m/m.
+    TorquePerLength, from_nm_per_m, nm_per_m, "newton metres per metre"
+);
+quantity!(
+    /// A torque per speed, N.m.s/m.
+    TorquePerSpeed, from_nm_s_per_m, nm_s_per_m, "newton metre seconds per metre"
+);
+quantity!(
+    /// A torque per angle, N.m/rad.
+    TorquePerAngle, from_nm_per_rad, nm_per_rad, "newton metres per radian"
+);
+quantity!(
+    /// A torque per turning rate, N.m.s/rad.
+    TorquePerTurningRate, from_nm_s_per_rad, nm_s_per_rad, "newton metre seconds per radian"
+);
+quantity!(
+    /// A torque per acceleration, N.m.s2/m.
+    TorquePerAcceleration, from_nm_s2_per_m, nm_s2_per_m, "newton metre seconds squared per metre"
+);
+quantity!(
+    /// An angle per length and angle, 1/m: how much a vehicle's path bends for an angle of the wheel.
+    CurvaturePerAngle, from_per_m, per_m, "one per metre"
+);
+quantity!(
+    /// A turning rate per angle, 1/s.
+    TurningRatePerAngle, from_per_s, per_s, "one per second"
+);
+quantity!(
+    /// A stability factor, s2/m2.
+    StabilityFactor, from_s2_per_m2, s2_per_m2, "seconds squared per metre squared"
+);
+quantity!(
+    /// A time as a factor, s. Spans of the clock are [`Micros`].
+    Seconds, from_s, s, "seconds"
+);
+quantity!(
+    /// A share, a slope between like quantities, or K_hg: no unit.
+    Ratio, from_si, si, "ones"
 );
 
-impl Gain {
+impl Ratio {
     /// One.
     pub const ONE: Self = Self::from_bits(1 << FRAC_BITS);
 
@@ -163,7 +220,7 @@ impl Micros {
     }
 }
 
-impl Vital for Micros {
+impl Words for Micros {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self(change(self.0))
     }
@@ -212,7 +269,7 @@ impl Instant {
     }
 }
 
-impl Vital for Instant {
+impl Words for Instant {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self(change(self.0))
     }

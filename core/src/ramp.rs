@@ -4,8 +4,8 @@
 //! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/safety.md has the
 //! table). Neither ramp ever grows.
 
-use crate::quantity::{Instant, Micros, Torque};
-use crate::vital::vital;
+use crate::quantity::{Instant, Micros, Torque, TorqueRate};
+use crate::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
@@ -13,7 +13,7 @@ pub const HANDOVER: Micros = Micros::from_ms(2000);
 /// How far back an output may be trusted.
 pub const HISTORY: Micros = Micros::from_ms(250);
 
-vital! {
+words! {
     /// A straight line from a torque to zero.
     pub struct Ramp {
         from: Torque,
@@ -40,9 +40,9 @@ impl Ramp {
         }
     }
 
-    /// From `torque` to zero at `rate` per second.
+    /// From `torque` to zero at `rate`.
     #[must_use]
-    pub fn at_rate(torque: Torque, rate: Torque) -> Self {
+    pub fn at_rate(torque: Torque, rate: TorqueRate) -> Self {
         let us = i64::from(torque.abs().bits()).saturating_mul(1_000_000);
         let us = us.checked_div(i64::from(rate.bits())).unwrap_or(0);
         Self::over(
@@ -97,11 +97,13 @@ impl History {
     }
 
     /// The output that is `back` places older than the newest.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     const fn output(&self, back: usize) -> (Instant, Torque) {
         self.outputs[self.newest.wrapping_sub(back) % RING]
     }
 
     /// Remembers an output.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn push(&mut self, now: Instant, torque: Torque) {
         if now.since(self.output(0).0) >= HISTORY_STEP {
             self.newest = self.newest.wrapping_add(1);
@@ -122,13 +124,13 @@ impl History {
     /// the trusted one; zero if their signs differ.
     #[must_use]
     pub fn handover_start(&self, now: Instant, suspect: Micros, applied: Torque) -> Torque {
-        lesser(self.trusted(now, suspect), applied)
+        smaller_of_same_sign(self.trusted(now, suspect), applied)
     }
 }
 
 /// The torque of smaller magnitude; zero if the signs differ.
 #[must_use]
-pub fn lesser(a: Torque, b: Torque) -> Torque {
+pub fn smaller_of_same_sign(a: Torque, b: Torque) -> Torque {
     if (a > Torque::ZERO) != (b > Torque::ZERO) {
         Torque::ZERO
     } else if a.abs() < b.abs() {

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 0..4 | version of this layout, u32 |
 //! | 4..8 | sequence number, u32; the newer of two good copies counts, across a wrap |
-//! | 8..160 | the fields of [`Params`] in their order, SI, f64 |
+//! | 8..160 | the parameters in the order of [`PARAMETERS`], SI, f64 |
 //! | 160..164 | CRC-32 (ISO-HDLC, as in zlib) of all before |
 //!
 //! All little-endian. Who writes puts the next sequence number into the copy that was *not* loaded, so that a
@@ -14,12 +14,13 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use crate::params::{Config, Params, VehicleParams};
+use crate::config::Config;
+use crate::params::{PARAMETERS, Params};
 
 /// Length of a copy.
 pub const BYTES: usize = 8 + 8 * VALUES + 4;
-/// Fields of [`Params`].
-pub(crate) const VALUES: usize = 19;
+const VALUES: usize = PARAMETERS.len();
+/// Counts up with every change of the list of parameters: a copy of another layout is no copy.
 const VERSION: u32 = 1;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
@@ -39,7 +40,7 @@ pub struct Stored {
 pub fn save(params: &Params, sequence: u32) -> [u8; BYTES] {
     let mut bytes = [0; BYTES];
     let head = VERSION.to_le_bytes().into_iter().chain(sequence.to_le_bytes());
-    let values = values(params).into_iter().flat_map(f64::to_le_bytes);
+    let values = params.to_values().into_iter().flat_map(f64::to_le_bytes);
     for (byte, value) in bytes.iter_mut().zip(head.chain(values)) {
         *byte = value;
     }
@@ -77,97 +78,7 @@ fn read(bytes: &[u8]) -> Option<(u32, Params)> {
     for (si, bytes) in si.iter_mut().zip(values.as_chunks().0) {
         *si = f64::from_le_bytes(*bytes);
     }
-    let params = from_values(&si);
+    let params = Params::from_values(&si);
     (is_whole && is_ours && Config::new(&params).is_ok())
         .then(|| (u32::from_le_bytes([*s0, *s1, *s2, *s3]), params))
-}
-
-/// The fields of a set, in their order.
-pub(crate) fn values(params: &Params) -> [f64; VALUES] {
-    let Params {
-        k_1,
-        a_1,
-        a_2,
-        a_3,
-        a_4,
-        rate_corner_hz,
-        torque_limit_nm,
-        wind_up_nm_per_s,
-        reduction_nm_per_s,
-        least_speed_mps,
-        probe_amplitude_nm,
-        probe_frequency_hz,
-        t_nms_s,
-        k_nms,
-        vehicle,
-    } = *params;
-    [
-        k_1,
-        a_1,
-        a_2,
-        a_3,
-        a_4,
-        rate_corner_hz,
-        torque_limit_nm,
-        wind_up_nm_per_s,
-        reduction_nm_per_s,
-        least_speed_mps,
-        probe_amplitude_nm,
-        probe_frequency_hz,
-        t_nms_s,
-        k_nms,
-        vehicle.curvature_gain_1pm,
-        vehicle.stability_factor_s2pm2,
-        vehicle.aligning_gain_nms2pm,
-        vehicle.column_damping_nms,
-        vehicle.far_time_s,
-    ]
-}
-
-/// The set with these fields.
-pub(crate) const fn from_values(si: &[f64; VALUES]) -> Params {
-    let [
-        k_1,
-        a_1,
-        a_2,
-        a_3,
-        a_4,
-        rate_corner_hz,
-        torque_limit_nm,
-        wind_up_nm_per_s,
-        reduction_nm_per_s,
-        least_speed_mps,
-        probe_amplitude_nm,
-        probe_frequency_hz,
-        t_nms_s,
-        k_nms,
-        curvature_gain_1pm,
-        stability_factor_s2pm2,
-        aligning_gain_nms2pm,
-        column_damping_nms,
-        far_time_s,
-    ] = *si;
-    Params {
-        k_1,
-        a_1,
-        a_2,
-        a_3,
-        a_4,
-        rate_corner_hz,
-        torque_limit_nm,
-        wind_up_nm_per_s,
-        reduction_nm_per_s,
-        least_speed_mps,
-        probe_amplitude_nm,
-        probe_frequency_hz,
-        t_nms_s,
-        k_nms,
-        vehicle: VehicleParams {
-            curvature_gain_1pm,
-            stability_factor_s2pm2,
-            aligning_gain_nms2pm,
-            column_damping_nms,
-            far_time_s,
-        },
-    }
 }

@@ -2,17 +2,19 @@
 //! core's layout.
 
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
-use haptic_core::bus::Frame;
-use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ParameterStatus, ParameterWrite, ResetCause,
-    SimTime, Telemetry, Vehicle, Warning, WriteOutcome,
+    Column, Demand, FaultRecord, Guidance, LanePreview, MESSAGES, Message, ParameterStatus, ParameterUnlock,
+    ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle, Warning,
+    WriteOutcome,
 };
+use haptic_core::bus::{Frame, Reject};
 use haptic_core::envelope::LimitReason;
+use haptic_core::estimator::Reading;
 use haptic_core::faults::{Fault, FaultSet, Record};
 use haptic_core::modes::Mode;
-use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
-use haptic_core::reliance::Reading;
+use haptic_core::params::PARAMETERS;
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -127,7 +129,7 @@ fn vehicle_and_demand() {
     for raw in 0..=90 * 256 {
         let (a, b) = (f64::from(raw) / 256.0, f64::from(90 * 256 - raw) / 256.0);
         let sent = Vehicle {
-            speeds: [Speed::from_mps(a), Speed::from_mps(b)],
+            speeds: [Speed::from_m_per_s(a), Speed::from_m_per_s(b)],
         };
         let frame = sent.encode(3);
         assert_eq!(
@@ -139,7 +141,7 @@ fn vehicle_and_demand() {
     for raw in 0..=128 {
         let sent = Demand {
             engage: raw % 2 == 0,
-            authority: Gain::from_si(f64::from(raw) / 128.0),
+            authority: Ratio::from_si(f64::from(raw) / 128.0),
             probe: raw % 3 == 0,
         };
         let frame = sent.encode(3);
@@ -155,7 +157,7 @@ fn guidance() {
     let dbc = dbc();
     for raw in -20_480..=20_480_i32 {
         let torque = f64::from(raw) / 4096.0;
-        let (code, bits) = (raw.rem_euclid(7), (raw & 0x7FFF) as u16);
+        let (code, bits) = (raw.rem_euclid(7), (raw & 0x3_FFFF) as u32);
         let sent = Guidance {
             torque: Torque::from_nm(torque),
             limit: LimitReason::from_code(i64::from(code)).unwrap(),
@@ -170,6 +172,19 @@ fn guidance() {
         assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
         assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code));
+        let classes = [("ClassB", 0x3_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
+        for (name, mask) in classes {
+            assert_eq!(
+                signal(&dbc, &frame, name),
+                f64::from(u8::from(bits & mask != 0)),
+                "{name}"
+            );
+        }
+        let told = Guidance::classes(&frame).unwrap();
+        assert_eq!(
+            [told.b, told.c, told.locked],
+            classes.map(|(_, mask)| bits & mask != 0)
+        );
         for (i, fault) in Fault::ALL.iter().enumerate() {
             let name = format!("Fault_{fault:?}");
             assert_eq!(signal(&dbc, &frame, &name), f64::from(bits >> i & 1), "{name}");
@@ -196,6 +211,7 @@ fn warning_and_fault_record() {
             fault,
             count: 200,
             age_s: 54_321,
+            present: i % 2 == 1,
         };
         let sent = FaultRecord {
             index: i as u8,
@@ -203,8 +219,12 @@ fn warning_and_fault_record() {
             record,
         };
         let frame = sent.encode(0);
-        let signals = ["Index", "Total", "Fault", "Count", "Age"].map(|name| signal(&dbc, &frame, name));
-        assert_eq!(signals, [i as f64, 15.0, i as f64, 200.0, 54_321.0]);
+        let signals =
+            ["Index", "Total", "Fault", "Present", "Count", "Age"].map(|name| signal(&dbc, &frame, name));
+        assert_eq!(
+            signals,
+            [i as f64, 15.0, i as f64, (i % 2) as f64, 200.0, 54_321.0]
+        );
         assert_eq!(decode(sent), sent);
     }
 }
@@ -218,9 +238,9 @@ fn telemetry() {
         let (probing, identified) = (raw % 2 == 0, raw % 3 == 0);
         let sent = Telemetry {
             probe: probing.then(|| Torque::from_nm(probe)),
-            reliance: identified.then(|| Reading {
-                k_hg: Gain::from_si(k_hg),
-                deviation: Gain::from_si(deviation),
+            k_hg: identified.then(|| Reading {
+                k_hg: Ratio::from_si(k_hg),
+                deviation: Ratio::from_si(deviation),
             }),
         };
         let frame = sent.encode(0);
@@ -229,8 +249,8 @@ fn telemetry() {
             ("Probe", shown(probing, probe)),
             ("ProbeOn", shown(probing, 1.0)),
             ("Identified", shown(identified, 1.0)),
-            ("Reliance", shown(identified, k_hg)),
-            ("Deviation", shown(identified, deviation)),
+            ("K_hg", shown(identified, k_hg)),
+            ("K_hg_Deviation", shown(identified, deviation)),
         ];
         for (name, value) in expected {
             assert_eq!(signal(&dbc, &frame, name), value, "{name} {raw}");
@@ -261,7 +281,7 @@ fn parameters() {
         value: 1.0,
     };
     assert_eq!(ParameterWrite::unpack(beyond.pack()), None);
-    for code in 0..6 {
+    for code in 0..9 {
         let sent = ParameterStatus {
             stored: code % 2 == 0,
             damaged: code % 3 == 0,
@@ -277,6 +297,90 @@ fn parameters() {
             [flag(code % 2 == 0), flag(code % 3 == 0), code as f64, sequence]
         );
         assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
+fn unlock_value_and_rejection() {
+    let dbc = dbc();
+    let sent = ParameterUnlock {
+        sequence: 0xFEDC_BA98,
+    };
+    assert_eq!(
+        signal(&dbc, &sent.encode(0), "Sequence"),
+        f64::from(0xFEDC_BA98_u32)
+    );
+    assert_eq!(decode(sent), sent);
+    for (index, value) in [(0, 0.25_f32), (18, 0.7)] {
+        let sent = ParameterValue { index, value };
+        let frame = sent.encode(index);
+        assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
+        assert_eq!(f32::from_bits(signal(&dbc, &frame, "Value") as u32), value);
+        assert_eq!(decode(sent), sent);
+    }
+    for (code, reason) in Reject::ALL.into_iter().enumerate() {
+        let sent = Rejection {
+            id: 0x7FF - code as u16,
+            reason,
+            count: 54_321,
+        };
+        let frame = sent.encode(0);
+        let signals = ["Message", "Reason", "Count"].map(|name| signal(&dbc, &frame, name));
+        assert_eq!(signals, [2047.0 - code as f64, code as f64, 54_321.0]);
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+/// What a client needs to send a frame that is accepted: the data IDs as they are used, and the window of the counter.
+#[test]
+fn the_dbc_file_has_the_data_ids_of_every_message() {
+    let text = include_str!("../haptic.dbc");
+    let attribute = |name: &str, id: u16| {
+        let begin = format!("BA_ \"{name}\" BO_ {id} ");
+        let value = text.split_once(&begin).unwrap().1.split(';').next().unwrap();
+        value.trim_matches('"').to_owned()
+    };
+    for message in MESSAGES {
+        let ids = attribute("E2EDataIds", message.id);
+        let ids: Vec<u8> = ids
+            .split(' ')
+            .map(|hex| u8::from_str_radix(hex, 16).unwrap())
+            .collect();
+        let by_file = Protection::with_list(ids.try_into().unwrap());
+        for counter in 0..16 {
+            let mut data = [0, 0, 1, 2, 3, 4, 5, 6];
+            by_file.protect(&mut data, counter);
+            assert!(message.protection.is_intact(&data), "{} {counter}", message.name);
+        }
+        let constant: u8 = attribute("E2EConstant", message.id).parse().unwrap();
+        assert_eq!(Protection::new(constant), message.protection, "{}", message.name);
+        let max_delta = attribute("E2EMaxDelta", message.id);
+        assert_eq!(max_delta, message.max_delta.to_string(), "{}", message.name);
+    }
+}
+
+/// A tool that shows one signal shows what it is, and names instead of codes; and no two things have one name.
+#[test]
+fn the_dbc_file_explains_every_signal() {
+    let dbc = dbc();
+    let text = include_str!("../haptic.dbc");
+    for message in &dbc.messages {
+        let MessageId::Standard(id) = message.id else {
+            panic!("{} is extended", message.name)
+        };
+        assert!(text.contains(&format!("CM_ BO_ {id} \"")), "{}", message.name);
+        for signal in &message.signals {
+            let comment = format!("CM_ SG_ {id} {} \"", signal.name);
+            assert_eq!(text.matches(&comment).count(), 1, "{}", signal.name);
+            let values = format!("VAL_ {id} {} ", signal.name);
+            let is_flag = signal.size == 1;
+            assert!(!is_flag || text.matches(&values).count() == 1, "{}", signal.name);
+        }
+        assert!(
+            dbc.nodes.iter().all(|node| node.0 != message.name),
+            "{}",
+            message.name
+        );
     }
 }
 
@@ -346,17 +450,6 @@ fn a_frame_beyond_its_range_does_not_count_as_clean() {
     );
 }
 
-#[test]
-fn simulated_time() {
-    let frame = SimTime(Instant::from_us(0xFEDC_BA98)).encode();
-    assert_eq!(signal(&dbc(), &frame, "Time"), f64::from(0xFEDC_BA98_u32));
-    assert_eq!(
-        SimTime::decode(&frame),
-        Some(SimTime(Instant::from_us(0xFEDC_BA98)))
-    );
-    assert_eq!(SimTime::decode(&Frame::new(0x7F1, frame.data()).unwrap()), None);
-}
-
 /// Names that the DBC file gives a signal's codes.
 fn named(signal: &str) -> Vec<(i64, String)> {
     let dbc = dbc();
@@ -377,7 +470,7 @@ fn named(signal: &str) -> Vec<(i64, String)> {
 
 /// Names that the code gives them.
 fn coded<T: core::fmt::Debug>(from_code: impl Fn(i64) -> Option<T>) -> Vec<(i64, String)> {
-    (0..16)
+    (0..64)
         .filter_map(|code| from_code(code).map(|value| (code, format!("{value:?}"))))
         .collect()
 }
@@ -389,8 +482,64 @@ fn the_dbc_file_names_every_code() {
     assert_eq!(named("Warning_Mode"), coded(|code| Mode::from_code(code as u32)));
     assert_eq!(named("Guidance_Reset"), coded(ResetCause::from_code));
     assert_eq!(named("ParameterStatus_Outcome"), coded(WriteOutcome::from_code));
-    assert_eq!(
-        named("FaultRecord_Fault"),
-        coded(|code| Fault::ALL.get(code as usize).copied())
-    );
+    assert_eq!(named("FaultRecord_Fault"), coded(Fault::from_code));
+    let parameters: Vec<_> = (0..)
+        .zip(PARAMETERS.map(|parameter| parameter.name.to_owned()))
+        .collect();
+    assert_eq!(named("ParameterWrite_Index"), parameters);
+    assert_eq!(named("ParameterValue_Index"), parameters);
+    assert_eq!(named("Rejection_Reason"), coded(Reject::from_code));
+    let messages = MESSAGES.map(|message| (i64::from(message.id), message.name.to_owned()));
+    assert_eq!(named("Rejection_Message"), messages);
+}
+
+/// Names, identifiers, senders and periods: the DBC file, the table in docs/design.md and the list in the code.
+#[test]
+fn the_dbc_file_and_the_documents_list_every_message() {
+    let dbc = dbc();
+    assert_eq!(dbc.version.0, VERSION);
+    let row = |id: &MessageId, name: &str| match id {
+        MessageId::Standard(id) => (*id, name.to_owned()),
+        MessageId::Extended(id) => panic!("{id:#x} is extended"),
+    };
+    let in_file: Vec<_> = dbc.messages.iter().map(|m| row(&m.id, &m.name)).collect();
+    let in_code: Vec<_> = MESSAGES.iter().map(|m| (m.id, m.name.to_owned())).collect();
+    assert_eq!(in_file, in_code);
+    let document = include_str!("../../docs/design.md");
+    let rows = document.lines().filter_map(|line| line.strip_prefix("| 0x"));
+    let in_document: Vec<_> = rows
+        .map(|row| {
+            let (id, rest) = row.split_once(" | ").unwrap();
+            let name = rest.split(':').next().unwrap();
+            (u16::from_str_radix(id, 16).unwrap(), name.to_owned())
+        })
+        .collect();
+    assert_eq!(in_document, in_code);
+    for message in MESSAGES {
+        let there = dbc.messages.iter().find(|m| m.name == message.name).unwrap();
+        let sender = format!("{:?}", message.sender);
+        assert_eq!(there.transmitter, Some(sender), "{}", message.name);
+        let text = include_str!("../haptic.dbc");
+        let attribute = format!("BA_ \"GenMsgCycleTime\" BO_ {} ", message.id);
+        let value = text.split_once(&attribute).unwrap().1.split(';').next().unwrap();
+        let period_ms: f64 = value.parse().unwrap();
+        assert!((period_ms - message.period_ms).abs() < 1e-6, "{}", message.name);
+    }
+}
+
+/// One bit of the word for each fault, in the order of the list, in the guidance frame and in the warning.
+#[test]
+fn the_dbc_file_has_a_bit_for_every_fault() {
+    let dbc = dbc();
+    for (message, start, room) in [("Guidance", 37, 21), ("Warning", 16, 32)] {
+        let signals = &dbc.messages.iter().find(|m| m.name == message).unwrap().signals;
+        let prefix = format!("{message}_Fault_");
+        let bits: Vec<_> = signals
+            .iter()
+            .filter_map(|s| Some((s.start_bit, s.name.strip_prefix(&prefix)?.to_owned())))
+            .collect();
+        let faults = Fault::ALL.iter().take(room);
+        let expected: Vec<_> = (start..).zip(faults.map(|fault| format!("{fault:?}"))).collect();
+        assert_eq!(bits, expected);
+    }
 }

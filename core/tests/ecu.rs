@@ -7,13 +7,13 @@ mod rig;
 
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use haptic_core::bus::{Frame, Reject};
+use haptic_core::config::Setup;
 use haptic_core::controller::Command;
-use haptic_core::ecu::injection::Region;
+use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::envelope::LimitReason;
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_core::params::Setup;
 use haptic_core::quantity::{Instant, Micros, Radians, Torque};
 use rig::Rig;
 
@@ -255,12 +255,20 @@ fn a_jump_of_the_lane_or_the_speed_is_rejected_and_becomes_a_fault_when_it_stays
     rig.rejects.clear();
     let (ms, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
     assert!(ms <= 31 + 8, "{ms}");
-    assert!(step.command.faults.contains(Fault::LaneTimeout));
+    assert!(step.command.faults.contains(Fault::LaneStep));
+    assert!(
+        !step.command.faults.contains(Fault::LaneTimeout),
+        "frames do arrive"
+    );
     assert!(rig.rejects.len() >= 3 && rig.rejects.iter().all(|r| *r == Reject::Step));
     let mut rig = Rig::active_in_curve(1.0);
     rig.speeds = [rig::SPEED + 1.5; 2];
     let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
-    assert!(step.command.faults.contains(Fault::SpeedTimeout));
+    assert!(step.command.faults.contains(Fault::SpeedStep));
+    assert!(
+        !step.command.faults.contains(Fault::SpeedTimeout),
+        "frames do arrive"
+    );
 }
 
 #[test]
@@ -829,7 +837,7 @@ fn engaged_from_the_start_for_studies() {
 fn without_a_fault_the_history_is_silent() {
     let mut rig = Rig::paper();
     rig.engage = true;
-    rig.ecu = Ecu::engaged(&Setup::PAPER, rig.now());
+    rig.ecu = InjectedEcu::new(Ecu::engaged(&Setup::PAPER, rig.now()));
     for _ in 0..250 {
         let step = rig.tick();
         assert_eq!((step.command.faults, step.others.len()), (FaultSet::NONE, 0));

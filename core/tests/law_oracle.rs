@@ -1,7 +1,8 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
+use haptic_core::config::Config;
 use haptic_core::law::{LaneSample, Law, LawState};
-use haptic_core::params::{Config, Params};
+use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};

@@ -7,7 +7,7 @@ use haptic_core::ecu::injection::Region;
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
 use haptic_core::quantity::Torque;
-use haptic_core::vital::{Guarded, Vital};
+use haptic_core::redundant::{Redundant, Words};
 use rig::Rig;
 
 fn rigs() -> Vec<Rig> {
@@ -33,7 +33,7 @@ fn every_flip_ends_in_fault_within_a_step() {
     {
         assert_eq!(rig.clone().tick().command.mode, mode);
         for region in Region::ALL {
-            let bits = rig.ecu.vital_bits(region);
+            let bits = rig.ecu.redundant_bits(region);
             // Both copies of at least six words.
             assert!(
                 bits >= 2 * 6 * 32 && bits.is_multiple_of(64),
@@ -70,7 +70,7 @@ fn every_flip_ends_in_fault_within_a_step() {
 #[test]
 fn two_flips_end_in_fault_too() {
     let standby = Rig::paper();
-    let words = standby.ecu.vital_bits(Region::Monitor) / 32;
+    let words = standby.ecu.redundant_bits(Region::Monitor) / 32;
     for (i, j) in (0..words).flat_map(|i| (0..i).map(move |j| (i, j))) {
         let mut rig = standby.clone();
         rig.ecu.flip_bit(Region::Monitor, 32 * i);
@@ -97,7 +97,7 @@ fn a_flip_before_a_frame_arrives_is_found_too() {
 fn the_guard_holds_a_value_and_its_inverse() {
     for word in [0_u32, 1, 0xDEAD_BEEF, u32::MAX] {
         assert_eq!([word, 7].complement(), [!word, !7]);
-        let mut guarded = Guarded::new(word);
+        let mut guarded = Redundant::new(word);
         assert_eq!(guarded.get(), Some(&word));
         guarded.set(!word);
         assert_eq!(guarded.get(), Some(&!word));

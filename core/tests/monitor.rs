@@ -1,7 +1,8 @@
 //! Each rule of the independent monitor at its edge, with frames packed here by hand.
 
+use haptic_core::config::Setup;
 use haptic_core::monitor::{Evidence, Monitor, MonitorState, RULES};
-use haptic_core::params::{Params, Setup};
+use haptic_core::params::Params;
 
 const STANDBY: u64 = 1;
 const ACTIVE: u64 = 2;
@@ -360,7 +361,7 @@ fn each_rule_is_tried_by_itself() {
     for limit_nm in [5.0, 3.0, 0.5] {
         let monitor = monitor(limit_nm);
         for turn in 0..2 * RULES {
-            let (state, nonsense) = monitor.nonsense(turn);
+            let (state, self_test_vector) = monitor.self_test_vector(turn);
             let limit_mnm = (limit_nm * 1e3) as i64;
             let (mnm, mode) = [
                 (limit_mnm + 20, FADE),
@@ -370,12 +371,12 @@ fn each_rule_is_tried_by_itself() {
                 (100, ACTIVE),
                 (400, ACTIVE),
             ][turn as usize % 6];
-            assert_eq!(nonsense, guidance(counts(mnm).0, mode));
+            assert_eq!(self_test_vector, guidance(counts(mnm).0, mode));
             let show = |lane: Option<[u8; 8]>, column: Option<[u8; 8]>, guidance: [u8; 8]| {
                 let mut bench = Bench { monitor, state };
                 bench.show(lane, column, guidance, 1000)
             };
-            assert!(!show(None, None, nonsense), "{turn}");
+            assert!(!show(None, None, self_test_vector), "{turn}");
             if turn % 6 == 1 {
                 // In the band and below every limit: only growth is wrong with it.
                 assert!(!show(None, None, guidance(counts(50).0, ACTIVE)));
@@ -385,10 +386,10 @@ fn each_rule_is_tried_by_itself() {
                 // As much growth as 4 N.m/s allow.
                 1 => show(None, None, guidance(counts(4).0, ACTIVE)),
                 2 => show(None, None, guidance(counts(100).0, FADE)),
-                3 => show(None, Some(column(0)), nonsense),
-                4 => show(Some(lane(0, 0, 0)), None, nonsense),
+                3 => show(None, Some(column(0)), self_test_vector),
+                4 => show(Some(lane(0, 0, 0)), None, self_test_vector),
                 // 1 m asks for 0.5 N.m.
-                _ => show(Some(lane(8192, 0, 0)), None, nonsense),
+                _ => show(Some(lane(8192, 0, 0)), None, self_test_vector),
             };
             assert!(remedied, "{turn}");
         }

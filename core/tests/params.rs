@@ -1,6 +1,7 @@
 //! Parameters out of range are named with their value and range; the edges of the range are in it.
 
-use haptic_core::params::{Config, ParamError, Params};
+use haptic_core::config::Config;
+use haptic_core::params::{PARAMETERS, Params};
 
 type Set = fn(&mut Params, f64);
 
@@ -32,14 +33,10 @@ fn each_parameter_is_checked_at_its_edges() {
         assert!(with(min).is_ok() && with(max).is_ok(), "{name}");
         // Beyond the nearest f32 of each, which is at most 1.2e-8 away.
         for bad in [min - 2e-8, max + 2e-8, f64::INFINITY, f64::NEG_INFINITY] {
+            let error = with(bad).unwrap_err();
             assert_eq!(
-                with(bad),
-                Err(ParamError {
-                    name,
-                    value: bad,
-                    min,
-                    max
-                })
+                (error.name, error.value, error.min, error.max),
+                (name, bad, min, max)
             );
         }
         assert_eq!(with(f64::NAN).unwrap_err().name, name);
@@ -54,7 +51,7 @@ fn a_product_out_of_range_is_named() {
         ..Params::PAPER
     })
     .unwrap_err();
-    assert_eq!(error.to_string(), "k_1 * a_3 = 40 is outside [0, 32]");
+    assert_eq!(error.to_string(), "k_1 * a_3 = 40 is outside [0, 32] N.m/rad");
 }
 
 #[test]
@@ -79,4 +76,39 @@ fn the_default_is_the_paper() {
     let p = Params::default();
     assert_eq!([p.k_1, p.a_1, p.a_2, p.a_3, p.a_4], [0.25, 2.0, 0.05, 40.0, 1.0]);
     assert_eq!(p.torque_limit_nm, 5.0);
+}
+
+/// The table in docs/parameters.md, of which this prints what it should be.
+#[test]
+fn the_documents_list_every_parameter() {
+    let mut table =
+        String::from("| number | name | unit | range | default | what |\n|---|---|---|---|---|---|\n");
+    for (number, p) in PARAMETERS.iter().enumerate() {
+        table += &format!(
+            "| {number} | `{}` | {} | {} to {} | {} | {} |\n",
+            p.name,
+            p.unit,
+            p.min,
+            p.max,
+            p.default,
+            p.meaning.trim()
+        );
+    }
+    let document = include_str!("../../docs/parameters.md");
+    assert!(
+        document.contains(&table),
+        "docs/parameters.md should hold\n{table}"
+    );
+}
+
+/// A value in each place of a set comes out of the same place.
+#[test]
+fn values_and_fields_are_in_the_order_of_the_list() {
+    let numbered = core::array::from_fn(|i| i as f64);
+    let params = Params::from_values(&numbered);
+    assert_eq!(params.to_values(), numbered);
+    assert_eq!(
+        (params.k_1, params.k_nms, params.vehicle.far_time_s),
+        (0.0, 13.0, 18.0)
+    );
 }

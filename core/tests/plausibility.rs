@@ -4,8 +4,8 @@
 //! The vehicle is steered by a preview driver along a line of given curvature, in small angles about that line.
 //! The closed loop with the whole ECU is in the fault campaign.
 
+use haptic_core::config::Config;
 use haptic_core::law::LaneSample;
-use haptic_core::params::Config;
 use haptic_core::plausibility::{
     Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
 };
@@ -80,7 +80,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
     let config = Config::PAPER;
     let checks: &Plausibility = &config.plausibility;
     let mut state = PlausibilityState::NEW;
-    checks.speed(&mut state, Speed::from_mps(speed));
+    checks.speed(&mut state, Speed::from_m_per_s(speed));
     // beta, yaw rate, wheel and its rate; offset and heading against the line.
     let (mut beta, mut r, mut phi, mut phi_rate) = (0.0, 0.0, 0.0_f64, 0.0_f64);
     let (mut y, mut psi) = (0.0, 0.0);
@@ -151,7 +151,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
             }
             let (lane, column) = Plausibility::used(&state);
             drive.lane_used_m = drive.lane_used_m.max(lane.m());
-            drive.column_used_nms = drive.column_used_nms.max(column.si().abs());
+            drive.column_used_nms = drive.column_used_nms.max(column.nm_s().abs());
         }
 
         let rear = beta - L_R * r / speed;
@@ -210,7 +210,7 @@ fn honest_driving_is_never_declared() {
 fn crossing(speed: f64, side: f64, spoil: impl Fn(f64, f64) -> (f64, f64)) -> f64 {
     let checks = Config::PAPER.plausibility;
     let mut state = PlausibilityState::NEW;
-    checks.speed(&mut state, Speed::from_mps(speed));
+    checks.speed(&mut state, Speed::from_m_per_s(speed));
     for k in 0..6000 / 8 {
         let t = f64::from(k) * 8e-3 - 2.0;
         let (mut e_y, mut e_theta) = (-t, -1.0 / speed);
@@ -320,7 +320,7 @@ fn lane(e_y: f64, e_theta: f64) -> LaneSample {
 fn what_was_lost_is_not_held_against_what_comes() {
     let checks = Config::PAPER.plausibility;
     let mut state = PlausibilityState::NEW;
-    checks.speed(&mut state, Speed::from_mps(20.0));
+    checks.speed(&mut state, Speed::from_m_per_s(20.0));
     let at = |ms: u32| Instant::from_us(1_000).after(Micros::from_ms(ms));
     let full = |state: &mut PlausibilityState, ms| {
         checks.column(state, at(ms), Torque::from_nm(20.0), Radians::ZERO, Torque::ZERO)
@@ -334,7 +334,7 @@ fn what_was_lost_is_not_held_against_what_comes() {
     assert!((0..=28).step_by(2).all(|ms| full(&mut state, ms)));
     let used = |state: &PlausibilityState| {
         let (lane, column) = Plausibility::used(state);
-        [lane.m(), column.si()]
+        [lane.m(), column.nm_s()]
     };
     // 1 - exp(-t) metres after 0.496 s; 20 N.m for 28 ms, less what 1 s of memory forgets.
     let [seen, summed] = used(&state);
@@ -361,7 +361,7 @@ fn steps_at_their_edges() {
             |dy: f64, dt: f64| lane_step_is_possible(&from, &lane(sign * (dy - 1.0), sign * (dt - 0.05)));
         assert!(possible(y, theta) && possible(0.0, 0.0));
         assert!(!possible(y + LSB, 0.0) && !possible(0.0, theta + LSB + LSB));
-        let v = |x: f64| Speed::from_mps(20.0 + sign * x);
+        let v = |x: f64| Speed::from_m_per_s(20.0 + sign * x);
         assert!(speed_step_is_possible(v(0.0), v(1.0)) && !speed_step_is_possible(v(0.0), v(1.0 + LSB)));
         assert!(speeds_agree(v(0.0), v(2.0 - LSB)) && !speeds_agree(v(0.0), v(2.0)));
     }

@@ -7,12 +7,13 @@ use std::f64::consts::TAU;
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Demand, Guidance, Message, ResetCause, Telemetry};
+use haptic_core::config::Setup;
 use haptic_core::envelope::LimitReason;
 use haptic_core::faults::FaultSet;
 use haptic_core::modes::Mode;
 use haptic_core::monitor::{Evidence, Monitor, MonitorState};
-use haptic_core::params::{Params, Setup};
-use haptic_core::quantity::{Gain, Torque};
+use haptic_core::params::Params;
+use haptic_core::quantity::{Ratio, Torque};
 use rig::Rig;
 
 /// Half an LSB of the torque on the bus, and the arithmetic of the core.
@@ -85,7 +86,7 @@ fn is_refused_outside_active() {
         rig.telemetry,
         Some(Telemetry {
             probe: None,
-            reliance: None
+            k_hg: None
         })
     );
     // A fade is a straight line at 4 N.m/s, whatever the probe was doing.
@@ -156,7 +157,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
     let demand = |probe| {
         let demand = Demand {
             engage: true,
-            authority: Gain::ONE,
+            authority: Ratio::ONE,
             probe,
         };
         bytes(&demand.encode(0))
@@ -239,7 +240,7 @@ fn drive(rig: &mut Rig, k_hg: f64, arm: &mut f64, ms: u32) {
 }
 
 fn reading(rig: &Rig) -> Option<(f64, f64)> {
-    let reading = rig.telemetry?.reliance?;
+    let reading = rig.telemetry?.k_hg?;
     Some((reading.k_hg.si(), reading.deviation.si()))
 }
 

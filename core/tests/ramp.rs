@@ -1,7 +1,7 @@
 //! The ways to zero against hand values: linear, never growing, started from what can be trusted.
 
-use haptic_core::quantity::{Instant, Micros, Torque};
-use haptic_core::ramp::{HANDOVER, History, Ramp, lesser};
+use haptic_core::quantity::{Instant, Micros, Torque, TorqueRate};
+use haptic_core::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
 /// The resolution of a torque, N.m.
 const LSB: f64 = 1.0 / 16_777_216.0;
@@ -34,7 +34,7 @@ fn a_handover_is_a_straight_line_of_two_seconds() {
 #[test]
 fn a_fade_falls_at_its_rate() {
     for (start, ms) in [(2.0, 500), (-2.0, 500), (0.4, 100), (0.004, 1), (5.0, 1250)] {
-        let mut ramp = Ramp::at_rate(nm(start), nm(4.0));
+        let mut ramp = Ramp::at_rate(nm(start), TorqueRate::from_nm_per_s(4.0));
         let mut steps = 0;
         while !ramp.is_done() {
             let torque = ramp.step(Micros::from_ms(1)).nm();
@@ -49,7 +49,7 @@ fn a_fade_falls_at_its_rate() {
         // The length is rounded up to whole microseconds, so one step more than the exact time may be needed.
         assert!(steps == ms || steps == ms + 1, "{start}: {steps}");
     }
-    let mut nothing = Ramp::at_rate(Torque::ZERO, nm(4.0));
+    let mut nothing = Ramp::at_rate(Torque::ZERO, TorqueRate::from_nm_per_s(4.0));
     assert_eq!(nothing.step(Micros::from_ms(1)), Torque::ZERO);
     assert!(nothing.is_done() && Ramp::NONE.is_done());
 }
@@ -69,7 +69,7 @@ fn the_lesser_of_two_torques() {
         (-1.0, 0.0, 0.0),
         (0.0, 0.0, 0.0),
     ] {
-        assert_eq!(lesser(nm(a), nm(b)), nm(expected), "{a} {b}");
+        assert_eq!(smaller_of_same_sign(nm(a), nm(b)), nm(expected), "{a} {b}");
     }
 }
 

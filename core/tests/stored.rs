@@ -1,6 +1,7 @@
 //! Parameter blocks against a CRC and a layout written a second time, and every way a copy can be spoilt.
 
-use haptic_core::params::{Params, Setup, VehicleParams};
+use haptic_core::config::Setup;
+use haptic_core::params::{Params, VehicleParams};
 use haptic_core::stored::{BYTES, Stored, load, save};
 
 /// CRC-32 bit by bit (ISO-HDLC).
@@ -39,16 +40,16 @@ fn params() -> Params {
         torque_limit_nm: 3.0,
         wind_up_nm_per_s: 3.5,
         reduction_nm_per_s: 7.0,
-        least_speed_mps: 6.0,
+        least_speed_m_per_s: 6.0,
         probe_amplitude_nm: 0.1,
         probe_frequency_hz: 2.0,
         t_nms_s: 0.2,
         k_nms: 1.5,
         vehicle: VehicleParams {
-            curvature_gain_1pm: 0.02,
-            stability_factor_s2pm2: 0.001,
-            aligning_gain_nms2pm: 1.25,
-            column_damping_nms: 0.5,
+            curvature_gain_per_m: 0.02,
+            stability_factor_s2_per_m2: 0.001,
+            aligning_gain_nm_s2_per_m: 1.25,
+            column_damping_nm_s: 0.5,
             far_time_s: 0.75,
         },
     }

@@ -50,9 +50,9 @@ pub fn column(counts: [u16; 4]) -> Option<Column> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use haptic_core::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
     use haptic_core::modes::Mode;
-    use haptic_core::params::Setup;
     use haptic_core::quantity::Instant;
 
     /// By hand: 0.3 V a N.m are 372.36 counts, from 1.65 V.

@@ -11,6 +11,7 @@ use serde_json::Value;
 use crate::code::{CONTROLLER, Code, PRODUCT};
 use crate::golden::{self, Figure};
 use crate::image::{self, Image, M4F};
+use crate::seal;
 use crate::size;
 use crate::tool::{self, Usage, cargo, run};
 
@@ -59,8 +60,19 @@ impl Board {
         }
     }
 
+    /// Builds an image. QEMU's is for the bench (`firmware/Cargo.toml`); a board's product is sealed.
     pub(crate) fn build(self, image: Image) -> Result<PathBuf> {
-        image::elf_of(&mut image::build_command(image.bin(), M4F, self.feature()))
+        let is_machine = self.chip().is_none();
+        let features = if is_machine {
+            format!("{},bench", self.feature())
+        } else {
+            self.feature().to_owned()
+        };
+        let elf = image::elf_of(&mut image::build_command(image.bin(), M4F, &features))?;
+        if !is_machine && image == Image::SteeringEcu {
+            seal::seal(&elf)?;
+        }
+        Ok(elf)
     }
 }
 
@@ -166,7 +178,7 @@ fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
 }
 
 /// What a whole run over paper-course takes in QEMU, every frame of it compared: the stack that the lockstep image
-/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick, `Ecu::step` and `Ecu::advise`. The
+/// ever used, and instructions of a step, which is every `Ecu::receive` of a tick, `Ecu::step` and `Ecu::background_step`. The
 /// probe is on, so that the estimator works.
 fn in_qemu(board: Board) -> Result<Vec<Figure>> {
     let text = tool::output(
@@ -207,9 +219,9 @@ fn in_qemu(board: Board) -> Result<Vec<Figure>> {
             1,
         ),
         figure(
-            "worst advice",
+            "worst background step",
             "instructions",
-            number(&spent["worst_advice"], "advice")?,
+            number(&spent["worst_background"], "background")?,
             1,
         ),
     ])

@@ -12,8 +12,9 @@ pub(crate) fn run_all() -> Result<()> {
         ("qemu-system-arm", "qemu-system-arm"),
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
     ])?;
-    let target_features = format!("{BOARD},gate,broken");
+    let target_features = format!("{BOARD},gate,broken,bench");
     let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
         ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
         ("clippy", &|| {

@@ -16,6 +16,7 @@ impl Frame {
 
     /// A frame, or `None` for an identifier above 0x7FF or more than eight bytes.
     #[must_use]
+    #[expect(clippy::as_conversions, reason = "at most eight bytes")]
     pub fn new(id: u16, bytes: &[u8]) -> Option<Self> {
         if id > Self::MAX_ID {
             return None;
@@ -31,7 +32,8 @@ impl Frame {
     }
 
     /// A full frame. `id` is a message's own identifier, at most 0x7FF; higher bits are dropped.
-    pub(crate) const fn full(id: u16, data: [u8; 8]) -> Self {
+    #[must_use]
+    pub const fn full(id: u16, data: [u8; 8]) -> Self {
         Self {
             id: id & Self::MAX_ID,
             len: 8,
@@ -57,7 +59,8 @@ impl Frame {
     }
 
     /// All eight bytes, if the frame is full.
-    pub(crate) fn full_data(&self) -> Option<[u8; 8]> {
+    #[must_use]
+    pub fn full_data(&self) -> Option<[u8; 8]> {
         (self.len == 8).then_some(self.data)
     }
 }

@@ -1,30 +1,95 @@
-//! Faults from inside, for campaigns and tests: bits of the vital memory, a law that lies, a monitor that
-//! agrees when it should not, a lane preview that never ages. Faults on the bus need nothing of this: they are injected as bytes.
+//! Faults from inside, for campaigns and tests: bits of the redundant memory, a law that lies, a monitor that agrees
+//! when it should not, a lane preview that never ages. Faults on the bus need nothing of this: they are injected as
+//! bytes.
 //!
-//! Only with the feature `fault-injection`, which no product image has. With nothing injected an ECU of such
-//! a build behaves as any other, bit for bit.
+//! Only with the feature `fault-injection`, which no product image has. The product's type, [`Ecu`], is the same with
+//! and without it; an [`InjectedEcu`] is another type around it. With nothing injected it behaves as any other, bit
+//! for bit.
 
-use super::Ecu;
-use crate::quantity::Torque;
-use crate::vital::{Guarded, Vital};
+use core::ops::{Deref, DerefMut};
+
+use super::{Ecu, Step};
+use crate::injection::Injection;
+use crate::quantity::{Instant, Torque};
+use crate::redundant::{Redundant, Words};
+
+/// An ECU that can be made to lie. Everything but its step is the product's own.
+#[derive(Debug, Clone)]
+pub struct InjectedEcu {
+    ecu: Ecu,
+    injected: Injected,
+}
 
 /// Faults held until they are taken back.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Injected {
-    pub(super) monitor_passes: fn(&[u8; 8]) -> bool,
-    pub(super) lane_never_ages: bool,
+struct Injected {
+    law: Option<Torque>,
+    monitor_passes: fn(&[u8; 8]) -> bool,
+    lane_never_ages: bool,
 }
 
-impl Default for Injected {
-    fn default() -> Self {
-        Self {
-            monitor_passes: |_| false,
-            lane_never_ages: false,
-        }
+impl Injection for Injected {
+    fn law(&self, asked: Torque) -> Torque {
+        self.law.unwrap_or(asked)
+    }
+
+    fn monitor_passes(&self, guidance: &[u8; 8]) -> bool {
+        (self.monitor_passes)(guidance)
+    }
+
+    fn lane_never_ages(&self) -> bool {
+        self.lane_never_ages
     }
 }
 
-/// Where a bit of the vital memory lies.
+impl InjectedEcu {
+    /// Nothing injected.
+    #[must_use]
+    pub fn new(ecu: Ecu) -> Self {
+        let injected = Injected {
+            law: None,
+            monitor_passes: |_| false,
+            lane_never_ages: false,
+        };
+        Self { ecu, injected }
+    }
+
+    /// [`Ecu::step`], with what was injected.
+    pub fn step(&mut self, now: Instant) -> Step {
+        self.ecu.step_with(now, &self.injected)
+    }
+
+    /// Replaces the torque that the law asks for, until `None`.
+    pub fn force_law(&mut self, torque: Option<Torque>) {
+        self.injected.law = torque;
+    }
+
+    /// Makes the monitor agree with every guidance frame whose bytes are in `passes`, whatever it knows.
+    pub fn blind_monitor(&mut self, passes: fn(&[u8; 8]) -> bool) {
+        self.injected.monitor_passes = passes;
+    }
+
+    /// Makes the last lane preview look fresh for ever.
+    pub fn keep_lane_fresh(&mut self) {
+        self.injected.lane_never_ages = true;
+    }
+}
+
+impl Deref for InjectedEcu {
+    type Target = Ecu;
+
+    fn deref(&self) -> &Ecu {
+        &self.ecu
+    }
+}
+
+impl DerefMut for InjectedEcu {
+    fn deref_mut(&mut self) -> &mut Ecu {
+        &mut self.ecu
+    }
+}
+
+/// Where a bit of the redundant memory lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
     /// Gains, limits and margins.
@@ -45,42 +110,27 @@ impl Region {
 impl Ecu {
     /// Number of bits in a region, both copies counted.
     #[must_use]
-    pub fn vital_bits(&self, region: Region) -> usize {
+    pub fn redundant_bits(&self, region: Region) -> usize {
         // A bit that does not exist flips nothing and counts them all.
         self.clone().flip(region, usize::MAX)
     }
 
-    /// Flips one bit, 0 to [`Ecu::vital_bits`] exclusive, of one of the copies; others are ignored.
+    /// Flips one bit, 0 to [`Ecu::redundant_bits`] exclusive, of one of the copies; others are ignored.
     pub fn flip_bit(&mut self, region: Region, bit: usize) {
         self.flip(region, bit);
-    }
-
-    /// Replaces the torque that the law asks for, until `None`.
-    pub fn force_law(&mut self, torque: Option<Torque>) {
-        self.state.forced_law = torque;
-    }
-
-    /// Makes the monitor agree with every guidance frame whose bytes are in `passes`, whatever it knows.
-    pub fn blind_monitor(&mut self, passes: fn(&[u8; 8]) -> bool) {
-        self.injected.monitor_passes = passes;
-    }
-
-    /// Makes the last lane preview look fresh for ever.
-    pub fn keep_lane_fresh(&mut self) {
-        self.injected.lane_never_ages = true;
     }
 
     fn flip(&mut self, region: Region, bit: usize) -> usize {
         let mut words = 0;
         match region {
             Region::Config => flip(&mut self.controller.config, bit, &mut words),
-            Region::Controller => flip(&mut self.state.vitals, bit, &mut words),
+            Region::Controller => flip(&mut self.state.memory, bit, &mut words),
             Region::Ecu => {
                 flip(&mut self.receivers.lane, bit, &mut words);
                 flip(&mut self.receivers.column, bit, &mut words);
                 flip(&mut self.receivers.speeds, bit, &mut words);
                 flip(&mut self.receivers.request, bit, &mut words);
-                flip(&mut self.vitals, bit, &mut words);
+                flip(&mut self.memory, bit, &mut words);
             }
             Region::Monitor => flip(&mut self.monitor, bit, &mut words),
         }
@@ -89,7 +139,7 @@ impl Ecu {
 }
 
 /// Flips a bit of a region if it lies here, `words` words into it, and counts the words.
-fn flip<T: Vital>(guarded: &mut Guarded<T>, bit: usize, words: &mut usize) {
+fn flip<T: Words>(guarded: &mut Redundant<T>, bit: usize, words: &mut usize) {
     guarded.change_copies(&mut |word| {
         let mask = if bit / 32 == *words {
             1_u32.wrapping_shl(bit as u32)

@@ -5,17 +5,24 @@
 
 use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
-use crate::bus::messages::{Column as ColumnMessage, Demand, LanePreview, Message, TIMEOUT, Vehicle};
+use crate::bus::messages::{
+    Column as ColumnMessage, Demand, FaultRecord, Guidance, LanePreview, Message, ParameterStatus,
+    ParameterValue, Rejection, TIMEOUT, Telemetry, Vehicle, Warning,
+};
 use crate::bus::{Frame, Reject};
 use crate::controller::{Column, Input, Inputs, Request};
 use crate::faults::{Fault, FaultSet};
 use crate::law::LaneSample;
 use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
-use crate::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
-use crate::vital::{Guarded, Vital};
+use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use crate::redundant::{Redundant, Words, words};
 
+/// The column's frames come at this rate.
+const COLUMN_PERIOD_US: u32 = 2000;
 /// Spans beyond half a wrap of the clock are negative.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
+/// Slower is standing.
+const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
 
 /// The latest value of one input, with what judges the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,12 +31,20 @@ pub(super) struct Slot<T> {
     e2e: ReceiverState,
     /// [`LOST`], [`HELD`] or [`NEW`], as an [`Input`].
     state: u32,
-    /// 1 when the sender did not vouch for its last value.
-    invalid: u32,
+    /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason.
+    doubt: u32,
     /// When it was true.
     at: Instant,
     value: T,
 }
+
+/// Its sender did not vouch for it.
+const INVALID: u32 = 1;
+/// It was too far from the last one used.
+const STEP: u32 = 2;
+
+/// So many steps after a frame under an identifier of this ECU, that is still a fault: a second.
+const FOREIGN_STEPS: u32 = 1000;
 
 /// Nothing heard, or not for too long.
 const LOST: u32 = 0;
@@ -38,12 +53,12 @@ const HELD: u32 = 1;
 /// A value that no step has seen.
 const NEW: u32 = 2;
 
-impl<T: Vital> Vital for Slot<T> {
+impl<T: Words> Words for Slot<T> {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         Self {
             e2e: self.e2e.map_words(change),
             state: change(self.state),
-            invalid: change(self.invalid),
+            doubt: change(self.doubt),
             at: self.at.map_words(change),
             value: self.value.map_words(change),
         }
@@ -52,19 +67,19 @@ impl<T: Vital> Vital for Slot<T> {
     fn is_inverse_of(&self, other: &Self) -> bool {
         self.e2e.is_inverse_of(&other.e2e)
             & self.state.is_inverse_of(&other.state)
-            & self.invalid.is_inverse_of(&other.invalid)
+            & self.doubt.is_inverse_of(&other.doubt)
             & self.at.is_inverse_of(&other.at)
             & self.value.is_inverse_of(&other.value)
     }
 }
 
-impl<T: Vital> Slot<T> {
+impl<T: Words> Slot<T> {
     /// Nothing heard; `value` only fills the place.
-    fn guarded(e2e: ReceiverState, value: T, now: Instant) -> Guarded<Self> {
-        Guarded::new(Self {
+    fn redundant(e2e: ReceiverState, value: T, now: Instant) -> Redundant<Self> {
+        Redundant::new(Self {
             e2e,
             state: LOST,
-            invalid: 0,
+            doubt: 0,
             at: now,
             value,
         })
@@ -103,15 +118,37 @@ pub(super) struct Accepted {
     pub(super) demand: Option<[u8; 8]>,
 }
 
+words! {
+    /// A [`Request`], its flags as words.
+    pub(super) struct RequestWords {
+        engage: u32,
+        authority: Ratio,
+        probe: u32,
+    }
+}
+
+impl From<RequestWords> for Request {
+    fn from(words: RequestWords) -> Self {
+        Self {
+            engage: words.engage != 0,
+            authority: words.authority,
+            probe: words.probe != 0,
+        }
+    }
+}
+
 /// The receivers of all inputs.
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
-    pub(super) lane: Guarded<Slot<LaneSample>>,
-    pub(super) column: Guarded<Slot<Column>>,
-    pub(super) speeds: Guarded<Slot<[Speed; 2]>>,
-    pub(super) request: Guarded<Slot<Request>>,
+    pub(super) lane: Redundant<Slot<LaneSample>>,
+    pub(super) column: Redundant<Slot<Column>>,
+    pub(super) speeds: Redundant<Slot<[Speed; 2]>>,
+    pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
     pub(super) accepted: Accepted,
+    /// Steps for which a frame under an identifier of this ECU is still a fault. Not kept twice: a flip raises the fault
+    /// for a while, or ends it early.
+    foreign: u32,
 }
 
 impl Receivers {
@@ -126,18 +163,19 @@ impl Receivers {
             driver_torque: Torque::ZERO,
             wheel_angle: Radians::ZERO,
         };
-        let request = Request {
+        let request = RequestWords {
             engage: 0,
-            authority: Gain::ZERO,
+            authority: Ratio::ZERO,
             probe: 0,
         };
         Self {
-            lane: Slot::guarded(e2e, lane, now),
-            column: Slot::guarded(e2e, column, now),
-            speeds: Slot::guarded(e2e, [Speed::ZERO; 2], now),
-            request: Slot::guarded(e2e, request, now),
+            lane: Slot::redundant(e2e, lane, now),
+            column: Slot::redundant(e2e, column, now),
+            speeds: Slot::redundant(e2e, [Speed::ZERO; 2], now),
+            request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::default(),
+            foreign: 0,
         }
     }
 
@@ -149,7 +187,7 @@ impl Receivers {
         match frame.id() {
             LanePreview::ID => self.lane.change(|slot| {
                 let lane = LanePreview::decode(&mut slot.e2e, frame)?;
-                slot.invalid = u32::from(!lane.valid);
+                slot.doubt = u32::from(!lane.valid);
                 if !lane.valid {
                     return Ok(());
                 }
@@ -166,6 +204,7 @@ impl Receivers {
                         return Err(Reject::Older);
                     }
                     if !lane_step_is_possible(&last, &sample) {
+                        slot.doubt = STEP;
                         return Err(Reject::Step);
                     }
                 }
@@ -174,7 +213,11 @@ impl Receivers {
                 Ok(())
             }),
             ColumnMessage::ID => self.column.change(|slot| {
-                let c = ColumnMessage::decode(&mut slot.e2e, frame)?;
+                // The longer ago the last one, the more may have been lost: at once no more than three, so that few of
+                // the sixteen counters let an old frame pass.
+                let since = now.since(slot.at).us() / COLUMN_PERIOD_US;
+                let window = since.saturating_add(u32::from(ColumnMessage::MAX_DELTA)).min(14);
+                let c = ColumnMessage::decode_within(&mut slot.e2e, frame, window as u8)?;
                 let column = Column {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
@@ -192,14 +235,16 @@ impl Receivers {
                         .all(|(last, new)| speed_step_is_possible(*last, *new))
                 };
                 if slot.last().is_some_and(|last| !follows(last)) {
+                    slot.doubt = STEP;
                     return Err(Reject::Step);
                 }
+                slot.doubt = 0;
                 slot.put(speeds, now);
                 Ok(())
             }),
             Demand::ID => self.request.change(|slot| {
                 let demand = Demand::decode(&mut slot.e2e, frame)?;
-                let request = Request {
+                let request = RequestWords {
                     engage: u32::from(demand.engage),
                     authority: demand.authority,
                     probe: u32::from(demand.probe),
@@ -208,27 +253,52 @@ impl Receivers {
                 accepted.demand = frame.full_data();
                 Ok(())
             }),
+            // On a bus nobody hears itself.
+            Guidance::ID
+            | Warning::ID
+            | FaultRecord::ID
+            | Telemetry::ID
+            | ParameterStatus::ID
+            | ParameterValue::ID
+            | Rejection::ID => {
+                self.foreign = FOREIGN_STEPS;
+                Some(Err(Reject::OwnIdentifier))
+            }
             _ => Some(Ok(())),
         }
     }
 
+    /// Whether the vehicle stands: both speeds are known and next to nothing.
+    pub(super) fn stands(&self) -> bool {
+        let speeds = self.speeds.get().and_then(Slot::last);
+        speeds.is_some_and(|speeds| speeds.iter().all(|speed| *speed <= STANDSTILL))
+    }
+
     /// The last lane preview passes for one that came now.
-    #[cfg(feature = "fault-injection")]
     pub(super) fn renew_lane(&mut self, now: Instant) {
         let _ = self.lane.change(|slot| slot.at = now);
     }
 
     /// What a step sees, or `None` if a receiver is damaged.
     pub(super) fn take(&mut self, now: Instant) -> Option<Inputs> {
-        let (lane, invalid) = self.lane.change(|slot| (slot.take(now), slot.invalid != 0))?;
+        let (lane, lane_doubt) = self.lane.change(|slot| (slot.take(now), slot.doubt))?;
+        let (speeds, speeds_doubt) = self.speeds.change(|slot| (slot.take(now), slot.doubt))?;
         let mut faults = FaultSet::NONE;
-        // An invalid preview is the reason of a time-out, not a fault by itself: one may be a blink.
-        faults.insert_if(lane == Input::Lost && invalid, Fault::LaneInvalid);
+        // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
+        if lane == Input::Lost {
+            faults.insert_if(lane_doubt == INVALID, Fault::LaneInvalid);
+            faults.insert_if(lane_doubt == STEP, Fault::LaneStep);
+        }
+        faults.insert_if(speeds == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
+        if self.foreign > 0 {
+            self.foreign = self.foreign.saturating_sub(1);
+            faults.insert(Fault::OwnIdentifier);
+        }
         Some(Inputs {
             lane,
             column: self.column.change(|slot| slot.take(now))?,
-            speeds: self.speeds.change(|slot| slot.take(now))?,
-            request: self.request.change(|slot| slot.take(now))?,
+            speeds,
+            request: self.request.change(|slot| slot.take(now).map(Request::from))?,
             faults,
         })
     }

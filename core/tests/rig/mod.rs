@@ -10,10 +10,11 @@ pub(crate) mod watch;
 
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Telemetry, Vehicle};
 use haptic_core::bus::{Frame, Reject};
+use haptic_core::config::Setup;
+use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::modes::Mode;
-use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;
@@ -31,7 +32,7 @@ pub(crate) struct Heard {
 #[derive(Clone)]
 /// Bench state; public fields are what a test turns.
 pub(crate) struct Rig {
-    pub(crate) ecu: Ecu,
+    pub(crate) ecu: InjectedEcu,
     /// Time since the start; the ECU sees it modulo 2^32 from `clock_start_us`.
     pub(crate) t_us: u64,
     pub(crate) clock_start_us: u32,
@@ -64,7 +65,7 @@ impl Rig {
         // Three seconds before the microsecond clock wraps.
         let clock_start_us = u32::MAX - 3_000_000;
         Self {
-            ecu: Ecu::new(setup, boot, Instant::from_us(clock_start_us)),
+            ecu: InjectedEcu::new(Ecu::new(setup, boot, Instant::from_us(clock_start_us))),
             t_us: 0,
             clock_start_us,
             ticks: 0,
@@ -138,12 +139,12 @@ impl Rig {
                 .encode(counter)
             }
             2 => Vehicle {
-                speeds: self.speeds.map(Speed::from_mps),
+                speeds: self.speeds.map(Speed::from_m_per_s),
             }
             .encode(counter),
             _ => Demand {
                 engage: self.engage,
-                authority: Gain::from_si(self.authority),
+                authority: Ratio::from_si(self.authority),
                 probe: self.probe,
             }
             .encode(counter),
@@ -152,7 +153,8 @@ impl Rig {
 
     /// Hands a frame to the ECU.
     pub(crate) fn send(&mut self, frame: &Frame) -> Result<(), Reject> {
-        let result = self.ecu.receive(frame, self.now());
+        let now = self.now();
+        let result = self.ecu.receive(frame, now);
         if let (Ok(()), Ok(bytes)) = (result, <[u8; 8]>::try_from(frame.data())) {
             let word = u64::from_le_bytes(bytes);
             // Bits 12..29 signed, 2^-12 N.m; bit 12: layouts written a second time.
@@ -189,7 +191,7 @@ impl Rig {
     pub(crate) fn step(&mut self) -> Step {
         let step = self.ecu.step(self.now());
         self.applied = step.command.torque.nm();
-        if let Some(frame) = self.ecu.advise() {
+        if let Some(frame) = self.ecu.background_step() {
             let data: [u8; 8] = frame.data().try_into().unwrap();
             assert!(frame.id() == Telemetry::ID && Telemetry::PROTECTION.is_intact(&data));
             self.telemetry = Telemetry::unpack(u64::from_le_bytes(data));

@@ -19,8 +19,8 @@ mod target {
 
     use cortex_m_rt::entry;
     use haptic_core::bus::Frame;
+    use haptic_core::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
-    use haptic_core::params::Setup;
     use haptic_core::quantity::Instant;
 
     static mut INPUT: (u16, usize, [u8; 8], u32) = (0, 0, [0; 8], 0);

@@ -4,10 +4,7 @@
 //! interframe space included (Davis, Burns, Bril, Lukkien 2007: *Controller Area Network schedulability
 //! analysis: refuted, revisited and revised*, Real-Time Systems 35, equation 1).
 
-use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, Message, ParameterStatus, ParameterWrite, Telemetry,
-    Vehicle, Warning,
-};
+use haptic_core::bus::messages::MESSAGES;
 use serde::Serialize;
 
 /// Bit rate of the bus.
@@ -17,7 +14,7 @@ pub const MAX_LOAD: f64 = 0.6;
 
 /// One message of the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Row {
+pub struct MessageLoad {
     /// Name in the DBC file.
     pub message: &'static str,
     /// CAN identifier.
@@ -38,29 +35,18 @@ pub fn worst_case_bits(data_bytes: u32) -> u32 {
 
 /// Every message of a vehicle's bus, most urgent first.
 #[must_use]
-pub fn table() -> Vec<Row> {
-    let row = |message, id, period_ms: f64| {
-        let bits = worst_case_bits(8);
-        Row {
-            message,
-            id,
-            period_ms,
+pub fn table() -> Vec<MessageLoad> {
+    let bits = worst_case_bits(8);
+    MESSAGES
+        .iter()
+        .map(|message| MessageLoad {
+            message: message.name,
+            id: message.id,
+            period_ms: message.period_ms,
             bits,
-            load: f64::from(bits) / (period_ms * 1e-3 * BIT_RATE),
-        }
-    };
-    vec![
-        row("Guidance", Guidance::ID, 1.0),
-        row("Warning", Warning::ID, 100.0),
-        row("LanePreview", LanePreview::ID, 1000.0 / 120.0),
-        row("Column", Column::ID, 2.0),
-        row("Vehicle", Vehicle::ID, 10.0),
-        row("Demand", Demand::ID, 10.0),
-        row("ParameterWrite", ParameterWrite::ID, 10.0),
-        row("FaultRecord", FaultRecord::ID, 100.0),
-        row("Telemetry", Telemetry::ID, 20.0),
-        row("ParameterStatus", ParameterStatus::ID, 1000.0),
-    ]
+            load: f64::from(bits) / (message.period_ms * 1e-3 * BIT_RATE),
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -8,8 +8,9 @@
 
 use serde::Serialize;
 
-use super::evaluate::{DRIVERS_T_P, Results};
+use super::evaluate::{DRIVERS_T_P, EvaluationResults};
 use haptic_analysis::metrics::Window;
+use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 
 use Condition::{High, Low, Manual, Mid};
@@ -77,22 +78,28 @@ fn tolerance(sensors: Sensors) -> (f64, f64) {
 pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
     // The evaluation sets condition, gains, delay and kind of failure by itself, and without a remnant the seed
     // does nothing.
-    let mut comparable = Scenario {
-        sensors: base.sensors,
-        seed: base.seed,
-        ..Scenario::default()
-    };
-    comparable.condition = base.condition;
-    comparable.gains = base.gains;
-    comparable.driver.t_p = base.driver.t_p;
-    comparable.failure = Failure {
-        kind: base.failure.kind,
-        ..comparable.failure
-    };
-    comparable == *base && window == super::record::default_window(&base.course)
+    let paper = Scenario::default();
+    let comparable = base
+        .to_builder()
+        .course(paper.course().clone())
+        .speed_kmh(paper.speed_kmh())
+        .vehicle(*paper.vehicle())
+        .guidance(*paper.guidance())
+        .driver_change(None)
+        .driver(DriverParameters {
+            t_p: base.driver().t_p,
+            ..*paper.driver()
+        })
+        .failure(Failure {
+            kind: base.failure().kind,
+            ..paper.failure()
+        })
+        .build();
+    let comparable = comparable.is_ok_and(|comparable| comparable == *base);
+    comparable && window == super::record::default_window(base.course())
 }
 
-pub(super) fn check(results: &Results) -> Vec<Claim> {
+pub(super) fn check(results: &EvaluationResults) -> Vec<Claim> {
     let mut claims = vec![numbers(results)];
     let peak = |t_p, condition, failure| {
         let record = results.record(t_p, condition, failure);
@@ -192,7 +199,7 @@ pub(super) fn check(results: &Results) -> Vec<Claim> {
     claims
 }
 
-fn numbers(results: &Results) -> Claim {
+fn numbers(results: &EvaluationResults) -> Claim {
     let (share, floor_m) = tolerance(results.sensors);
     let (mut worst_m, mut count, mut holds) = (0.0_f64, 0, true);
     for reference in TABLE {

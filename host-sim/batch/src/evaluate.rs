@@ -9,10 +9,9 @@ use super::RunRecord;
 use super::claims::{self, Claim};
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use haptic_analysis::metrics::Window;
-use haptic_sim::closed_loop::{Run, simulate};
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::road::Centreline;
-use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
+use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, ScenarioError, Sensors};
+use haptic_sim::simulation::{Run, simulate};
 
 /// Processing delays of the three drivers, s (table 7).
 pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
@@ -26,12 +25,12 @@ pub struct Evaluation {
     /// runs whose guidance input fails.
     pub runs: Vec<(Scenario, Run)>,
     /// What is handed on.
-    pub results: Results,
+    pub results: EvaluationResults,
 }
 
 /// The results of an evaluation, as JSON holds them.
 #[derive(Debug, Clone, Serialize)]
-pub struct Results {
+pub struct EvaluationResults {
     /// Name of the course.
     pub course: String,
     /// Its length, m.
@@ -53,7 +52,7 @@ pub struct Results {
     pub notes: Vec<String>,
 }
 
-impl Results {
+impl EvaluationResults {
     /// The record of a run, if there is one.
     pub fn record(&self, t_p: f64, condition: Condition, failure: FailureKind) -> Option<&RunRecord> {
         self.runs
@@ -71,30 +70,28 @@ impl Results {
 /// failure; its driver's delay, condition and kind of failure are varied. `progress` is called after each run.
 ///
 /// # Errors
-/// As [`Scenario::check`], and a window that does not lie where the runs drive.
+/// A manual base that has what takes guidance; a window that does not lie where the runs drive.
 pub fn evaluate(
     base: &Scenario,
     window: Option<Window>,
     progress: impl Fn() + Sync,
 ) -> Result<Evaluation, String> {
-    let window = window.unwrap_or_else(|| default_window(&base.course));
-    base.check()?;
+    let window = window.unwrap_or_else(|| default_window(base.course()));
     super::check_window(window, base)?;
-    let centreline = Centreline::new(&base.course);
-    let runs: Vec<(Scenario, Run)> = scenarios(base)
+    let runs: Vec<(Scenario, Run)> = scenarios(base)?
         .into_par_iter()
         .map(|scenario| {
-            let run = simulate(&scenario, &centreline)?;
+            let run = simulate(&scenario);
             progress();
-            Ok((scenario, run))
+            (scenario, run)
         })
-        .collect::<Result<_, String>>()?;
+        .collect();
 
     let peak_without_failure = |failed: &Scenario| {
-        let failure_time_s = failed.failure.at_s()?;
+        let failure_time_s = failed.failure().at_s()?;
         let (_, run) = runs.iter().find(|(scenario, _)| {
-            let same = scenario.driver == failed.driver && scenario.condition == failed.condition;
-            same && scenario.failure.kind == FailureKind::None
+            let same = scenario.driver() == failed.driver() && scenario.condition() == failed.condition();
+            same && scenario.failure().kind == FailureKind::None
         })?;
         nominal_peak_m(run, window, failure_time_s)
     };
@@ -102,13 +99,13 @@ pub fn evaluate(
         .iter()
         .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
         .collect();
-    let notes = failure_notes(base.failure.time_s, &records, window);
-    let mut results = Results {
-        course: base.course.name().into(),
-        course_length_m: base.course.length_m(),
-        speed_kmh: base.speed_kmh,
-        failure_time_s: base.failure.time_s,
-        sensors: base.sensors,
+    let notes = failure_notes(base.failure().time_s, &records, window);
+    let mut results = EvaluationResults {
+        course: base.course().name().into(),
+        course_length_m: base.course().length_m(),
+        speed_kmh: base.speed_kmh(),
+        failure_time_s: base.failure().time_s,
+        sensors: base.sensors(),
         window_m: [window.from_m, window.to_m],
         runs: records,
         claims: Vec::new(),
@@ -120,7 +117,7 @@ pub fn evaluate(
     Ok(Evaluation { runs, results })
 }
 
-fn scenarios(base: &Scenario) -> Vec<Scenario> {
+fn scenarios(base: &Scenario) -> Result<Vec<Scenario>, ScenarioError> {
     let mut scenarios = Vec::with_capacity(RUNS);
     for t_p in DRIVERS_T_P {
         for kind in [FailureKind::None, FailureKind::Torque, FailureKind::Input] {
@@ -129,17 +126,20 @@ fn scenarios(base: &Scenario) -> Vec<Scenario> {
                 if condition == Condition::Manual && kind != FailureKind::None {
                     continue;
                 }
-                scenarios.push(Scenario {
-                    condition,
-                    gains: condition.gains(),
-                    driver: DriverParameters { t_p, ..base.driver },
-                    failure: Failure { kind, ..base.failure },
-                    ..base.clone()
-                });
+                let driver = DriverParameters {
+                    t_p,
+                    ..*base.driver()
+                };
+                let failure = Failure {
+                    kind,
+                    ..base.failure()
+                };
+                let scenario = base.to_builder().condition(condition).driver(driver);
+                scenarios.push(scenario.failure(failure).build()?);
             }
         }
     }
     // Stable: the others stay driver by driver.
-    scenarios.sort_by_key(|scenario| scenario.failure.kind == FailureKind::Input);
-    scenarios
+    scenarios.sort_by_key(|scenario| scenario.failure().kind == FailureKind::Input);
+    Ok(scenarios)
 }

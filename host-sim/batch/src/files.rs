@@ -55,10 +55,10 @@ mod tests {
         );
         let relying = load_scenario(&folder.join("relying-driver.toml")).unwrap();
         assert_eq!(
-            (relying.condition, relying.failure.at_s()),
+            (relying.condition(), relying.failure().at_s()),
             (Condition::High, Some(40.0))
         );
-        assert!(relying.course.name().ends_with("hill-road.toml"));
+        assert!(relying.course().name().ends_with("hill-road.toml"));
     }
 
     #[test]

@@ -14,10 +14,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::evaluate::DRIVERS_T_P;
-use haptic_sim::closed_loop::{Run, simulate};
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenario};
+use haptic_sim::simulation::{Run, simulate};
 
 /// Speeds of the study, km/h.
 pub const SPEEDS_KMH: [f64; 9] = [40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0];
@@ -34,7 +34,7 @@ const LAST_STRAIGHT_M: f64 = 400.0;
 
 /// One speed, delay and reliance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Row {
+pub struct HandoverRow {
     /// Speed, km/h.
     pub speed_kmh: f64,
     /// Processing delay, s.
@@ -57,7 +57,7 @@ pub struct Row {
     pub loss_ratio: Option<f64>,
 }
 
-impl Row {
+impl HandoverRow {
     /// Whether the row has to keep the bound.
     pub fn is_judged(&self) -> bool {
         self.manual_stable && self.condition != Condition::Low
@@ -71,9 +71,9 @@ impl Row {
 
 /// What the study found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Results {
+pub struct HandoverResults {
     /// By speed, delay and reliance.
-    pub rows: Vec<Row>,
+    pub rows: Vec<HandoverRow>,
     /// Largest handover ratio of the judged rows.
     pub largest_judged_ratio: f64,
     /// Most that it may be.
@@ -83,45 +83,42 @@ pub struct Results {
 /// Runs every row on all cores; `progress` is called after each.
 ///
 /// # Errors
-/// As [`Scenario::check`]; none of these scenarios meets one.
-pub fn study(progress: impl Fn() + Sync) -> Result<Results, String> {
+/// As [`haptic_sim::scenario::ScenarioBuilder::build`]; none of these scenarios meets one.
+pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
         .flat_map(|kmh| DRIVERS_T_P.map(|t_p| (*kmh, t_p)))
         .collect();
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<HandoverRow>> = cases
         .into_par_iter()
         .map(|(kmh, t_p)| rows_of(kmh, t_p, &progress))
         .collect::<Result<_, String>>()?;
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let rows: Vec<HandoverRow> = rows.into_iter().flatten().collect();
     let judged = rows.iter().filter(|row| row.is_judged());
-    Ok(Results {
+    Ok(HandoverResults {
         largest_judged_ratio: judged.filter_map(|row| row.handover_ratio).fold(0.0, f64::max),
         most: MOST,
         rows,
     })
 }
 
-fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<Row>, String> {
+fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<HandoverRow>, String> {
     let course = stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?;
-    let line = Centreline::new(&course);
     let run = |condition: Condition, kind| {
-        let scenario = Scenario {
-            course: course.clone(),
-            speed_kmh,
-            condition,
-            gains: condition.gains(),
-            driver: DriverParameters {
+        let scenario = Scenario::builder()
+            .course(course.clone())
+            .speed_kmh(speed_kmh)
+            .condition(condition)
+            .driver(DriverParameters {
                 t_p,
                 ..Default::default()
-            },
-            failure: Failure {
+            })
+            .failure(Failure {
                 kind,
                 time_s: FAILURE_S,
-            },
-            ..Default::default()
-        };
-        simulate(&scenario, &line)
+            })
+            .build()?;
+        Ok::<_, String>(simulate(&scenario))
     };
     let manual = run(Condition::Manual, FailureKind::None)?;
     let manual_m = peak_m(&manual, 0.0);
@@ -138,7 +135,7 @@ fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Ve
         let (handover_m, loss_m) = (peak(FailureKind::Input)?, peak(FailureKind::Torque)?);
         let larger_m = nominal_m.zip(manual_m).map(|(a, b)| a.max(b));
         let ratio = |failed: Option<f64>| failed.zip(larger_m).map(|(a, b)| a / b);
-        rows.push(Row {
+        rows.push(HandoverRow {
             speed_kmh,
             t_p,
             condition,
@@ -164,14 +161,17 @@ fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
 fn stretched_curve(k: f64) -> Result<Course, String> {
     let curvature = 1.0 / (300.0 * k * k);
     let (clothoid, arc) = (80.0 * k, 300.0 * k);
-    let toml = format!(
-        "[[segment]]\nlength = {before}\n\
-         [[segment]]\nlength = {clothoid}\ncurvature_start = 0.0\ncurvature_end = {curvature}\n\
-         [[segment]]\nlength = {arc}\ncurvature = {curvature}\n\
-         [[segment]]\nlength = {clothoid}\ncurvature_start = {curvature}\ncurvature_end = 0.0\n\
-         [[segment]]\nlength = {after}\n",
-        before = 120.0 * k,
-        after = LAST_STRAIGHT_M * k,
+    let segments = vec![
+        Segment::straight(120.0 * k),
+        Segment::clothoid(clothoid, 0.0, curvature),
+        Segment::arc(arc, curvature),
+        Segment::clothoid(clothoid, curvature, 0.0),
+        Segment::straight(LAST_STRAIGHT_M * k),
+    ];
+    let course = Course::new(
+        "first curve of paper-course, stretched",
+        DEFAULT_LANE_WIDTH_M,
+        segments,
     );
-    Course::from_toml("first curve of paper-course, stretched", &toml).map_err(|e| e.to_string())
+    course.map_err(|e| e.to_string())
 }

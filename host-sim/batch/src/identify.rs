@@ -9,9 +9,9 @@ use haptic_analysis::identify::{
     DriveLog, FixError, Identification, Options, Tracking, identify_as_published, identify_with_noise_model,
     track,
 };
-use haptic_sim::closed_loop::simulate;
-use haptic_sim::models::road::{Centreline, Course};
+use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::simulation::simulate;
 
 /// How to identify.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -76,22 +76,21 @@ impl IdentifiedDrive {
     /// Lets the identified driver, without remnant, drive `course` under the default guidance, or manually.
     ///
     /// # Errors
-    /// As [`Scenario::check`]: the course is too short, say.
+    /// As [`haptic_sim::scenario::ScenarioBuilder::build`]: the course is too short, say.
     pub fn drive_again(&mut self, course: Course, speed_kmh: f64, options: &Options) -> Result<(), String> {
         let condition = if options.manual {
             Condition::Manual
         } else {
             Condition::Custom
         };
-        let base = Scenario {
-            course,
-            speed_kmh,
-            condition,
-            ..Scenario::default()
-        };
-        let scenario = identified_driver(&base, &self.results.identification, options.muscle);
-        let run = simulate(&scenario, &Centreline::new(&scenario.course))?;
-        let window = default_window(&scenario.course);
+        let base = Scenario::builder()
+            .course(course)
+            .speed_kmh(speed_kmh)
+            .condition(condition)
+            .build()?;
+        let scenario = identified_driver(&base, &self.results.identification, options.muscle)?;
+        let run = simulate(&scenario);
+        let window = default_window(scenario.course());
         self.results.drives_again = Some(RunRecord::new(&scenario, &run, window, None));
         Ok(())
     }

@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use haptic_analysis::metrics::{self, Circumstances, Metrics, Window};
 use haptic_log::trace::Sample;
-use haptic_sim::closed_loop::Run;
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+use haptic_sim::simulation::Run;
 
 /// A run's line in the results. A metric without a value is `null` in JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -32,23 +32,23 @@ pub struct RunRecord {
 impl RunRecord {
     /// Measures a run over a window. `nominal_peak_m` is the peak of the same run without its failure.
     pub fn new(scenario: &Scenario, run: &Run, window: Window, nominal_peak_m: Option<f64>) -> Self {
-        let failure = scenario.failure.at_s().map(|time_s| metrics::Failure {
+        let failure = scenario.failure().at_s().map(|time_s| metrics::Failure {
             time_s,
             nominal_peak_lateral_error_m: nominal_peak_m,
         });
         let first_failed = |time_s| run.trace.samples.iter().find(|sample| sample.time_s >= time_s);
         let circumstances = Circumstances {
-            speed_m_s: scenario.speed_mps(),
-            lane_width_m: scenario.course.lane_width_m(),
+            speed_m_s: scenario.speed_m_per_s(),
+            lane_width_m: scenario.course().lane_width_m(),
             window: Some(window),
             failure,
         };
         Self {
-            t_p: scenario.driver.t_p,
-            condition: scenario.condition,
-            failure: scenario.failure.kind,
+            t_p: scenario.driver().t_p,
+            condition: scenario.condition(),
+            failure: scenario.failure().kind,
             failure_s_m: scenario
-                .failure
+                .failure()
                 .at_s()
                 .and_then(first_failed)
                 .map(|sample| sample.s_m),
@@ -117,7 +117,7 @@ const LEAST_WINDOW_M: f64 = 1.0;
 /// Which end is wrong, with its value and range.
 pub fn check_window(window: Window, scenario: &Scenario) -> Result<(), String> {
     let Window { from_m, to_m } = window;
-    let (length_m, reach_m) = (scenario.course.length_m(), scenario.reach_m());
+    let (length_m, reach_m) = (scenario.course().length_m(), scenario.reach_m());
     // Whole tenths, for people to read.
     let last_start_m = (10.0 * (reach_m - LEAST_WINDOW_M)).floor() / 10.0;
     in_range("window from", from_m, 0.0..=last_start_m, "m").map_err(|e| {
@@ -139,7 +139,7 @@ pub fn check_window(window: Window, scenario: &Scenario) -> Result<(), String> {
 mod tests {
     use super::*;
     use haptic_log::trace::Trace;
-    use haptic_sim::closed_loop::Ending;
+    use haptic_sim::simulation::Ending;
 
     /// 1 m a second; |e| falls from 0.9 m by 0.1 m a sample.
     fn run() -> Run {
@@ -175,12 +175,12 @@ mod tests {
 
     #[test]
     fn a_failure_that_the_window_does_not_hold_is_noted() {
-        let scenario = |time_s| Scenario {
-            failure: haptic_sim::scenario::Failure {
+        let scenario = |time_s| {
+            let failure = haptic_sim::scenario::Failure {
                 kind: FailureKind::Torque,
                 time_s,
-            },
-            ..Scenario::default()
+            };
+            Scenario::builder().failure(failure).build().unwrap()
         };
         let window = Window {
             from_m: 2.0,

@@ -7,10 +7,9 @@ use super::RunRecord;
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::reliance::Readings;
 use haptic_log::Event;
-use haptic_sim::closed_loop::{Cycle, Observer, Run, observe, simulate};
 use haptic_sim::ecu_events::EcuEvents;
-use haptic_sim::models::road::Centreline;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
+use haptic_sim::simulation::{Run, observe, simulate};
 
 /// A scenario with its run.
 #[derive(Debug, Clone)]
@@ -45,7 +44,7 @@ pub struct SingleResults {
     /// Seed of the remnant.
     pub seed: u64,
     /// The ECU's last estimate of K_hg and its standard deviation, if it identified any.
-    pub reliance: Option<[f64; 2]>,
+    pub k_hg: Option<[f64; 2]>,
     /// Stretch that was measured, m: the paper's curve on its course, else all of it.
     pub window_m: [f64; 2],
     /// The run's record.
@@ -59,51 +58,46 @@ pub struct SingleResults {
 /// `record_bus` every frame is kept.
 ///
 /// # Errors
-/// As [`Scenario::check`] and [`Scenario::check_times`]; a bus to record where there is none.
+/// As [`Scenario::check_times`]; a bus to record where there is none.
 pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
-    scenario.check()?;
     scenario.check_times()?;
-    if record_bus && (scenario.sensors == Sensors::Exact || scenario.condition == Condition::Manual) {
+    if record_bus && (scenario.sensors() == Sensors::Exact || scenario.condition() == Condition::Manual) {
         return Err(
             "there is no bus to record: it takes sensors = \"paper\" and a condition with guidance".into(),
         );
     }
-    let centreline = Centreline::new(&scenario.course);
-    let window = default_window(&scenario.course);
+    let window = default_window(scenario.course());
     let (mut ecu, mut readings, mut bus) = (EcuEvents::new(), Readings::default(), Vec::new());
-    let run = observe(&scenario, &centreline, &mut |cycle: &Cycle| {
-        ecu.cycle(cycle);
-        readings.cycle(cycle);
+    let run = observe(&scenario, |outcome| {
+        ecu.observe(outcome);
+        readings.observe(outcome);
         if record_bus {
-            let frames = cycle.frames_in.iter().chain(cycle.frames_out);
-            bus.extend(frames.map(|frame| (cycle.view.step, *frame)));
+            let frames = outcome.frames_in.iter().chain(outcome.frames_out);
+            bus.extend(frames.map(|frame| (outcome.observation.step, *frame)));
         }
-    })?;
-    let nominal_peak_m = if let Some(failure_time_s) = scenario.failure.at_s() {
+    });
+    let nominal_peak_m = if let Some(failure_time_s) = scenario.failure().at_s() {
         let failure = Failure {
             kind: FailureKind::None,
-            ..scenario.failure
+            ..scenario.failure()
         };
-        let nominal = Scenario {
-            failure,
-            ..scenario.clone()
-        };
-        nominal_peak_m(&simulate(&nominal, &centreline)?, window, failure_time_s)
+        let nominal = scenario.to_builder().failure(failure).build()?;
+        nominal_peak_m(&simulate(&nominal), window, failure_time_s)
     } else {
         None
     };
     let record = RunRecord::new(&scenario, &run, window, nominal_peak_m);
     let results = SingleResults {
-        course: scenario.course.name().into(),
-        course_length_m: scenario.course.length_m(),
-        speed_kmh: scenario.speed_kmh,
-        sensors: scenario.sensors,
-        failure_time_s: scenario.failure.at_s(),
-        seed: scenario.seed,
-        reliance: readings.readings.iter().rev().find_map(|r| r.estimate),
+        course: scenario.course().name().into(),
+        course_length_m: scenario.course().length_m(),
+        speed_kmh: scenario.speed_kmh(),
+        sensors: scenario.sensors(),
+        failure_time_s: scenario.failure().at_s(),
+        seed: scenario.seed(),
+        k_hg: readings.readings.iter().rev().find_map(|r| r.estimate),
         window_m: [window.from_m, window.to_m],
         record,
-        notes: failure_notes(scenario.failure.time_s, &[record], window),
+        notes: failure_notes(scenario.failure().time_s, &[record], window),
     };
     Ok(SingleRun {
         scenario,

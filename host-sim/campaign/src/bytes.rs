@@ -120,6 +120,8 @@ pub(super) struct Status {
     pub(super) mode: u64,
     pub(super) warning: bool,
     pub(super) faults: u64,
+    /// Whether some fault of class B, of class C, of class Locked is present, one bit each.
+    pub(super) classes: u64,
     pub(super) reset: u64,
     pub(super) spare: u64,
 }
@@ -132,9 +134,10 @@ impl Status {
             limit: unsigned(frame, 28, 4),
             mode: unsigned(frame, 32, 4),
             warning: unsigned(frame, 36, 1) != 0,
-            faults: unsigned(frame, 37, 15),
-            reset: unsigned(frame, 52, 3),
-            spare: unsigned(frame, 55, 9),
+            faults: unsigned(frame, 37, 21),
+            classes: unsigned(frame, 58, 3),
+            reset: unsigned(frame, 61, 3),
+            spare: unsigned(frame, 52, 6),
         }
     }
 }
@@ -162,7 +165,7 @@ mod tests {
             Vehicle::default().encode(0),
             Demand {
                 engage: true,
-                authority: haptic_core::quantity::Gain::ONE,
+                authority: haptic_core::quantity::Ratio::ONE,
                 probe: false,
             }
             .encode(9),

@@ -3,10 +3,10 @@
 //! A *row* is one fault of the table with its class, deadline and torque bound. A *trial* is one run of a row with
 //! one seed. Faults are injected between the world and the ECU, in a sensor's value, on the bus, in the clock, in
 //! memory, in the motor; whatever reaches the ECU goes through the shipping receive and step. In every cycle a
-//! guard that shares nothing with the core checks what must always hold.
+//! checker of invariants that shares nothing with the core checks what must always hold.
 //!
 //! ```text
-//! world -> senders -> bus -> Ecu -> motor -> world        guard: frames in and out, every cycle
+//! world -> senders -> bus -> Ecu -> motor -> world        checker: frames in and out, every cycle
 //!            ^         ^      ^       ^                   residual: since when the fault can be seen
 //!            +--- one injection ------+                   verdict: class, deadline, torque bound
 //! ```
@@ -18,20 +18,20 @@
 
 mod bytes;
 pub mod campaign;
-mod come_up;
 pub mod document;
 pub mod drivers;
-mod guard;
+mod ecu_harness;
 mod injection;
+mod invariants;
 mod residual;
-mod seat;
 mod senders;
+mod start_up;
 pub mod table;
 pub mod target;
 mod trial;
 mod verdict;
 mod wire;
 
-pub use guard::Broken;
+pub use invariants::Violation;
 pub use residual::Seen;
-pub use trial::{Outcome, World};
+pub use trial::{TrialOutcome, World};

@@ -6,8 +6,8 @@ use haptic_core::bus::messages::{Guidance, Message};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 
-use crate::closed_loop::{Cycle, Observer};
 use crate::models::STEP_S;
+use crate::simulation::Outcome;
 use haptic_log::Event;
 
 /// Listens to an ECU.
@@ -30,8 +30,15 @@ impl EcuEvents {
         }
     }
 
+    /// Takes what came of a step.
+    pub fn observe(&mut self, outcome: &Outcome) {
+        if let Some(frame) = outcome.frames_out.first() {
+            self.take_frame(outcome.observation.step, frame);
+        }
+    }
+
     /// Takes the frame of a step.
-    pub fn hear(&mut self, step: u32, frame: &Frame) {
+    pub fn take_frame(&mut self, step: u32, frame: &Frame) {
         let Ok(guidance) = Guidance::decode(&mut self.receiver, frame) else {
             return;
         };
@@ -63,14 +70,6 @@ impl Default for EcuEvents {
     }
 }
 
-impl Observer for EcuEvents {
-    fn cycle(&mut self, cycle: &Cycle) {
-        if let Some(frame) = cycle.frames_out.first() {
-            self.hear(cycle.view.step, frame);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,7 +98,7 @@ mod tests {
             (2, Mode::Handover, 9),
             (3, Mode::Standby, 9),
         ] {
-            ecu.hear(step, &frame(step, mode, bits));
+            ecu.take_frame(step, &frame(step, mode, bits));
         }
         let told: Vec<_> = ecu
             .into_events()

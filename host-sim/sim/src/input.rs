@@ -46,22 +46,73 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
     })
 }
 
-/// Refuses a value outside `range`, and NaN, in a sentence that names field, value and range.
+/// A value outside its range, or NaN.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RangeError {
+    /// The field, with the table that it is in.
+    pub field: String,
+    /// Its value.
+    pub value: f64,
+    /// The least value allowed.
+    pub min: f64,
+    /// The largest value allowed.
+    pub max: f64,
+    /// The unit of all three; empty for a number without one.
+    pub unit: &'static str,
+}
+
+impl RangeError {
+    /// The same of a field in a table.
+    #[must_use]
+    pub fn within(mut self, table: &str) -> Self {
+        self.field = format!("{table}.{}", self.field);
+        self
+    }
+}
+
+impl Display for RangeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let space = if self.unit.is_empty() { "" } else { " " };
+        let Self {
+            field,
+            value,
+            min,
+            max,
+            unit,
+        } = self;
+        write!(
+            f,
+            "{field} = {value}{space}{unit} is outside {min} to {max}{space}{unit}"
+        )
+    }
+}
+
+impl std::error::Error for RangeError {}
+
+impl From<RangeError> for String {
+    fn from(error: RangeError) -> Self {
+        error.to_string()
+    }
+}
+
+/// Refuses a value outside `range`, and NaN.
 ///
 /// # Errors
-/// The sentence, without the file.
-pub fn in_range(field: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> Result<(), String> {
+/// Field, value, range and unit.
+pub fn in_range(
+    field: &str,
+    value: f64,
+    range: RangeInclusive<f64>,
+    unit: &'static str,
+) -> Result<(), RangeError> {
     if range.contains(&value) {
         return Ok(());
     }
-    let unit = if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {unit}")
-    };
-    Err(format!(
-        "{field} = {value}{unit} is outside {} to {}{unit}",
-        range.start(),
-        range.end()
-    ))
+    Err(RangeError {
+        field: field.into(),
+        value,
+        min: *range.start(),
+        max: *range.end(),
+        unit,
+    })
 }

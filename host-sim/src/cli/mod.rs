@@ -19,7 +19,7 @@ mod pil;
 mod progress;
 mod reliance;
 mod run;
-mod table;
+mod series;
 
 use std::fmt::Display;
 use std::process::ExitCode;

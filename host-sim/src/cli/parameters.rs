@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use haptic_sim::input::InputError;
 use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
@@ -28,14 +27,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let params = match &arguments.scenario {
-        Some(path) => {
-            let scenario = haptic_batch::files::load_scenario(path)?;
-            // What is out of range is told in the words of the file.
-            scenario
-                .setup()
-                .map_err(|message| InputError::new(path.display(), message))?;
-            Some(scenario.controller_params())
-        }
+        Some(path) => Some(haptic_batch::files::load_scenario(path)?.controller_params()),
         None => None,
     };
     let status = Product::on(&arguments.can).and_then(|mut product| match &params {

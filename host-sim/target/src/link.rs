@@ -2,7 +2,7 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::lockstep::{RECORD_LEN, from_record, to_record};
+use haptic_lockstep::{RECORD_LEN, from_record, to_record};
 
 use super::Channel;
 
@@ -20,7 +20,7 @@ pub(super) fn encode(channel: Channel, frame: &Frame) -> Vec<u8> {
     }
 }
 
-/// Collects bytes to frames. Answers to our own SLCAN lines are passed over.
+/// Collects bytes to frames. ResponseStream to our own SLCAN lines are passed over.
 pub(super) enum Decoder {
     Fifo(Vec<u8>),
     Slcan(Parser),

@@ -1,8 +1,7 @@
 //! What the ECU hears.
 
-use super::{Message, from_lsb, put, signed, to_lsb, unsigned};
-use crate::bus::e2e::Protection;
-use crate::quantity::{Gain, Metres, Micros, Radians, Speed, Torque, shift_round};
+use super::{Info, Message, from_lsb, info, put, signed, to_lsb, unsigned};
+use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, shift_round};
 
 /// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -29,9 +28,7 @@ impl LanePreview {
 }
 
 impl Message for LanePreview {
-    const ID: u16 = 0x100;
-    const PROTECTION: Protection = Protection::new(0x11);
-    const MAX_DELTA: u8 = 3;
+    const INFO: Info = info::LanePreview;
 
     fn pack(&self) -> u64 {
         let age = (self.age.us().saturating_add(Self::AGE_LSB_US / 2) / Self::AGE_LSB_US).min(Self::AGE_MAX);
@@ -45,6 +42,7 @@ impl Message for LanePreview {
             | put(i64::from(self.valid), 55, 1)
     }
 
+    #[expect(clippy::as_conversions, reason = "masked to nine bits")]
     fn unpack(word: u64) -> Option<Self> {
         let e_y = signed(word, 12, 17);
         let e_theta = signed(word, 29, 17);
@@ -84,9 +82,7 @@ impl Column {
 }
 
 impl Message for Column {
-    const ID: u16 = 0x110;
-    const PROTECTION: Protection = Protection::new(0x22);
-    const MAX_DELTA: u8 = 14;
+    const INFO: Info = info::Column;
 
     fn pack(&self) -> u64 {
         let angle = shift_round(
@@ -135,9 +131,7 @@ impl Vehicle {
 }
 
 impl Message for Vehicle {
-    const ID: u16 = 0x120;
-    const PROTECTION: Protection = Protection::new(0x33);
-    const MAX_DELTA: u8 = 3;
+    const INFO: Info = info::Vehicle;
 
     fn pack(&self) -> u64 {
         let [a, b] = self.speeds.map(|v| to_lsb(v.bits(), Self::LSB, Self::MAX));
@@ -160,7 +154,7 @@ pub struct Demand {
     /// Guidance is wanted.
     pub engage: bool,
     /// Share of the law's torque, 0 to 1, LSB 2^-7.
-    pub authority: Gain,
+    pub authority: Ratio,
     /// The probe is wanted on top of it; refused outside Active.
     pub probe: bool,
 }
@@ -171,9 +165,7 @@ impl Demand {
 }
 
 impl Message for Demand {
-    const ID: u16 = 0x130;
-    const PROTECTION: Protection = Protection::new(0x44);
-    const MAX_DELTA: u8 = 3;
+    const INFO: Info = info::Demand;
 
     fn pack(&self) -> u64 {
         let authority = to_lsb(self.authority.bits(), Self::LSB, Self::MAX).max(0);
@@ -184,7 +176,7 @@ impl Message for Demand {
         let authority = unsigned(word, 13, 8);
         (authority <= Self::MAX).then(|| Self {
             engage: unsigned(word, 12, 1) != 0,
-            authority: Gain::from_wide(from_lsb(authority, Self::LSB)),
+            authority: Ratio::from_wide(from_lsb(authority, Self::LSB)),
             probe: unsigned(word, 21, 1) != 0,
         })
     }

@@ -11,20 +11,101 @@ mod service;
 
 pub use inputs::{Column, Demand, LanePreview, Vehicle};
 pub use outputs::{FaultRecord, Guidance, ResetCause, Telemetry, Warning};
-pub use service::{ParameterStatus, ParameterWrite, WriteOutcome};
+pub use service::{
+    ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
+};
 
 use super::e2e::{Protection, ReceiverState, Reject};
 use super::frame::Frame;
-use crate::quantity::{Instant, Micros, shift_round};
+use crate::quantity::{Micros, shift_round};
 
-/// A safety message: identifier, protection, and how its signals lie in a 64-bit little-endian word.
-pub trait Message: Copy {
+/// Version of the bus: of identifiers, layouts and data IDs. `core/haptic.dbc` carries the same.
+pub const VERSION: &str = "2.1.0";
+
+/// Who sends a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sender {
+    /// The camera's computer.
+    Camera,
+    /// The column's sensors.
+    ColumnModule,
+    /// The vehicle's computer, which wants guidance.
+    Host,
+    /// This ECU.
+    Ecu,
+}
+
+/// What the list says of a message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Info {
+    /// Name, as in the DBC file.
+    pub name: &'static str,
     /// CAN identifier.
-    const ID: u16;
+    pub id: u16,
     /// CRC and counter.
-    const PROTECTION: Protection;
+    pub protection: Protection,
     /// Largest step of the counter that lost frames explain within [`TIMEOUT`].
-    const MAX_DELTA: u8;
+    pub max_delta: u8,
+    /// Who sends it.
+    pub sender: Sender,
+    /// Shortest time between two frames, ms; where it is none, the shortest that the bus load is reckoned with.
+    pub period_ms: f64,
+}
+
+/// Declares the messages: `identifier name, data ID constant, largest step of the counter, sender, period`.
+macro_rules! messages {
+    ($($id:literal $name:ident, $constant:literal, $max_delta:literal, $sender:ident, $period_ms:expr;)*) => {
+        /// Every message, most urgent first.
+        pub const MESSAGES: [Info; [$($id),*].len()] = [$(<$name as Message>::INFO),*];
+
+        /// What [`Message::INFO`] is, by name.
+        mod info {
+            use super::{Info, Protection, Sender};
+            $(
+                #[expect(non_upper_case_globals, reason = "named as its message")]
+                pub(super) const $name: Info = Info {
+                    name: stringify!($name),
+                    id: $id,
+                    protection: Protection::new($constant),
+                    max_delta: $max_delta,
+                    sender: Sender::$sender,
+                    period_ms: $period_ms,
+                };
+            )*
+        }
+    };
+}
+
+// The one list of messages. One more is one more line, its struct with its bits (`inputs`, `outputs`, `service`), and
+// its signals in `core/haptic.dbc`; `core/tests/dbc.rs` holds the three and the table in `docs/design.md` together. The
+// monitor decodes torque, mode, lane and column by itself.
+messages! {
+    0x0C0 Guidance, 0x5A, 14, Ecu, 1.0;
+    0x0D0 Warning, 0x66, 14, Ecu, 100.0;
+    0x100 LanePreview, 0x11, 3, Camera, 8.333_333_333_333_334;
+    0x110 Column, 0x22, 3, ColumnModule, 2.0;
+    0x120 Vehicle, 0x33, 3, Host, 10.0;
+    0x130 Demand, 0x44, 3, Host, 10.0;
+    0x140 ParameterWrite, 0x55, 14, Host, 10.0;
+    0x148 ParameterUnlock, 0xBB, 14, Host, 1000.0;
+    0x300 FaultRecord, 0x77, 14, Ecu, 100.0;
+    0x310 Telemetry, 0x88, 2, Ecu, 20.0;
+    0x320 ParameterStatus, 0x99, 2, Ecu, 1000.0;
+    0x330 ParameterValue, 0xCC, 14, Ecu, 100.0;
+    0x340 Rejection, 0xAA, 14, Ecu, 100.0;
+}
+
+/// A safety message: what the list says of it, and how its signals lie in a 64-bit little-endian word.
+pub trait Message: Copy {
+    /// Its line of the list.
+    const INFO: Info;
+    /// CAN identifier.
+    const ID: u16 = Self::INFO.id;
+    /// CRC and counter.
+    const PROTECTION: Protection = Self::INFO.protection;
+    /// Largest step of the counter that lost frames explain within [`TIMEOUT`].
+    const MAX_DELTA: u8 = Self::INFO.max_delta;
 
     /// The signals in their bits; values outside a signal's range saturate.
     fn pack(&self) -> u64;
@@ -45,11 +126,20 @@ pub trait Message: Copy {
     /// # Errors
     /// The first check that it fails: length, CRC, counter, trust, range.
     fn decode(state: &mut ReceiverState, frame: &Frame) -> Result<Self, Reject> {
+        Self::decode_within(state, frame, Self::MAX_DELTA)
+    }
+
+    /// The same, with the step of the counter that may have been lost: more, the longer the sender was silent.
+    ///
+    /// # Errors
+    /// As [`Message::decode`].
+    #[inline(always)]
+    fn decode_within(state: &mut ReceiverState, frame: &Frame, max_delta: u8) -> Result<Self, Reject> {
         let data = frame.full_data().ok_or(Reject::Length)?;
         let signals = Self::unpack(u64::from_le_bytes(data));
         // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
         if signals.is_some() || state.is_trusted() {
-            state.accept(&Self::PROTECTION, &data, Self::MAX_DELTA)?;
+            state.accept(&Self::PROTECTION, &data, max_delta)?;
         }
         signals.ok_or(Reject::Range)
     }
@@ -58,10 +148,12 @@ pub trait Message: Copy {
 /// Every safety message is stale at this age.
 pub const TIMEOUT: Micros = Micros::from_ms(30);
 
+#[expect(clippy::as_conversions, reason = "two's complement, then masked to its bits")]
 const fn put(value: i64, start: u32, bits: u32) -> u64 {
     ((value as u64) & mask(bits)).wrapping_shl(start)
 }
 
+#[expect(clippy::as_conversions, reason = "masked to fewer bits than an i64 has")]
 const fn unsigned(word: u64, start: u32, bits: u32) -> i64 {
     (word.wrapping_shr(start) & mask(bits)) as i64
 }
@@ -83,27 +175,4 @@ fn to_lsb(bits: i32, lsb: u32, max: i64) -> i64 {
 /// The other way, exact.
 fn from_lsb(raw: i64, lsb: u32) -> i64 {
     raw.wrapping_shl(24_u32.wrapping_sub(lsb))
-}
-
-/// The simulated time, which ends a tick of a lock-step run: the ECU steps when it arrives. Not protected,
-/// and not part of a product image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SimTime(pub Instant);
-
-impl SimTime {
-    /// CAN identifier, the weakest on the bus.
-    pub const ID: u16 = 0x7F0;
-
-    /// Bytes 0..3: microseconds, little-endian.
-    #[must_use]
-    pub fn encode(self) -> Frame {
-        Frame::full(Self::ID, u64::from(self.0.us()).to_le_bytes())
-    }
-
-    /// The instant, if this is such a frame.
-    #[must_use]
-    pub fn decode(frame: &Frame) -> Option<Self> {
-        let [a, b, c, d, ..] = frame.full_data()?;
-        (frame.id() == Self::ID).then(|| Self(Instant::from_us(u32::from_le_bytes([a, b, c, d]))))
-    }
 }

@@ -1,16 +1,22 @@
 //! What the ECU says.
 
-use super::{Message, from_lsb, put, signed, to_lsb, unsigned};
-use crate::bus::e2e::Protection;
+#![expect(
+    clippy::as_conversions,
+    reason = "a code is its discriminant, and a field is masked to fewer bits than its type has"
+)]
+
+use super::{Info, Message, from_lsb, info, put, signed, to_lsb, unsigned};
+use crate::bus::frame::Frame;
 use crate::envelope::LimitReason;
+use crate::estimator::Reading;
 use crate::faults::{Fault, FaultSet, Record};
 use crate::modes::Mode;
-use crate::quantity::{Gain, Torque};
-use crate::reliance::Reading;
+use crate::quantity::{Ratio, Torque};
 
 /// Why the ECU last started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum ResetCause {
     /// Power came.
     #[default]
@@ -57,13 +63,38 @@ pub struct Guidance {
     pub mode: Mode,
     /// The driver has to take over.
     pub warning: bool,
-    /// What is wrong, one bit each.
+    /// What is wrong, one bit each. This frame has room for the first [`Guidance::FAULTS`] of the fault word.
     pub faults: FaultSet,
     /// Why the ECU last started.
     pub reset: ResetCause,
 }
 
+/// The classes of all faults present, those without a bit of their own in the frame too.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Classes {
+    /// An input failed.
+    pub b: bool,
+    /// The computation, memory, timing or output failed.
+    pub c: bool,
+    /// The ECU must not leave Boot.
+    pub locked: bool,
+}
+
 impl Guidance {
+    /// So many faults of the word have a bit of their own here; the rest is in [`Warning`] and [`FaultRecord`].
+    pub const FAULTS: u32 = 21;
+
+    /// The classes that a guidance frame names.
+    #[must_use]
+    pub fn classes(frame: &Frame) -> Option<Classes> {
+        let word = u64::from_le_bytes(frame.full_data().filter(|_| frame.id() == Self::ID)?);
+        Some(Classes {
+            b: unsigned(word, 58, 1) != 0,
+            c: unsigned(word, 59, 1) != 0,
+            locked: unsigned(word, 60, 1) != 0,
+        })
+    }
+
     const TORQUE_LSB: u32 = 12;
     /// +-5 N.m, the widest profile of the envelope.
     const TORQUE_MAX: i64 = 5 << Self::TORQUE_LSB;
@@ -79,9 +110,7 @@ impl Guidance {
 }
 
 impl Message for Guidance {
-    const ID: u16 = 0x0C0;
-    const PROTECTION: Protection = Protection::new(0x5A);
-    const MAX_DELTA: u8 = 14;
+    const INFO: Info = info::Guidance;
 
     fn pack(&self) -> u64 {
         put(
@@ -91,8 +120,11 @@ impl Message for Guidance {
         ) | put(i64::from(self.limit as u8), 28, 4)
             | put(i64::from(self.mode as u8), 32, 4)
             | put(i64::from(self.warning), 36, 1)
-            | put(i64::from(self.faults.bits()), 37, 15)
-            | put(i64::from(self.reset as u8), 52, 3)
+            | put(i64::from(self.faults.bits()), 37, Self::FAULTS)
+            | put(i64::from(self.faults.intersects(FaultSet::INPUT)), 58, 1)
+            | put(i64::from(self.faults.intersects(FaultSet::CRITICAL)), 59, 1)
+            | put(i64::from(self.faults.intersects(FaultSet::LOCKING)), 60, 1)
+            | put(i64::from(self.reset as u8), 61, 3)
     }
 
     fn unpack(word: u64) -> Option<Self> {
@@ -102,8 +134,8 @@ impl Message for Guidance {
             limit: LimitReason::from_code(unsigned(word, 28, 4))?,
             mode: Mode::from_code(unsigned(word, 32, 4) as u32)?,
             warning: unsigned(word, 36, 1) != 0,
-            faults: FaultSet::from_bits(unsigned(word, 37, 15) as u16),
-            reset: ResetCause::from_code(unsigned(word, 52, 3))?,
+            faults: FaultSet::from_bits(unsigned(word, 37, Self::FAULTS) as u32),
+            reset: ResetCause::from_code(unsigned(word, 61, 3))?,
         };
         (torque.abs() <= Self::TORQUE_MAX).then_some(guidance)
     }
@@ -119,18 +151,16 @@ pub struct Warning {
 }
 
 impl Message for Warning {
-    const ID: u16 = 0x0D0;
-    const PROTECTION: Protection = Protection::new(0x66);
-    const MAX_DELTA: u8 = 14;
+    const INFO: Info = info::Warning;
 
     fn pack(&self) -> u64 {
-        put(i64::from(self.mode as u8), 12, 4) | put(i64::from(self.faults.bits()), 16, 15)
+        put(i64::from(self.mode as u8), 12, 4) | put(i64::from(self.faults.bits()), 16, 32)
     }
 
     fn unpack(word: u64) -> Option<Self> {
         Some(Self {
             mode: Mode::from_code(unsigned(word, 12, 4) as u32)?,
-            faults: FaultSet::from_bits(unsigned(word, 16, 15) as u16),
+            faults: FaultSet::from_bits(unsigned(word, 16, 32) as u32),
         })
     }
 }
@@ -147,30 +177,26 @@ pub struct FaultRecord {
 }
 
 impl Message for FaultRecord {
-    const ID: u16 = 0x300;
-    const PROTECTION: Protection = Protection::new(0x77);
-    const MAX_DELTA: u8 = 14;
+    const INFO: Info = info::FaultRecord;
 
     fn pack(&self) -> u64 {
-        put(i64::from(self.index), 12, 4)
-            | put(i64::from(self.total), 16, 4)
-            | put(i64::from(self.record.fault as u8), 20, 4)
-            | put(i64::from(self.record.count), 24, 8)
-            | put(i64::from(self.record.age_s), 32, 16)
+        put(i64::from(self.index), 12, 5)
+            | put(i64::from(self.total), 17, 6)
+            | put(i64::from(self.record.fault as u8), 23, 5)
+            | put(i64::from(self.record.present), 28, 1)
+            | put(i64::from(self.record.count), 32, 8)
+            | put(i64::from(self.record.age_s), 40, 16)
     }
 
     fn unpack(word: u64) -> Option<Self> {
-        let code = unsigned(word, 20, 4);
-        let fault = Fault::ALL
-            .into_iter()
-            .find(|fault| i64::from(*fault as u8) == code)?;
         Some(Self {
-            index: unsigned(word, 12, 4) as u8,
-            total: unsigned(word, 16, 4) as u8,
+            index: unsigned(word, 12, 5) as u8,
+            total: unsigned(word, 17, 6) as u8,
             record: Record {
-                fault,
-                count: unsigned(word, 24, 8) as u8,
-                age_s: unsigned(word, 32, 16) as u16,
+                fault: Fault::from_code(unsigned(word, 23, 5))?,
+                count: unsigned(word, 32, 8) as u8,
+                age_s: unsigned(word, 40, 16) as u16,
+                present: unsigned(word, 28, 1) != 0,
             },
         })
     }
@@ -182,34 +208,32 @@ pub struct Telemetry {
     /// The part of the guidance torque that is the probe, +-0.4995 N.m, LSB 2^-12 N.m, while there is one.
     pub probe: Option<Torque>,
     /// K_hg, +-4, LSB 2^-10, and its standard deviation, 0 to 1.999, LSB 2^-10, once identified.
-    pub reliance: Option<Reading>,
+    pub k_hg: Option<Reading>,
 }
 
 impl Telemetry {
     const TORQUE_LSB: u32 = 12;
     const TORQUE_MAX: i64 = (1 << 11) - 1;
-    const RELIANCE_LSB: u32 = 10;
-    const RELIANCE_MAX: i64 = 4 << Self::RELIANCE_LSB;
+    const K_HG_LSB: u32 = 10;
+    const K_HG_MAX: i64 = 4 << Self::K_HG_LSB;
     const DEVIATION_MAX: i64 = (1 << 11) - 1;
 }
 
 impl Message for Telemetry {
-    const ID: u16 = 0x310;
-    const PROTECTION: Protection = Protection::new(0x88);
-    const MAX_DELTA: u8 = 2;
+    const INFO: Info = info::Telemetry;
 
     fn pack(&self) -> u64 {
         let probe = self.probe.unwrap_or(Torque::ZERO);
-        let reading = self.reliance.unwrap_or(Reading {
-            k_hg: Gain::ZERO,
-            deviation: Gain::ZERO,
+        let reading = self.k_hg.unwrap_or(Reading {
+            k_hg: Ratio::ZERO,
+            deviation: Ratio::ZERO,
         });
-        let deviation = to_lsb(reading.deviation.bits(), Self::RELIANCE_LSB, Self::DEVIATION_MAX);
+        let deviation = to_lsb(reading.deviation.bits(), Self::K_HG_LSB, Self::DEVIATION_MAX);
         put(to_lsb(probe.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX), 12, 12)
             | put(i64::from(self.probe.is_some()), 24, 1)
-            | put(i64::from(self.reliance.is_some()), 25, 1)
+            | put(i64::from(self.k_hg.is_some()), 25, 1)
             | put(
-                to_lsb(reading.k_hg.bits(), Self::RELIANCE_LSB, Self::RELIANCE_MAX),
+                to_lsb(reading.k_hg.bits(), Self::K_HG_LSB, Self::K_HG_MAX),
                 26,
                 14,
             )
@@ -220,12 +244,12 @@ impl Message for Telemetry {
         let probe = Torque::from_wide(from_lsb(signed(word, 12, 12), Self::TORQUE_LSB));
         let k_hg = signed(word, 26, 14);
         let reading = Reading {
-            k_hg: Gain::from_wide(from_lsb(k_hg, Self::RELIANCE_LSB)),
-            deviation: Gain::from_wide(from_lsb(unsigned(word, 40, 11), Self::RELIANCE_LSB)),
+            k_hg: Ratio::from_wide(from_lsb(k_hg, Self::K_HG_LSB)),
+            deviation: Ratio::from_wide(from_lsb(unsigned(word, 40, 11), Self::K_HG_LSB)),
         };
-        (k_hg.abs() <= Self::RELIANCE_MAX).then(|| Self {
+        (k_hg.abs() <= Self::K_HG_MAX).then(|| Self {
             probe: (unsigned(word, 24, 1) != 0).then_some(probe),
-            reliance: (unsigned(word, 25, 1) != 0).then_some(reading),
+            k_hg: (unsigned(word, 25, 1) != 0).then_some(reading),
         })
     }
 }

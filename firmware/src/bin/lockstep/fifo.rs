@@ -8,8 +8,8 @@ use embedded_can::nb::Can;
 use embedded_can::{Error, ErrorKind};
 use embedded_hal_nb::nb;
 use haptic_core::bus::Frame;
-use haptic_core::lockstep::{RECORD_LEN, from_record, to_record};
 use haptic_firmware::host;
+use haptic_lockstep::{RECORD_LEN, from_record, to_record};
 
 /// Bytes of a buffer: few calls of the host, which cost a microsecond each and more.
 const BUFFER: usize = 8192;

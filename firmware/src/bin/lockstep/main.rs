@@ -7,7 +7,7 @@
 //!
 //! A board without QEMU has only its bus, and waits there for the next run; a panic or a fault restarts it.
 //!
-//! How a run starts and how an answer ends: `haptic_core::lockstep`.
+//! How a run starts and how an answer ends: `haptic_lockstep`.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -25,13 +25,14 @@ mod target {
     use embedded_can::nb::Can;
     use embedded_hal_nb::nb;
     use haptic_core::bus::Frame;
-    use haptic_core::bus::messages::SimTime;
+    use haptic_core::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
-    use haptic_core::lockstep::{StackUse, Start, StartState, StepCost, set_parameter};
     use haptic_core::params::Params;
     use haptic_core::quantity::{Instant, Micros};
     use haptic_firmware::boards::{Board, ThisBoard};
     use haptic_firmware::stack;
+    use haptic_lockstep::SimTime;
+    use haptic_lockstep::{StackUse, Start, StartState, StepCost, set_parameter};
     use heapless::Vec;
 
     /// Most frames of one tick; a full bus at 500 kbit/s carries 4 a millisecond.
@@ -129,13 +130,13 @@ mod target {
             }
             let step = ecu.step(now);
             let stepped = ThisBoard::cycles();
-            let advice = ecu.advise();
-            let advice_cycles = ThisBoard::cycles().wrapping_sub(stepped);
+            let background = ecu.background_step();
+            let background_cycles = ThisBoard::cycles().wrapping_sub(stepped);
             let cycles = stepped.wrapping_sub(start);
             self.frames.clear();
             self.steps = self.steps.wrapping_add(1);
             send(can, &step.guidance);
-            for frame in step.others.iter().chain(&advice) {
+            for frame in step.others.iter().chain(&background) {
                 send(can, frame);
             }
             if self.steps.is_multiple_of(STACK_TURN) {
@@ -144,7 +145,7 @@ mod target {
             }
             let cost = StepCost {
                 cycles,
-                advice_cycles,
+                background_cycles,
             };
             send(can, &cost.encode());
         }
@@ -166,8 +167,8 @@ mod target {
     /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
     #[inline(never)]
     fn begin(ecu: &mut Option<Ecu>, start: Start, params: &Params) {
-        match start.ecu(params) {
-            Ok(new) => *ecu = Some(new),
+        match Setup::new(params) {
+            Ok(setup) => *ecu = Some(start.ecu_with(&setup)),
             Err(error) => panic!("{error}"),
         }
     }

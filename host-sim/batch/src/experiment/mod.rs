@@ -12,7 +12,6 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
-mod participants;
 mod recorder;
 mod repetitions;
 mod spoiled;
@@ -20,7 +19,6 @@ mod spoiled;
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use participants::{Participant, PublishedDriver, participants};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
 pub use spoiled::{POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
@@ -29,11 +27,12 @@ use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
 };
 use haptic_log::trace::Trace;
-use haptic_sim::closed_loop::{self, Cycle};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::road::{Centreline, Course};
-use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::models::road::Course;
+use haptic_sim::participants::{Participant, PublishedDriver, participants};
+use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
+use haptic_sim::simulation;
 
 /// Standard deviation of the remnant in manual driving, N.m.
 pub const REMNANT_MANUAL_NM: f64 = 0.097;
@@ -115,11 +114,10 @@ pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, Str
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])
         .collect();
     let course = Course::paper();
-    let centreline = Centreline::new(&course);
     let drives = drives
         .into_par_iter()
         .map(|(number, truth)| {
-            let drive = one_drive(plan, number, truth, &centreline);
+            let drive = one_drive(plan, number, truth);
             done();
             drive
         })
@@ -150,38 +148,36 @@ struct Driven {
     path: Vec<(f64, f64)>,
 }
 
-/// Lets a published driver drive, with his remnant and the paper's sensors.
-fn driven(
-    plan: &Plan,
-    number: u32,
-    truth: &PublishedDriver,
-    centreline: &Centreline,
-) -> Result<Driven, String> {
-    driven_by(plan, number, truth, centreline, |_| {})
+/// Lets a published driver drive, with a remnant and the paper's sensors.
+fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
+    driven_by(plan, number, truth, truth.parameters())
 }
 
-/// The same, with something about the drive changed by `change`.
+/// The same, by a driver who differs from the published one in what the log does not name.
 fn driven_by(
     plan: &Plan,
     number: u32,
     truth: &PublishedDriver,
-    centreline: &Centreline,
-    change: impl Fn(&mut Scenario),
+    driver: DriverParameters,
 ) -> Result<Driven, String> {
     let guided = truth.k_hg.is_some();
     let seed = plan
         .seed
         .wrapping_mul(1000)
         .wrapping_add(u64::from(2 * number) + u64::from(guided));
-    let mut scenario = scenario_of(plan, truth, seed)?;
-    scenario.driver.remnant_sd_nm = if guided {
+    let scenario = scenario_of(plan, truth, seed)?;
+    let remnant_sd_nm = if guided {
         REMNANT_GUIDED_NM
     } else {
         REMNANT_MANUAL_NM
     };
-    change(&mut scenario);
+    let driver = DriverParameters {
+        remnant_sd_nm,
+        ..driver
+    };
+    let scenario = scenario.to_builder().driver(driver).build()?;
     let mut recorder = Recorder::new(true);
-    let run = closed_loop::observe(&scenario, centreline, &mut |cycle: &Cycle| recorder.cycle(cycle))?;
+    let run = simulation::observe(&scenario, |outcome| recorder.observe(outcome));
     Ok(Driven {
         scenario,
         log: recorder.into_log(),
@@ -189,23 +185,16 @@ fn driven_by(
     })
 }
 
-fn one_drive(
-    plan: &Plan,
-    number: u32,
-    truth: PublishedDriver,
-    centreline: &Centreline,
-) -> Result<Drive, String> {
-    let Driven { scenario, log, path } = driven(plan, number, &truth, centreline)?;
+fn one_drive(plan: &Plan, number: u32, truth: PublishedDriver) -> Result<Drive, String> {
+    let Driven { scenario, log, path } = driven(plan, number, &truth)?;
     let guided = truth.k_hg.is_some();
     let options = Options {
         manual: !guided,
         ..Options::default()
     };
     let finding = |identification: Identification| -> Result<Finding, String> {
-        let again = closed_loop::simulate(
-            &identified_driver(&scenario, &identification, options.muscle),
-            centreline,
-        )?;
+        let driver = identified_driver(&scenario, &identification, options.muscle)?;
+        let again = simulation::simulate(&driver);
         let again_path = path_of(&again.trace);
         Ok(Finding {
             trajectory_error_m: (!again.diverged()).then(|| mean_distance(&path, &again_path)),
@@ -219,7 +208,7 @@ fn one_drive(
         participant: number,
         guided,
         truth,
-        remnant_sd_nm: scenario.driver.remnant_sd_nm,
+        remnant_sd_nm: scenario.driver().remnant_sd_nm,
         noise_model,
         paper,
         path,
@@ -229,55 +218,57 @@ fn one_drive(
 
 /// The drive of a published driver, without remnant.
 fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, String> {
-    let mut scenario = Scenario {
-        driver: DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
-            ..DriverParameters::default()
-        },
-        gains: ArmGains {
-            k_d: driver.k_d,
-            k_hg: driver.k_hg.unwrap_or(0.0),
-        },
-        condition: if driver.k_hg.is_some() {
-            Condition::Custom
-        } else {
-            Condition::Manual
-        },
-        seed,
-        ..Scenario::default()
+    let condition = match driver.k_hg {
+        Some(_) => Condition::Custom,
+        None => Condition::Manual,
     };
-    if plan.probe_nm != 0.0 {
-        scenario.guidance.probe = true;
-        scenario.guidance.controller.probe_amplitude_nm = plan.probe_nm;
+    let mut guidance = GuidanceParameters::default();
+    if plan.probe_nm != 0.0 && condition != Condition::Manual {
+        guidance.probe = true;
+        guidance.controller.probe_amplitude_nm = plan.probe_nm;
     }
-    scenario.check()?;
-    Ok(scenario)
+    let scenario = Scenario::builder()
+        .driver(driver.parameters())
+        .condition(condition)
+        .gains(driver.gains())
+        .guidance(guidance)
+        .seed(seed);
+    Ok(scenario.build()?)
 }
 
 /// `scenario` with the driver identified in place of its own, without remnant. Where K_d and a_i are not told
 /// apart, table 4's K_d splits the gains: the torque does not depend on the split. A parameter that is not
 /// identified has its place on the ridge that the search ended on.
-pub(super) fn identified_driver(scenario: &Scenario, found: &Identification, muscle: Muscle) -> Scenario {
+pub(super) fn identified_driver(
+    scenario: &Scenario,
+    found: &Identification,
+    muscle: Muscle,
+) -> Result<Scenario, ScenarioError> {
     let p = &found.parameters;
     let k_d = p.k_d.optimum.unwrap_or(TABLE_4[4].0);
     let sum = k_d + muscle.k_nms;
     let a = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| gain.optimum.unwrap_or(0.0) / sum);
-    let mut again = scenario.clone();
-    again.driver.a1 = a[0];
-    again.driver.a2 = a[1];
-    again.driver.a3 = a[2];
-    again.driver.t_p = p.t_p.optimum.unwrap_or(0.0).max(STEP_S);
-    again.driver.t_nms = muscle.t_nms_s;
-    again.driver.k_nms = muscle.k_nms;
-    again.driver.remnant_sd_nm = 0.0;
-    again.gains = ArmGains {
-        k_d,
-        k_hg: p.k_hg.optimum.unwrap_or(0.0),
+    let driver = DriverParameters {
+        a_1: a[0],
+        a_2: a[1],
+        a_3: a[2],
+        t_p: p.t_p.optimum.unwrap_or(0.0).max(STEP_S),
+        t_nms: muscle.t_nms_s,
+        k_nms: muscle.k_nms,
+        remnant_sd_nm: 0.0,
+        ..*scenario.driver()
     };
-    again
+    let manual = scenario.condition() == Condition::Manual;
+    let k_hg = if manual {
+        0.0
+    } else {
+        p.k_hg.optimum.unwrap_or(0.0)
+    };
+    scenario
+        .to_builder()
+        .driver(driver)
+        .gains(ArmGains { k_d, k_hg })
+        .build()
 }
 
 fn path_of(trace: &Trace) -> Vec<(f64, f64)> {

@@ -5,7 +5,7 @@
 //! instant at which it was decided anew the new value.
 
 use haptic_analysis::identify::DriveLog;
-use haptic_sim::closed_loop::Cycle;
+use haptic_sim::Outcome;
 use haptic_sim::models::{STEPS_PER_SECOND, sensors};
 
 /// Rows a second.
@@ -15,12 +15,12 @@ const RATE_HZ: u32 = 120;
 #[derive(Debug, Clone)]
 pub struct Recorder {
     rounded: bool,
-    last: Option<Row>,
+    last: Option<StepValues>,
     log: DriveLog,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Row {
+struct StepValues {
     step: u32,
     e_y_m: f64,
     e_theta_rad: f64,
@@ -49,14 +49,14 @@ impl Recorder {
     }
 
     /// Takes in one step.
-    pub fn cycle(&mut self, cycle: &Cycle) {
-        let now = Row {
-            step: cycle.view.step,
-            e_y_m: cycle.seen.e_y_m,
-            e_theta_rad: cycle.seen.e_theta_rad,
-            wheel_angle_rad: cycle.view.wheel_angle_rad,
-            guidance_torque_nm: cycle.applied_torque_nm,
-            driver_torque_nm: cycle.view.driver_torque_nm,
+    pub fn observe(&mut self, outcome: &Outcome) {
+        let now = StepValues {
+            step: outcome.observation.step,
+            e_y_m: outcome.preview.e_y_m,
+            e_theta_rad: outcome.preview.e_theta_rad,
+            wheel_angle_rad: outcome.observation.wheel_angle_rad,
+            guidance_torque_nm: outcome.applied_torque_nm,
+            driver_torque_nm: outcome.observation.driver_torque_nm,
         };
         let Some(last) = self.last.replace(now) else {
             return;

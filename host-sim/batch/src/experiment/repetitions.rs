@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use super::{Plan, PublishedDriver, chosen, driven};
 use haptic_analysis::identify::{Muscle, Options, Parameter, Parameters, identify_with_noise_model};
-use haptic_sim::models::road::{Centreline, Course};
 
 /// What is compared with the truth: the parameters that a torque record can carry.
 pub(super) const COMPARED: usize = 5;
@@ -57,7 +56,6 @@ pub struct Repeated {
 /// # Errors
 /// As [`super::experiment`].
 pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<Repetitions, String> {
-    let centreline = Centreline::new(&Course::paper());
     let jobs: Vec<(u32, PublishedDriver, u64)> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| (0..u64::from(repetitions)).map(move |r| (p.number, p.guided, r)))
@@ -69,7 +67,7 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
                 seed: plan.seed.wrapping_add(repetition),
                 ..plan.clone()
             };
-            let log = driven(&plan, number, &truth, &centreline)?.log;
+            let log = driven(&plan, number, &truth)?.log;
             let identification = identify_with_noise_model(&log, &Options::default());
             done();
             Ok(compared(&truth, &identification.parameters))

@@ -6,7 +6,6 @@
 //! beside it show what was given up.
 
 use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model};
-use haptic_sim::models::road::{Centreline, Course};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
@@ -163,7 +162,6 @@ pub struct Spoiled {
 /// # Errors
 /// As [`super::experiment`].
 pub fn spoiled(plan: &Plan, seeds: u32, only: &str, done: impl Fn() + Sync) -> Result<Spoiled, String> {
-    let centreline = Centreline::new(&Course::paper());
     let drivers = chosen(&plan.participants)?;
     let mut lines = Vec::new();
     for (name, ways) in POPULATION.iter().filter(|(name, _)| name.contains(only)) {
@@ -178,13 +176,13 @@ pub fn spoiled(plan: &Plan, seeds: u32, only: &str, done: impl Fn() + Sync) -> R
                     seed: plan.seed.wrapping_add(seed),
                     ..plan.clone()
                 };
-                let drive = driven_by(&plan, number, &truth, &centreline, |scenario| {
-                    for way in *ways {
-                        if let Spoiling::OtherMuscle(t_nms) = way {
-                            scenario.driver.t_nms = *t_nms;
-                        }
+                let mut driver = truth.parameters();
+                for way in *ways {
+                    if let Spoiling::OtherMuscle(t_nms) = way {
+                        driver.t_nms = *t_nms;
                     }
-                })?;
+                }
+                let drive = driven_by(&plan, number, &truth, driver)?;
                 let mut random =
                     StdRng::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)));
                 let mut log = drive.log;

@@ -10,7 +10,7 @@
 //! Terms: *after 10 s*, 10 s after the start of a session; *deviation*, the standard deviation that the ECU
 //! itself reports; *coverage*, the share of truths within 1.96 deviations of the estimate.
 //!
-//! Not here: the estimator (`haptic_core::reliance`), options and tables (the command line).
+//! Not here: the estimator (`haptic_core::estimator`), options and tables (the command line).
 
 mod readings;
 
@@ -19,20 +19,21 @@ use serde::Serialize;
 
 pub use readings::{Reading, Readings};
 
-use super::experiment::{Participant, participants};
-use haptic_sim::closed_loop::drive;
-use haptic_sim::guidance::{Applied, Guidance, OverBus, View};
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::road::Centreline;
-use haptic_sim::scenario::{Condition, DriverChange, Scenario};
+use haptic_sim::guidance::OverBus;
+use haptic_sim::models::STEP_S;
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::participants::{Participant, participants};
+use haptic_sim::scenario::{DriverChange, GuidanceParameters, Scenario};
+use haptic_sim::simulation::Ending;
+use haptic_sim::{Action, Simulation};
 
 /// Remnant of every driver: standard deviation, N.m, and corner, Hz.
 pub const REMNANT: (f64, f64) = (0.1, 0.5);
 /// Times after the start of a session at which the estimate is held against the truth, s.
 pub const TIMES_S: [f64; 3] = [10.0, 30.0, 40.0];
-/// A session, with the second of silence that ends it, s.
+/// A session, with the second of pause that ends it, s.
 const SESSION_S: f64 = 45.0;
-const SILENCE_S: f64 = 1.0;
+const PAUSE_S: f64 = 1.0;
 /// Sessions of a drive of 186 s.
 const SESSIONS: usize = 4;
 /// How long after a change the estimate must be near the new truth, s, and how near.
@@ -98,7 +99,7 @@ pub struct Settling {
 
 /// What came of it.
 #[derive(Debug, Clone, Serialize)]
-pub struct Results {
+pub struct RelianceResults {
     /// Amplitude of the probe, N.m.
     pub amplitude_nm: f64,
     /// Its frequency, Hz.
@@ -150,7 +151,7 @@ struct Drive {
 ///
 /// # Errors
 /// A participant or a parameter of the probe that is out of range.
-pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String> {
+pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults, String> {
     let all = participants();
     let chosen: Vec<usize> = plan
         .participants
@@ -163,7 +164,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String>
     if chosen.is_empty() || plan.seeds == 0 {
         return Err("participants and seeds: at least one of each is needed".into());
     }
-    scenario(plan, &all[chosen[0]], 0).check()?;
+    scenario(plan, &all[chosen[0]], 0)?;
     let jobs: Vec<(usize, u32)> = chosen
         .iter()
         .flat_map(|&place| (0..plan.seeds).map(move |seed| (place, seed)))
@@ -186,7 +187,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String>
     };
     let lines = chosen.iter().zip(drives.chunks(plan.seeds as usize));
     let lines = lines.map(|(&place, drives)| {
-        let truth = gains(&all[place]).k_hg;
+        let truth = all[place].guided.gains().k_hg;
         let accuracy = accuracy(drives);
         ParticipantResult {
             participant: all[place].number,
@@ -199,7 +200,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String>
             accuracy,
         }
     });
-    Ok(Results {
+    Ok(RelianceResults {
         amplitude_nm: plan.amplitude_nm,
         frequency_hz: plan.frequency_hz,
         seeds: plan.seeds,
@@ -223,9 +224,9 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
         diverged: 0,
         example: None,
     };
-    let truth = gains(&all[place]);
-    let steady = scenario(plan, &all[place], seed);
-    let readings = run(&steady, SESSION_S, &mut result)?;
+    let truth = all[place].guided.gains();
+    let steady = scenario(plan, &all[place], seed)?;
+    let readings = run(&steady, SESSION_S, &mut result);
     if result.diverged == 0 {
         for (i, after_s) in TIMES_S.iter().enumerate() {
             for session in 0..SESSIONS {
@@ -238,18 +239,20 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
 
     // Every other participant in turn, and the change on the straight, in the curves and between them.
     let count = all.len();
-    let other = gains(&all[(place + 1 + (seed as usize * 3) % (count - 1)) % count]);
+    let other = all[(place + 1 + (seed as usize * 3) % (count - 1)) % count]
+        .guided
+        .gains();
     let time_s = 40.0 + f64::from(seed * 37 % 100);
-    let changing = Scenario {
-        driver_change: Some(DriverChange {
+    let changing = scenario(plan, &all[place], seed + 1000)?
+        .to_builder()
+        .driver_change(Some(DriverChange {
             time_s,
             k_d: other.k_d,
             k_hg: other.k_hg,
-        }),
-        ..scenario(plan, &all[place], seed + 1000)
-    };
+        }))
+        .build()?;
     let diverged = result.diverged;
-    let readings = run(&changing, f64::INFINITY, &mut result)?;
+    let readings = run(&changing, f64::INFINITY, &mut result);
     if result.diverged == diverged {
         let estimate = readings.at(time_s + SETTLING_S).and_then(|r| r.estimate);
         let change = other.k_hg - truth.k_hg;
@@ -264,75 +267,41 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
 }
 
 /// Drives a scenario over the bus, the probe asked for in sessions of a length, and counts what was limited.
-fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Result<Readings, String> {
-    scenario.check()?;
-    let mut guidance = InSessions {
-        bus: OverBus::new(&scenario.setup()?),
-        session_s,
-    };
+fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Readings {
+    let mut simulation = Simulation::with(scenario, OverBus::new(scenario.setup()));
     let mut readings = Readings::default();
-    let centreline = Centreline::new(&scenario.course);
-    let run = drive(scenario, &centreline, &mut guidance, &mut readings);
+    loop {
+        let into_s = f64::from(simulation.steps()) * STEP_S % session_s;
+        let action = Action {
+            probe: Some(into_s < session_s - PAUSE_S),
+            ..Action::default()
+        };
+        let Some(outcome) = simulation.step(&action) else {
+            break;
+        };
+        readings.observe(&outcome);
+    }
     result.limited_steps[0] += u64::from(readings.limited_steps);
-    result.limited_steps[1] += u64::from(run.steps);
-    result.diverged += u32::from(run.diverged());
-    Ok(readings)
+    result.limited_steps[1] += u64::from(simulation.steps());
+    result.diverged += u32::from(simulation.ending() != Some(Ending::CourseEnd));
+    readings
 }
 
-fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Scenario {
+fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenario, String> {
     let driver = participant.guided;
-    let mut scenario = Scenario {
-        condition: Condition::Custom,
-        gains: gains(participant),
-        driver: DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
+    let mut guidance = GuidanceParameters::default();
+    guidance.controller.probe_amplitude_nm = plan.amplitude_nm;
+    guidance.controller.probe_frequency_hz = plan.frequency_hz;
+    let scenario = Scenario::builder()
+        .gains(driver.gains())
+        .driver(DriverParameters {
             remnant_sd_nm: REMNANT.0,
             remnant_corner_hz: REMNANT.1,
-            ..DriverParameters::default()
-        },
-        seed: u64::from(participant.number) * 10_000 + u64::from(seed),
-        ..Scenario::default()
-    };
-    scenario.guidance.controller.probe_amplitude_nm = plan.amplitude_nm;
-    scenario.guidance.controller.probe_frequency_hz = plan.frequency_hz;
-    scenario
-}
-
-fn gains(participant: &Participant) -> ArmGains {
-    let driver = participant.guided;
-    ArmGains {
-        k_d: driver.k_d,
-        k_hg: driver.k_hg.unwrap_or(0.0),
-    }
-}
-
-/// The bus, on which the host asks for the probe in sessions.
-struct InSessions {
-    bus: OverBus,
-    session_s: f64,
-}
-
-impl Guidance for InSessions {
-    fn looks_at_road(&self, step: u32) -> bool {
-        self.bus.looks_at_road(step)
-    }
-
-    fn step(&mut self, view: &View) -> Applied {
-        let into_s = f64::from(view.step) * haptic_sim::models::STEP_S % self.session_s;
-        self.bus.set_probe(into_s < self.session_s - SILENCE_S);
-        self.bus.step(view)
-    }
-
-    fn frames_in(&self) -> &[haptic_core::bus::Frame] {
-        self.bus.frames_in()
-    }
-
-    fn frames_out(&self) -> &[haptic_core::bus::Frame] {
-        self.bus.frames_out()
-    }
+            ..driver.parameters()
+        })
+        .guidance(guidance)
+        .seed(u64::from(participant.number) * 10_000 + u64::from(seed));
+    Ok(scenario.build()?)
 }
 
 impl Accuracy {

@@ -3,7 +3,7 @@
 use haptic_core::bus::messages::{Message, Telemetry};
 use serde::Serialize;
 
-use haptic_sim::closed_loop::{Cycle, Observer};
+use haptic_sim::Outcome;
 use haptic_sim::models::STEP_S;
 
 /// One report of the ECU.
@@ -26,24 +26,26 @@ pub struct Readings {
     pub limited_steps: u32,
 }
 
-impl Observer for Readings {
-    fn cycle(&mut self, cycle: &Cycle) {
-        let frame = cycle.frames_out.iter().find(|frame| frame.id() == Telemetry::ID);
+impl Readings {
+    /// Takes what came of a step.
+    pub fn observe(&mut self, outcome: &Outcome) {
+        let frame = outcome
+            .frames_out
+            .iter()
+            .find(|frame| frame.id() == Telemetry::ID);
         let data = frame.and_then(|frame| frame.data().try_into().ok());
         // The simulated bus damages nothing, so that the signals may be read without a receiver.
         if let Some(telemetry) = data.and_then(|data| Telemetry::unpack(u64::from_le_bytes(data))) {
             self.readings.push(Reading {
-                time_s: f64::from(cycle.view.step) * STEP_S,
+                time_s: f64::from(outcome.observation.step) * STEP_S,
                 probing: telemetry.probe.is_some(),
-                estimate: telemetry.reliance.map(|r| [r.k_hg.si(), r.deviation.si()]),
+                estimate: telemetry.k_hg.map(|r| [r.k_hg.si(), r.deviation.si()]),
             });
         }
         let probing = self.readings.last().is_some_and(|last| last.probing);
-        self.limited_steps += u32::from(probing && cycle.given.limited);
+        self.limited_steps += u32::from(probing && outcome.decided.limited);
     }
-}
 
-impl Readings {
     /// The last report at or before a time.
     pub fn at(&self, time_s: f64) -> Option<&Reading> {
         let next = self.readings.partition_point(|r| r.time_s <= time_s);

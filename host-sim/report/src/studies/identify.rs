@@ -5,10 +5,10 @@ use std::path::Path;
 
 use super::OutputError;
 use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Report, Section, Table, write_json};
-use crate::plot::{Axis, Figure, Line, Panel};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{History, Identification, autocorrelation};
-use haptic_batch::identify::IdentifiedDrive;
+use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
 
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
@@ -31,27 +31,29 @@ pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputErro
     for (name, figure) in &figures {
         write_figure(directory, name, figure)?;
     }
-    write_json(&directory.join("results.json"), &drive.results)?;
+    write_json(&directory.join("results.json"), &stamped(drive))?;
     write_report(directory, &report(drive, figures.map(|f| f.1)))
 }
 
-fn axis(label: &str) -> Axis {
-    Axis {
-        label: label.into(),
-        limits: None,
-    }
+/// The results as JSON holds them.
+pub fn stamped(drive: &IdentifiedDrive) -> Stamped<'_, IdentificationResults> {
+    Provenance::of(None).stamp(&drive.results)
 }
 
-fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Line {
-    Line {
-        label: label.into(),
-        style,
-        points: x.iter().copied().zip(y.iter().copied()).collect(),
+fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
+    Series::line(label, style, x.iter().copied().zip(y.iter().copied()).collect())
+}
+
+fn panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
+    Panel {
+        title: title.into(),
+        y: Axis::of(y),
+        series,
     }
 }
 
 /// A line that is broken where the rows are.
-fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Line> {
+fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Series> {
     let step = x.get(1).map_or(0.0, |second| 1.5 * (second - x[0]));
     let mut out = Vec::new();
     let mut from = 0;
@@ -68,20 +70,20 @@ fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Line> {
 fn delay_profile(found: &Identification) -> Figure {
     let profile = &found.delay_profile;
     let (x, y): (Vec<f64>, Vec<f64>) = profile.iter().map(|&[t_p, d]| (t_p, d.min(HIGHEST))).unzip();
-    let ends = [x.first().copied().unwrap_or(0.0), x.last().copied().unwrap_or(1.0)];
+    let ends = [
+        x.first().copied().unwrap_or(0.0),
+        x.last().copied().unwrap_or(1.0),
+    ];
+    let series = vec![line("profile", 0, &x, &y), line("95 %", 1, &ends, &[3.84, 3.84])];
     over(
         "t_p (s)",
-        vec![Panel {
-            title: String::new(),
-            y: axis("-2 log likelihood above the optimum"),
-            lines: vec![line("profile", 0, &x, &y), line("95 %", 2, &ends, &[3.84, 3.84])],
-        }],
+        vec![panel("", "-2 log likelihood above the optimum", series)],
     )
 }
 
 fn over(x: &str, panels: Vec<Panel>) -> Figure {
     Figure {
-        x: axis(x),
+        x: Axis::of(x),
         panels,
         ..Figure::default()
     }
@@ -89,35 +91,21 @@ fn over(x: &str, panels: Vec<Panel>) -> Figure {
 
 fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
-    let mut lines = pieces("measured", 0, &t.time_s, &t.measured_nm);
-    lines.extend(pieces("simulated", 1, &t.time_s, &t.simulated_nm));
-    // What was left out, on the zero line, by its reason.
+    let mut series = pieces("measured", 0, &t.time_s, &t.measured_nm);
+    series.extend(pieces("simulated", 3, &t.time_s, &t.simulated_nm));
+    // What was left out, on the zero line, with its reason.
     for l in found.preflight.iter().flat_map(|p| &p.left_out) {
-        lines.push(line(&format!("left out: {}", l.reason), 2, &[l.from_s, l.to_s], &[0.0, 0.0]));
+        let label = format!("left out: {}", l.reason);
+        series.push(line(&label, 1, &[l.from_s, l.to_s], &[0.0, 0.0]));
     }
-    over(
-        "Time (s)",
-        vec![Panel {
-            title: String::new(),
-            y: axis("Driver torque (N.m)"),
-            lines,
-        }],
-    )
+    over("Time (s)", vec![panel("", "Driver torque (N.m)", series)])
 }
 
 fn residuals(found: &Identification) -> Figure {
     let t = &found.traces;
-    let unexplained: Vec<f64> = t
-        .measured_nm
-        .iter()
-        .zip(&t.simulated_nm)
-        .map(|(y, m)| y - m)
-        .collect();
-    let panel = |title: &str, y: &[f64]| Panel {
-        title: title.into(),
-        y: axis("(N.m)"),
-        lines: vec![line("", 0, &t.time_s, y)],
-    };
+    let both = t.measured_nm.iter().zip(&t.simulated_nm);
+    let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
+    let panel = |title: &str, y: &[f64]| panel(title, "(N.m)", vec![line("", 1, &t.time_s, y)]);
     over(
         "Time (s)",
         vec![
@@ -130,43 +118,25 @@ fn residuals(found: &Identification) -> Figure {
 fn correlogram(found: &Identification) -> Figure {
     let r = autocorrelation(&found.traces.residual_nm, LAGS);
     let bound = 1.96 / (found.rows as f64).sqrt();
-    let lags: Vec<f64> = (1..=r.len()).map(|k| k as f64).collect();
-    let level = |label: &str, v: f64| line(label, 2, &[1.0, r.len() as f64], &[v, v]);
-    let lines = vec![
-        line("", 0, &lags, &r),
-        level("95 % if white", bound),
-        level("95 % if white", -bound),
+    let last = r.len() as f64;
+    let stems = (1..=r.len()).map(|k| k as f64).zip(r).collect();
+    let series = vec![
+        Series::interval("95 % if white", 5, &[0.5, last + 0.5], &[[-bound, bound]; 2]),
+        Series::with_mark("", 0, Mark::Stems, stems),
     ];
-    over(
-        "Lag (samples)",
-        vec![Panel {
-            title: String::new(),
-            y: axis("Autocorrelation"),
-            lines,
-        }],
-    )
+    over("Lag (samples)", vec![panel("", "Autocorrelation", series)])
 }
 
 fn over_time(drive: &IdentifiedDrive) -> Figure {
     let t = &drive.tracking;
     let panel = |title: &str, unit: &str, h: &History| {
-        let band = |sign: f64| -> Vec<f64> {
-            h.estimate
-                .iter()
-                .zip(&h.standard_deviation)
-                .map(|(e, s)| e + sign * 2.0 * s)
-                .collect()
-        };
-        let lines = vec![
-            line("two standard deviations", 2, &t.time_s, &band(-1.0)),
-            line("two standard deviations", 2, &t.time_s, &band(1.0)),
-            line("estimate", 0, &t.time_s, &h.estimate),
+        let both = h.estimate.iter().zip(&h.standard_deviation);
+        let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
+        let series = vec![
+            Series::interval("two standard deviations", 5, &t.time_s, &ends),
+            line("estimate", 1, &t.time_s, &h.estimate),
         ];
-        Panel {
-            title: title.into(),
-            y: axis(unit),
-            lines,
-        }
+        panel(title, unit, series)
     };
     over(
         "Time (s)",
@@ -187,22 +157,16 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
         figure,
         caption: caption.into(),
     };
-    let mut verdict: Vec<Block> = Vec::new();
-    for r in &found.refuted {
-        verdict.push(Block::Text(format!(
-            "Refuted: {}, because {}. Likeliest cause: {}. Cure: {}.",
-            r.assumption, r.evidence, r.cause, r.cure
-        )));
-    }
+    let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
     verdict.push(Block::Table(parameters(found)));
     verdict.push(figure(
         delay_profile,
         "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
     ));
     if !found.assumed.is_empty() {
+        let assumed = found.assumed.join("; ");
         verdict.push(Block::Text(format!(
-            "Assumed, for the log cannot show it: {}.",
-            found.assumed.join("; ")
+            "Assumed, for the log cannot show it: {assumed}."
         )));
     }
     verdict.extend(found.notes.iter().cloned().map(Block::Text));
@@ -210,18 +174,13 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
         verdict.push(Block::Table(combinations(found)));
     }
     verdict.push(Block::Table(correlation(found)));
-    let mut sections = Vec::new();
-    if let Some(preflight) = &found.preflight {
-        let rows = preflight.findings().into_iter().map(|row| row.map(Cell::Text).to_vec());
-        sections.push(Section {
+    let mut sections: Vec<Section> = in_the_log(found)
+        .map(|table| Section {
             heading: "In the log".into(),
-            blocks: vec![Block::Table(Table {
-                caption: "What was found in the log, and what was done about it.".into(),
-                columns: ["", "Found", "Done"].map(String::from).to_vec(),
-                rows: rows.collect(),
-            })],
-        });
-    }
+            blocks: vec![Block::Table(table)],
+        })
+        .into_iter()
+        .collect();
     sections.extend([
         Section {
             heading: "Parameters".into(),
@@ -256,25 +215,10 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
             )],
         },
     ]);
-    if let Some(again) = &drive.results.drives_again {
-        let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4}"));
-        let pairs = [
-            (
-                "peak lateral error (m)",
-                number(again.metrics.peak_lateral_error_m),
-            ),
-            (
-                "mean absolute lateral error (m)",
-                number(again.metrics.mean_abs_lateral_error_m),
-            ),
-            (
-                "left the road",
-                if again.diverged { "yes".into() } else { "no".into() },
-            ),
-        ];
+    if let Some(again) = drives_again(drive) {
         sections.push(Section {
             heading: "The identified driver on the course".into(),
-            blocks: vec![Block::Table(Table::of_pairs(["", ""], pairs))],
+            blocks: vec![Block::Table(again)],
         });
     }
     Report {
@@ -284,33 +228,85 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
             found.method, found.rows, found.fit_percent
         ),
         sections,
+        provenance: Some(Provenance::of(None)),
     }
+}
+
+/// What was found in the log and done about it.
+pub fn in_the_log(found: &Identification) -> Option<Table> {
+    let rows = found.preflight.as_ref()?.findings().into_iter();
+    Some(Table {
+        caption: "What was found in the log, and what was done about it.".into(),
+        columns: ["In the log", "Found", "Done"].map(String::from).to_vec(),
+        rows: rows.map(|row| row.map(Cell::Text).to_vec()).collect(),
+    })
+}
+
+/// What the record refutes, a sentence each.
+pub fn refutations(found: &Identification) -> Vec<String> {
+    let sentence = |r: &haptic_analysis::identify::Refutation| {
+        format!(
+            "Refuted: {}. Evidence: {}. Likeliest cause: {}. Cure: {}.",
+            r.assumption, r.evidence, r.cause, r.cure
+        )
+    };
+    found.refuted.iter().map(sentence).collect()
+}
+
+/// How the identified driver drives a course, if asked.
+pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
+    let again = drive.results.drives_again.as_ref()?;
+    let left_road = if again.diverged { "yes" } else { "no" };
+    let row = |name: &str, cell| vec![Cell::Text(name.into()), cell];
+    Some(Table {
+        caption: "The identified driver on the course.".into(),
+        columns: vec![String::new(); 2],
+        rows: vec![
+            row(
+                "peak lateral error (m)",
+                number(again.metrics.peak_lateral_error_m),
+            ),
+            row(
+                "mean absolute lateral error (m)",
+                number(again.metrics.mean_abs_lateral_error_m),
+            ),
+            row("left the road", Cell::Text(left_road.into())),
+        ],
+    })
 }
 
 fn number(value: Option<f64>) -> Cell {
     Cell::Number { value, decimals: 4 }
 }
 
-fn parameters(found: &Identification) -> Table {
-    let rows = found.parameters.list().into_iter().map(|(name, unit, p)| {
-        let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
-        let verdict = match (p.fixed, p.identified, p.on_bound) {
-            (true, ..) => "given",
-            (_, true, true) => "identified, on a bound",
-            (_, true, false) => "identified",
-            (_, false, true) => "not identified, on a bound",
-            (_, false, false) => "not identified",
-        };
-        vec![
-            Cell::Text(name.into()),
-            Cell::Text(unit.into()),
-            number(p.estimate),
-            number(p.standard_error),
-            number(low),
-            number(high),
-            Cell::Text(verdict.into()),
-        ]
-    });
+/// Every parameter with its interval and verdict.
+pub fn parameters(found: &Identification) -> Table {
+    let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
+    let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
+    let rows = found
+        .parameters
+        .list()
+        .into_iter()
+        .chain(beyond)
+        .map(|(name, unit, p)| {
+            let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
+            let verdict = match (p.fixed, p.identified, p.on_bound) {
+                (true, ..) => "given",
+                (_, true, true) => "identified, on a bound",
+                (_, true, false) => "identified",
+                (_, false, true) => "not identified, on a bound",
+                (_, false, false) => "not identified",
+            };
+            vec![
+                Cell::Text(name.into()),
+                Cell::Text(unit.into()),
+                number(p.estimate),
+                number(p.standard_error),
+                number(low),
+                number(high),
+                Cell::Text(verdict.into()),
+            ]
+        });
     Table {
         caption: "An estimate is given only where the data identify the parameter.".into(),
         columns: [
@@ -328,7 +324,8 @@ fn parameters(found: &Identification) -> Table {
     }
 }
 
-fn combinations(found: &Identification) -> Table {
+/// What the data determine where they do not determine each parameter.
+pub fn combinations(found: &Identification) -> Table {
     let row = |c: &haptic_analysis::identify::Combination| {
         vec![
             Cell::Text(c.name.clone()),
@@ -345,7 +342,8 @@ fn combinations(found: &Identification) -> Table {
     }
 }
 
-fn correlation(found: &Identification) -> Table {
+/// Correlation of the errors.
+pub fn correlation(found: &Identification) -> Table {
     let names = &found.correlation.names;
     let row = |(name, values): (&&str, &Vec<Option<f64>>)| {
         let mut cells = vec![Cell::Text((*name).into())];
@@ -361,7 +359,8 @@ fn correlation(found: &Identification) -> Table {
     }
 }
 
-fn facts(found: &Identification) -> Vec<(String, String)> {
+/// What else is known of the fit, name and value.
+pub fn facts(found: &Identification) -> Vec<(String, String)> {
     let mut facts = vec![(
         "Fit of the torque".to_owned(),
         format!("{:.2} %", found.fit_percent),
@@ -404,7 +403,8 @@ fn facts(found: &Identification) -> Vec<(String, String)> {
     facts
 }
 
-fn input_tests(found: &Identification) -> Table {
+/// Whether the residuals are free of the inputs.
+pub fn input_tests(found: &Identification) -> Table {
     let row = |test: &haptic_analysis::identify::InputCorrelation| {
         let verdict = if test.independent {
             "independent"

@@ -6,26 +6,27 @@ use super::files::{write_figure, write_report};
 use super::reliance::panel as reliance_panel;
 use super::{OutputError, curves, notes};
 use crate::document::{
-    Block, Report, Section, Table, definitions_table, write_file, write_json, write_trace_csv,
+    Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, write_file,
+    write_json, write_trace,
 };
-use crate::plot::{Axis, Figure, Line, Marker, Panel};
-use haptic_analysis::metrics::DEFINITIONS;
-use haptic_batch::run::SingleRun;
+use crate::plot::{Axis, Figure, Marker, Panel, Series};
+use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::Event;
 use haptic_log::trace::Sample;
-use haptic_sim::closed_loop::Ending;
 use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
+use haptic_sim::simulation::Ending;
 
-/// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON), a report (HTML), and the bus if it was
-/// recorded (as `candump -L` does).
+/// Writes a figure (SVG, PNG), the results (JSON), a report (HTML), the time series if they are asked for, and the bus
+/// if it was recorded (as `candump -L` does).
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
+pub fn write(single: &SingleRun, series: SeriesFormat, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(single);
     write_figure(directory, "run", &figure)?;
-    write_trace_csv(&directory.join("run.csv"), &single.run.trace)?;
-    write_json(&directory.join("results.json"), &single.results)?;
+    write_trace(directory, "run", &single.run.trace, series)?;
+    write_json(&directory.join("results.json"), &stamped(single))?;
     write_report(directory, &report(single, figure))?;
     if !single.bus.is_empty() {
         write_file(&directory.join("bus.log"), |f| {
@@ -42,41 +43,65 @@ pub fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
+/// The results as JSON holds them, with the scenario.
+pub fn stamped(single: &SingleRun) -> Stamped<'_, SingleResults> {
+    provenance(single).stamp(&single.results)
+}
+
+fn provenance(single: &SingleRun) -> Provenance {
+    Provenance::of(Some(single.scenario.to_toml()))
+}
+
+/// Every metric of the run, and what the ECU read of K_hg.
+pub fn table(results: &SingleResults) -> Table {
+    let metric = |d: &Definition| {
+        let value = (d.value)(&results.record.metrics);
+        vec![
+            Cell::Text(d.label.into()),
+            Cell::Number { value, decimals: 4 },
+            Cell::Text(d.unit.into()),
+        ]
+    };
+    let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
+    if let Some([k_hg, deviation]) = results.k_hg {
+        let name = Cell::Text("K_hg, as the ECU reads it".into());
+        rows.push(vec![
+            name,
+            Cell::number(k_hg, 4),
+            Cell::Text(format!("+- {deviation:.4}")),
+        ]);
+    }
+    Table {
+        caption: String::new(),
+        columns: ["Metric", "Value", "Unit"].map(String::from).to_vec(),
+        rows,
+    }
+}
+
 fn figure(single: &SingleRun) -> Figure {
     let samples = &single.run.trace.samples;
-    let line = |label: &str, style, value: fn(&Sample) -> f64| Line {
-        label: label.into(),
-        style,
-        points: samples.iter().map(|s| (s.s_m, value(s))).collect(),
-    };
-    let panel = |label: &str, lines| Panel {
+    let panel = |label: &str, value: fn(&Sample) -> f64| Panel {
         title: String::new(),
-        y: Axis {
-            label: label.into(),
-            limits: None,
-        },
-        lines,
+        y: Axis::of(label),
+        series: vec![Series::line(
+            "",
+            1,
+            samples.iter().map(|s| (s.s_m, value(s))).collect(),
+        )],
     };
     let failed = single
         .scenario
-        .failure
+        .failure()
         .at_s()
         .and_then(|t| samples.iter().find(|s| s.time_s >= t));
+    // Each torque for itself: the probe would hide the driver's.
     let mut panels = vec![
-        panel("Lateral error (m)", vec![line("", 0, |s| s.lateral_error_m)]),
-        panel(
-            "Wheel angle (deg)",
-            vec![line("", 0, |s| s.wheel_angle_rad.to_degrees())],
-        ),
-        panel(
-            "Torque (N.m)",
-            vec![
-                line("driver", 0, |s| s.driver_torque_nm),
-                line("guidance", 1, |s| s.guidance_torque_nm),
-            ],
-        ),
+        panel("Lateral error (m)", |s| s.lateral_error_m),
+        panel("Wheel angle (deg)", |s| s.wheel_angle_rad.to_degrees()),
+        panel("Driver torque (N.m)", |s| s.driver_torque_nm),
+        panel("Guidance torque (N.m)", |s| s.guidance_torque_nm),
     ];
-    if single.scenario.guidance.probe {
+    if single.scenario.guidance().probe {
         let place = |time_s: f64| {
             let next = samples.partition_point(|s| s.time_s < time_s);
             samples.get(next).or(samples.last()).map_or(0.0, |s| s.s_m)
@@ -93,12 +118,7 @@ fn figure(single: &SingleRun) -> Figure {
         ));
     }
     Figure {
-        title: String::new(),
-        x: Axis {
-            label: "Distance along the road (m)".into(),
-            limits: None,
-        },
-        same_y: false,
+        x: Axis::of("Distance along the road (m)"),
         panels,
         markers: failed
             .map(|s| Marker {
@@ -107,7 +127,8 @@ fn figure(single: &SingleRun) -> Figure {
             })
             .into_iter()
             .collect(),
-        bands: curves::bands(&single.scenario.course),
+        bands: curves::bands(single.scenario.course()),
+        ..Figure::default()
     }
 }
 
@@ -115,9 +136,9 @@ fn figure(single: &SingleRun) -> Figure {
 fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
     let scenario = &single.scenario;
     let last_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
-    let end_s = scenario.failure.at_s().map_or(last_s, |t| t.min(last_s));
-    let start = scenario.gains.k_hg;
-    match &scenario.driver_change {
+    let end_s = scenario.failure().at_s().map_or(last_s, |t| t.min(last_s));
+    let start = scenario.gains().k_hg;
+    match &scenario.driver_change() {
         Some(change) if change.time_s < end_s => {
             let t = change.time_s;
             vec![(0.0, start), (t, start), (t, change.k_hg), (end_s, change.k_hg)]
@@ -127,23 +148,18 @@ fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
 }
 
 fn report(single: &SingleRun, figure: Figure) -> Report {
-    let (scenario, record) = (&single.scenario, &single.results.record);
-    let metrics = DEFINITIONS.iter().map(|d| {
-        let value = (d.value)(&record.metrics).map_or("-".into(), |value| format!("{value:.4}"));
-        let unit = if d.unit == "1" { "" } else { d.unit };
-        (d.label, format!("{value} {unit}"))
-    });
+    let scenario = &single.scenario;
     let [from, to] = single.results.window_m;
     Report {
         title: "A run under shared steering control".into(),
         summary: format!(
             "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
-            scenario.course.name(),
-            scenario.speed_kmh,
-            scenario.driver.t_p,
-            scenario.gains.k_d,
-            scenario.gains.k_hg,
-            scenario.condition,
+            scenario.course().name(),
+            scenario.speed_kmh(),
+            scenario.driver().t_p,
+            scenario.gains().k_d,
+            scenario.gains().k_hg,
+            scenario.condition(),
             notes(&single.results.notes),
         ),
         sections: vec![
@@ -152,7 +168,7 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
                 blocks: vec![
                     Block::Figure {
                         figure,
-                        caption: if single.scenario.guidance.probe {
+                        caption: if single.scenario.guidance().probe {
                             "Lateral error, wheel angle, torques, and what the ECU says of K_hg.".into()
                         } else {
                             "Lateral error, wheel angle and torques.".into()
@@ -164,19 +180,20 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
             Section {
                 heading: "Metrics".into(),
                 blocks: vec![
-                    Block::Table(Table::of_pairs(["Metric", "Value"], metrics)),
+                    Block::Table(table(&single.results)),
                     Block::Table(definitions_table()),
                 ],
             },
         ],
+        provenance: Some(provenance(single)),
     }
 }
 
 fn events(single: &SingleRun) -> Vec<Event> {
     let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
     let mut events = single.reported.clone();
-    if let Some(time_s) = single.scenario.failure.at_s().filter(|t| *t <= end_s) {
-        let what = match single.scenario.failure.kind {
+    if let Some(time_s) = single.scenario.failure().at_s().filter(|t| *t <= end_s) {
+        let what = match single.scenario.failure().kind {
             FailureKind::Input => "The lane preview stops",
             FailureKind::Torque | FailureKind::None => "The guidance torque drops to zero",
         };

@@ -1,20 +1,19 @@
 //! The shipping controller without its bus: full resolution every step, so that what is seen is the law and
 //! the envelope alone.
 
+use haptic_core::config::Setup;
 use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Request};
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
-use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Speed, Torque};
 
-use super::{Applied, Guidance, View, is_limited};
+use super::{Actuation, Guidance, Observation, is_limited};
 
 /// The shipping controller, fed directly and active from the start.
 #[derive(Debug, Clone)]
 pub struct Direct {
     controller: Controller,
     state: ControllerState,
-    probe: bool,
 }
 
 impl Direct {
@@ -23,13 +22,7 @@ impl Direct {
         Self {
             controller: Controller::new(setup.config),
             state: ControllerState::engaged(Instant::from_us(0)),
-            probe: false,
         }
-    }
-
-    /// Whether the host asks for the probe from now on. At first it does not.
-    pub fn set_probe(&mut self, probe: bool) {
-        self.probe = probe;
     }
 }
 
@@ -39,10 +32,10 @@ impl Guidance for Direct {
     }
 
     #[inline]
-    fn step(&mut self, view: &View) -> Applied {
-        let now = view.now();
+    fn step(&mut self, observation: &Observation) -> Actuation {
+        let now = observation.now();
         let inputs = Inputs {
-            lane: view.lane.map_or(Input::Lost, |errors| {
+            lane: observation.lane.map_or(Input::Lost, |errors| {
                 Input::New(LaneSample {
                     e_y: Metres::from_m(errors.e_y_m),
                     e_theta: Radians::from_rad(errors.e_theta_rad),
@@ -50,20 +43,20 @@ impl Guidance for Direct {
                 })
             }),
             column: Input::New(Column {
-                driver_torque: Torque::from_nm(view.driver_torque_nm),
-                wheel_angle: Radians::from_rad(view.wheel_angle_rad),
+                driver_torque: Torque::from_nm(observation.driver_torque_nm),
+                wheel_angle: Radians::from_rad(observation.wheel_angle_rad),
             }),
-            speeds: Input::New([Speed::from_mps(view.speed_mps); 2]),
+            speeds: Input::New([Speed::from_m_per_s(observation.speed_m_per_s); 2]),
             request: Input::New(Request {
-                engage: 1,
-                authority: Gain::ONE,
-                probe: self.probe.into(),
+                engage: observation.request.engage,
+                authority: Ratio::from_si(observation.request.authority),
+                probe: observation.request.probe,
             }),
             faults: FaultSet::NONE,
         };
-        let applied = Torque::from_nm(view.motor_torque_nm);
+        let applied = Torque::from_nm(observation.motor_torque_nm);
         let command = self.controller.step(&mut self.state, now, applied, &inputs);
-        Applied {
+        Actuation {
             torque_nm: command.torque.nm(),
             limited: is_limited(command.limit),
         }

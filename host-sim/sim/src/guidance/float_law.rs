@@ -1,7 +1,7 @@
 //! Equation (9) in float64: the lane errors every millisecond at full
 //! resolution, rates by backward difference, limited to +-5 N.m. A reference for tests, never shipped.
 
-use super::{Applied, Guidance, LaneErrors, View};
+use super::{Actuation, Guidance, LaneErrors, Observation};
 use crate::models::STEP_S;
 use haptic_core::params::Params;
 
@@ -24,9 +24,9 @@ impl Guidance for FloatLaw {
         true
     }
 
-    fn step(&mut self, view: &View) -> Applied {
-        let Some(now) = view.lane else {
-            return Applied::default();
+    fn step(&mut self, observation: &Observation) -> Actuation {
+        let Some(now) = observation.lane else {
+            return Actuation::default();
         };
         let before = self.last.replace(now).unwrap_or(now);
         let Params {
@@ -41,7 +41,7 @@ impl Guidance for FloatLaw {
         let e_y_rate = (now.e_y_m - before.e_y_m) / STEP_S;
         let e_theta_rate = (now.e_theta_rad - before.e_theta_rad) / STEP_S;
         let wanted = k_1 * (a_1 * now.e_y_m + a_2 * e_y_rate + a_3 * now.e_theta_rad + a_4 * e_theta_rate);
-        Applied {
+        Actuation {
             torque_nm: wanted.clamp(-limit, limit),
             limited: wanted.abs() > limit,
         }

@@ -1,12 +1,15 @@
-//! Who gives the guidance torque in a closed loop: the seat that a controller takes.
+//! Who gives the guidance torque in a closed loop.
 //!
 //! - [`OverBus`]: the shipping ECU behind its bus frames, with the paper's sensors.
 //! - [`Direct`]: the shipping controller, fed past the bus with full resolution every step.
 //! - [`FloatLaw`]: a float64 evaluation of equation (9), the reference that the others are held against.
 //! - [`NoGuidance`]: manual driving.
 //!
+//! [`AnyGuidance`] is one of the first two or none, as a scenario names it.
+//!
 //! Not here: the failure of the guidance; the loop takes the torque or the lane errors away, whoever gives it.
 
+mod any;
 mod direct;
 mod float_law;
 mod over_bus;
@@ -15,6 +18,9 @@ use haptic_core::bus::Frame;
 use haptic_core::envelope::LimitReason;
 use haptic_core::quantity::Instant;
 
+use crate::action::Request;
+
+pub use any::AnyGuidance;
 pub use direct::Direct;
 pub use float_law::FloatLaw;
 pub use over_bus::OverBus;
@@ -30,7 +36,7 @@ pub struct LaneErrors {
 
 /// What a guidance may look at in one step: the truth, before any sensor.
 #[derive(Debug, Clone, Copy)]
-pub struct View {
+pub struct Observation {
     /// Number of the step; one is 1 ms.
     pub step: u32,
     /// The lane errors, in steps in which the guidance looks at the road.
@@ -42,10 +48,12 @@ pub struct View {
     /// Guidance torque really applied since the last step, N.m.
     pub motor_torque_nm: f64,
     /// Speed, m/s.
-    pub speed_mps: f64,
+    pub speed_m_per_s: f64,
+    /// What the host asks for.
+    pub request: Request,
 }
 
-impl View {
+impl Observation {
     /// The ECU's clock at this step, from zero at the start; it wraps every 71.6 minutes, as the real one does.
     pub fn now(&self) -> Instant {
         Instant::from_us(self.step.wrapping_mul(1000))
@@ -54,7 +62,7 @@ impl View {
 
 /// The torque that a guidance applies until the next step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Applied {
+pub struct Actuation {
     /// T_h, N.m.
     pub torque_nm: f64,
     /// Whether a limit held it back.
@@ -66,19 +74,13 @@ fn is_limited(reason: LimitReason) -> bool {
     !matches!(reason, LimitReason::None | LimitReason::Mode)
 }
 
-/// The seat of the controller.
+/// A controller in the loop.
 pub trait Guidance {
     /// Whether the lane errors are asked for at this step.
     fn looks_at_road(&self, step: u32) -> bool;
 
     /// One step of 1 ms.
-    fn step(&mut self, view: &View) -> Applied;
-
-    /// Torque on the wheel beyond what the driver's model gives (`arm_torque_nm`), N.m: only a fault campaign
-    /// has a hand that jerks it.
-    fn hand_torque_nm(&mut self, _step: u32, _arm_torque_nm: f64) -> f64 {
-        0.0
-    }
+    fn step(&mut self, observation: &Observation) -> Actuation;
 
     /// The frames that went to the ECU in the last step, in order of sending.
     fn frames_in(&self) -> &[Frame] {
@@ -100,7 +102,7 @@ impl Guidance for NoGuidance {
         false
     }
 
-    fn step(&mut self, _view: &View) -> Applied {
-        Applied::default()
+    fn step(&mut self, _view: &Observation) -> Actuation {
+        Actuation::default()
     }
 }

@@ -9,12 +9,12 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
     Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Vehicle,
 };
+use haptic_core::config::Setup;
 use haptic_core::ecu::Ecu;
-use haptic_core::params::Setup;
-use haptic_core::quantity::{Gain, Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 use heapless::Vec;
 
-use super::{Applied, Guidance, View, is_limited};
+use super::{Actuation, Guidance, Observation, is_limited};
 use crate::models::sensors;
 
 /// The column's sensors send every 2 ms.
@@ -31,12 +31,11 @@ const MAX_ANSWERS: usize = 4;
 #[derive(Debug, Clone)]
 pub struct OverBus {
     ecu: Ecu,
-    probe: bool,
     lane_counter: u8,
     sent: Vec<Frame, MAX_FRAMES>,
     answers: Vec<Frame, MAX_ANSWERS>,
     actuator: ReceiverState,
-    applied: Applied,
+    applied: Actuation,
 }
 
 impl OverBus {
@@ -44,25 +43,19 @@ impl OverBus {
     pub fn new(setup: &Setup) -> Self {
         Self {
             ecu: Ecu::engaged(setup, Instant::from_us(0)),
-            probe: false,
             lane_counter: 0,
             sent: Vec::new(),
             answers: Vec::new(),
             actuator: ReceiverState::TRUSTED,
-            applied: Applied::default(),
+            applied: Actuation::default(),
         }
     }
 
-    /// Whether the host asks for the probe from now on. At first it does not.
-    pub fn set_probe(&mut self, probe: bool) {
-        self.probe = probe;
-    }
-
     /// The frames that the senders put on the bus in this step.
-    fn send(&mut self, view: &View) {
+    fn send(&mut self, observation: &Observation) {
         self.sent.clear();
         // MAX_FRAMES has a place for each of the four, so no push fails.
-        if let Some(errors) = view.lane {
+        if let Some(errors) = observation.lane {
             let preview = LanePreview {
                 e_y: Metres::from_m(errors.e_y_m),
                 e_theta: Radians::from_rad(errors.e_theta_rad),
@@ -72,26 +65,26 @@ impl OverBus {
             let _ = self.sent.push(preview.encode(self.lane_counter));
             self.lane_counter = self.lane_counter.wrapping_add(1);
         }
-        if view.step.is_multiple_of(COLUMN_PERIOD_STEPS) {
+        if observation.step.is_multiple_of(COLUMN_PERIOD_STEPS) {
             let column = Column {
-                driver_torque: Torque::from_nm(sensors::torque_nm(view.driver_torque_nm)),
-                wheel_angle: Radians::from_rad(sensors::wheel_angle_rad(view.wheel_angle_rad)),
-                motor_torque: Torque::from_nm(view.motor_torque_nm),
+                driver_torque: Torque::from_nm(sensors::torque_nm(observation.driver_torque_nm)),
+                wheel_angle: Radians::from_rad(sensors::wheel_angle_rad(observation.wheel_angle_rad)),
+                motor_torque: Torque::from_nm(observation.motor_torque_nm),
             };
             let _ = self
                 .sent
-                .push(column.encode((view.step / COLUMN_PERIOD_STEPS) as u8));
+                .push(column.encode((observation.step / COLUMN_PERIOD_STEPS) as u8));
         }
-        if view.step.is_multiple_of(HOST_PERIOD_STEPS) {
-            let counter = (view.step / HOST_PERIOD_STEPS) as u8;
+        if observation.step.is_multiple_of(HOST_PERIOD_STEPS) {
+            let counter = (observation.step / HOST_PERIOD_STEPS) as u8;
             let vehicle = Vehicle {
-                speeds: [Speed::from_mps(view.speed_mps); 2],
+                speeds: [Speed::from_m_per_s(observation.speed_m_per_s); 2],
             };
             let _ = self.sent.push(vehicle.encode(counter));
             let demand = Demand {
-                engage: true,
-                authority: Gain::ONE,
-                probe: self.probe,
+                engage: observation.request.engage,
+                authority: Ratio::from_si(observation.request.authority),
+                probe: observation.request.probe,
             };
             let _ = self.sent.push(demand.encode(counter));
         }
@@ -104,9 +97,9 @@ impl Guidance for OverBus {
     }
 
     #[inline]
-    fn step(&mut self, view: &View) -> Applied {
-        let now = view.now();
-        self.send(view);
+    fn step(&mut self, observation: &Observation) -> Actuation {
+        let now = observation.now();
+        self.send(observation);
         for frame in &self.sent {
             // The ECU judges by itself, keeps the last good frame and reports what it misses.
             let _ = self.ecu.receive(frame, now);
@@ -116,9 +109,9 @@ impl Guidance for OverBus {
         // MAX_ANSWERS has a place for each.
         let _ = self.answers.push(step.guidance);
         let _ = self.answers.extend_from_slice(&step.others);
-        self.answers.extend(self.ecu.advise());
+        self.answers.extend(self.ecu.background_step());
         if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &step.guidance) {
-            self.applied = Applied {
+            self.applied = Actuation {
                 torque_nm: guidance.torque.nm(),
                 limited: is_limited(guidance.limit),
             };

@@ -67,7 +67,12 @@ pub struct Plant {
 
 impl Transition {
     /// The exact step of `STEP_S` at a constant speed.
-    pub fn new(v_mps: f64, vehicle: &VehicleParameters, driver: &DriverParameters, gains: ArmGains) -> Self {
+    pub fn new(
+        v_m_per_s: f64,
+        vehicle: &VehicleParameters,
+        driver: &DriverParameters,
+        gains: ArmGains,
+    ) -> Self {
         let VehicleParameters {
             m,
             i,
@@ -80,7 +85,7 @@ impl Transition {
             k_t,
             ..
         } = *vehicle;
-        let v = v_mps;
+        let v = v_m_per_s;
         let k_aln = vehicle.aligning_stiffness();
         let moment = l_f * k_f - l_r * k_r;
         // Rows and columns: the six states, then target angle, its slope, guidance torque, remnant. The target

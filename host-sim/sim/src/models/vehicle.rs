@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::input::in_range;
+use crate::input::{RangeError, in_range};
 
 /// Table 9, SI units. Every value has to be positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -72,7 +72,7 @@ impl VehicleParameters {
     ///
     /// # Errors
     /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), RangeError> {
         in_range("m", self.m, 100.0..=50_000.0, "kg")?;
         in_range("I", self.i, 100.0..=500_000.0, "kg.m^2")?;
         in_range("l_f", self.l_f, 0.1..=10.0, "m")?;

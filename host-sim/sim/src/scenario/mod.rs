@@ -2,9 +2,10 @@
 //!
 //! Fields bear the paper's symbols; defaults are tables 7 to 9. Terms: *condition*, how much the driver relies
 //! on the guidance (section 5.1): a name for a pair of arm gains, or manual driving. *Failure*: the guidance
-//! torque drops to zero, or its lane preview stops; the driver keeps his gains for one more second before he
+//! torque drops to zero, or its lane preview stops; the driver keeps the gains for one more second and then
 //! drives as manually.
 
+mod builder;
 mod file;
 mod names;
 #[cfg(test)]
@@ -12,8 +13,11 @@ mod tests;
 
 use std::fmt;
 
-use haptic_core::params::{Params, Setup, VehicleParams};
+use haptic_core::config::Setup;
+use haptic_core::params::{Params, VehicleParams};
 use serde::{Deserialize, Serialize};
+
+pub use builder::{ScenarioBuilder, ScenarioError};
 
 use crate::input::{InputError, in_range};
 use crate::models::driver::{ArmGains, DriverParameters};
@@ -187,40 +191,37 @@ impl Default for GuidanceParameters {
     }
 }
 
-/// Everything that decides a run. Checked: whoever holds one may simulate it.
-#[derive(Debug, Clone, PartialEq)]
+/// Everything that decides a run, checked: whoever holds one may simulate it. Made by a [`ScenarioBuilder`] or from
+/// the text of a file.
+#[derive(Debug, Clone)]
 pub struct Scenario {
-    /// The road.
-    pub course: Course,
-    /// Constant speed, km/h.
-    pub speed_kmh: f64,
-    /// How the driver drives; follows from `gains` and from whether there is guidance.
-    pub condition: Condition,
-    /// The driver's vision, delay, arm and remnant.
-    pub driver: DriverParameters,
-    /// How the driver's arm weighs vision against guidance, until a failure is noticed.
-    pub gains: ArmGains,
-    /// The vehicle.
-    pub vehicle: VehicleParameters,
-    /// The guidance.
-    pub guidance: GuidanceParameters,
-    /// What the controller sees.
-    pub sensors: Sensors,
-    /// What fails.
-    pub failure: Failure,
-    /// When the driver changes how he weighs vision against guidance, if he does.
-    pub driver_change: Option<DriverChange>,
-    /// Seed of the remnant's noise.
-    pub seed: u64,
+    values: Values,
+    /// Follows from the values.
+    setup: Setup,
 }
 
-impl Default for Scenario {
-    /// Driver 1 with medium reliance on the evaluation's course, tables 7 to 9.
+/// The values that a person chooses.
+#[derive(Debug, Clone, PartialEq)]
+struct Values {
+    course: Course,
+    speed_kmh: f64,
+    manual: bool,
+    driver: DriverParameters,
+    gains: ArmGains,
+    vehicle: VehicleParameters,
+    guidance: GuidanceParameters,
+    sensors: Sensors,
+    failure: Failure,
+    driver_change: Option<DriverChange>,
+    seed: u64,
+}
+
+impl Default for Values {
     fn default() -> Self {
         Self {
             course: Course::paper(),
             speed_kmh: DEFAULT_SPEED_KMH,
-            condition: Condition::Mid,
+            manual: false,
             driver: DriverParameters::default(),
             gains: Condition::Mid.gains(),
             vehicle: VehicleParameters::default(),
@@ -233,67 +234,64 @@ impl Default for Scenario {
     }
 }
 
+impl PartialEq for Scenario {
+    fn eq(&self, other: &Self) -> bool {
+        self.values == other.values
+    }
+}
+
+impl Default for Scenario {
+    /// Driver 1 with medium reliance on the evaluation's course, tables 7 to 9.
+    fn default() -> Self {
+        Self {
+            values: Values::default(),
+            setup: Setup::PAPER,
+        }
+    }
+}
+
 impl Scenario {
+    /// A builder that holds the defaults: tables 7 to 9.
+    pub fn builder() -> ScenarioBuilder {
+        ScenarioBuilder::default()
+    }
+
+    /// A builder that holds this scenario's values.
+    pub fn to_builder(&self) -> ScenarioBuilder {
+        ScenarioBuilder {
+            values: self.values.clone(),
+        }
+    }
+
     /// Checks the text of a scenario file; `name` stands for the file in errors, `course` opens a course by the
     /// name that the file gives it, unless that is the built-in one.
     ///
     /// # Errors
-    /// A syntax error (with its line), an unknown field (by name), a value out of range (by field, value and
-    /// range), a manual driver with something that takes guidance, a course with less than a second to drive; what
-    /// `course` says.
+    /// A syntax error (with its line), an unknown field (by name), as [`ScenarioBuilder::build`]; what `course`
+    /// says.
     pub fn from_toml(
         name: &str,
         text: &str,
         course: impl FnOnce(&str) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
-        let scenario = file::parse(name, text, course)?;
-        let checked = scenario.check().and_then(|()| scenario.check_manual());
-        checked.map_err(|e| InputError::new(name, e))?;
-        Ok(scenario)
+        let builder = file::parse(name, text, course)?;
+        builder.build().map_err(|e| InputError::new(name, e))
     }
 
-    /// Whether the scenario can be simulated.
-    ///
-    /// # Errors
-    /// The first field out of range, with its value and range; a course with less than a second to drive.
-    pub fn check(&self) -> Result<(), String> {
-        let within = |table: &'static str| move |e: String| format!("{table}.{e}");
-        in_range("speed", self.speed_kmh, SPEED_KMH, "km/h")?;
-        self.driver.check().map_err(within("driver"))?;
-        check_gains(self.gains).map_err(within("driver"))?;
-        self.vehicle.check().map_err(within("vehicle"))?;
-        in_range("t_n", self.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
-        // The controller's range: its plausibility checks divide by it.
-        in_range("t_f", self.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
-        self.setup()?;
-        in_range("time", self.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
-        if let Some(change) = &self.driver_change {
-            in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
-            check_gains(change.gains()).map_err(within("driver_change"))?;
-        }
-        if self.duration_s() < LEAST_DURATION_S {
-            return Err(format!(
-                "course {} is {:.1} m long, but at {} km/h it needs {:.1} m: {:.1} m of look-ahead ({:.2} s) and \
-                 {LEAST_DURATION_S} s to drive",
-                self.course.name(),
-                self.course.length_m(),
-                self.speed_kmh,
-                self.look_ahead_m() + self.speed_mps() * LEAST_DURATION_S,
-                self.look_ahead_m(),
-                self.longest_look_ahead_s(),
-            ));
-        }
-        Ok(())
+    /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit.
+    pub fn to_toml(&self) -> String {
+        // Only a map whose keys are no strings cannot be written, and there is none.
+        file::write(self).unwrap_or_default()
     }
 
     /// Whether what is to happen in mid-drive happens before the run ends.
     ///
     /// # Errors
     /// The field whose time is too late, with its value and range.
-    pub fn check_times(&self) -> Result<(), String> {
-        let change_s = self.driver_change.map(|change| change.time_s);
+    pub fn check_times(&self) -> Result<(), ScenarioError> {
+        let change_s = self.values.driver_change.map(|change| change.time_s);
         let times = [
-            ("failure.time", self.failure.at_s()),
+            ("failure.time", self.failure().at_s()),
             ("driver_change.time", change_s),
         ];
         for (field, time_s) in times {
@@ -308,43 +306,116 @@ impl Scenario {
     ///
     /// # Errors
     /// `field`, the value and its range.
-    pub fn check_time(&self, field: &str, time_s: f64) -> Result<(), String> {
+    pub fn check_time(&self, field: &str, time_s: f64) -> Result<(), ScenarioError> {
         // Whole tenths, for people to read.
         let end_s = (10.0 * self.duration_s()).floor() / 10.0;
-        in_range(field, time_s, 0.0..=end_s, "s").map_err(|e| format!("{e}: the run ends there"))
+        in_range(field, time_s, 0.0..=end_s, "s").map_err(ScenarioError::AfterTheEnd)
     }
 
-    /// A manual driver has no guidance that could fail, probe or be weighed.
-    fn check_manual(&self) -> Result<(), String> {
-        if self.condition != Condition::Manual {
-            return Ok(());
+    /// The road.
+    pub fn course(&self) -> &Course {
+        &self.values.course
+    }
+
+    /// Constant speed, km/h.
+    pub fn speed_kmh(&self) -> f64 {
+        self.values.speed_kmh
+    }
+
+    /// How the driver drives: follows from the gains and from whether there is guidance.
+    pub fn condition(&self) -> Condition {
+        if self.values.manual {
+            return Condition::Manual;
         }
-        let refused = |what: String| Err(format!("condition = \"manual\" has no guidance, but {what}"));
-        if self.failure.kind != FailureKind::None {
-            return refused(format!("failure.kind = \"{}\"; leave it out", self.failure.kind));
-        }
-        if self.guidance.probe {
-            return refused("guidance.probe = true; leave it out".into());
-        }
-        let changed = self.driver_change.map_or(0.0, |change| change.k_hg);
-        for (field, k_hg) in [("driver.K_hg", self.gains.k_hg), ("driver_change.K_hg", changed)] {
-            if k_hg != 0.0 {
-                return refused(format!("{field} = {k_hg}; it can only be 0"));
-            }
-        }
-        Ok(())
+        [Condition::High, Condition::Mid, Condition::Low]
+            .into_iter()
+            .find(|condition| condition.gains() == self.values.gains)
+            .unwrap_or(Condition::Custom)
+    }
+
+    /// The driver's vision, delay, arm and remnant.
+    pub fn driver(&self) -> &DriverParameters {
+        &self.values.driver
+    }
+
+    /// How the driver's arm weighs vision against guidance, until a failure is noticed.
+    pub fn gains(&self) -> ArmGains {
+        self.values.gains
+    }
+
+    /// The vehicle.
+    pub fn vehicle(&self) -> &VehicleParameters {
+        &self.values.vehicle
+    }
+
+    /// The controller and its camera.
+    pub fn guidance(&self) -> &GuidanceParameters {
+        &self.values.guidance
+    }
+
+    /// What the controller sees.
+    pub fn sensors(&self) -> Sensors {
+        self.values.sensors
+    }
+
+    /// What fails.
+    pub fn failure(&self) -> Failure {
+        self.values.failure
+    }
+
+    /// When the driver changes how vision is weighed against guidance, if that happens.
+    pub fn driver_change(&self) -> Option<DriverChange> {
+        self.values.driver_change
+    }
+
+    /// Root of all random numbers.
+    pub fn seed(&self) -> u64 {
+        self.values.seed
     }
 
     /// The controller's checked parameters.
-    ///
-    /// # Errors
-    /// The first parameter out of range, with its value and range.
-    pub fn setup(&self) -> Result<Setup, String> {
-        Setup::new(&self.controller_params()).map_err(|e| names::in_words_of_the_file(&e))
+    pub fn setup(&self) -> &Setup {
+        &self.setup
     }
 
     /// The controller's parameters with what it knows of the vehicle.
     pub fn controller_params(&self) -> Params {
+        self.values.controller_params()
+    }
+
+    /// Speed, m/s.
+    pub fn speed_m_per_s(&self) -> f64 {
+        self.values.speed_kmh / 3.6
+    }
+
+    /// Distance of the farthest point that anybody looks at, m: the run ends when it reaches the end of the
+    /// course. With table 8 it is the driver's far point.
+    pub fn look_ahead_m(&self) -> f64 {
+        self.speed_m_per_s() * self.longest_look_ahead_s()
+    }
+
+    /// Arc length that the centre of gravity reaches in a run that does not diverge, m: the course's, less the
+    /// look-ahead.
+    pub fn reach_m(&self) -> f64 {
+        self.values.course.length_m() - self.look_ahead_m()
+    }
+
+    /// How long a run lasts that does not diverge, s. In curves the points ahead lie a little further along
+    /// the road than their distance, so a run may end some hundredths of a second earlier.
+    pub fn duration_s(&self) -> f64 {
+        self.reach_m() / self.speed_m_per_s()
+    }
+
+    fn longest_look_ahead_s(&self) -> f64 {
+        let DriverParameters { t_n, t_f, .. } = self.values.driver;
+        let guidance = &self.values.guidance;
+        t_n.max(t_f).max(guidance.t_n).max(guidance.t_f)
+    }
+}
+
+impl Values {
+    /// The controller's parameters with what it knows of the vehicle.
+    fn controller_params(&self) -> Params {
         Params {
             vehicle: self.vehicle_for_plausibility(),
             ..self.guidance.controller
@@ -373,44 +444,11 @@ impl Scenario {
         } = self.vehicle;
         let l = l_f + l_r;
         VehicleParams {
-            curvature_gain_1pm: k_t / l,
-            stability_factor_s2pm2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
-            aligning_gain_nms2pm: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            column_damping_nms: b_s,
+            curvature_gain_per_m: k_t / l,
+            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
+            aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
+            column_damping_nm_s: b_s,
             far_time_s,
         }
     }
-
-    /// Speed, m/s.
-    pub fn speed_mps(&self) -> f64 {
-        self.speed_kmh / 3.6
-    }
-
-    /// Distance of the farthest point that anybody looks at, m: the run ends when it reaches the end of the
-    /// course. With table 8 it is the driver's far point.
-    pub fn look_ahead_m(&self) -> f64 {
-        self.speed_mps() * self.longest_look_ahead_s()
-    }
-
-    /// Arc length that the centre of gravity reaches in a run that does not diverge, m: the course's, less the
-    /// look-ahead.
-    pub fn reach_m(&self) -> f64 {
-        self.course.length_m() - self.look_ahead_m()
-    }
-
-    /// How long a run lasts that does not diverge, s. In curves the points ahead lie a little further along
-    /// the road than their distance, so a run may end some hundredths of a second earlier.
-    pub fn duration_s(&self) -> f64 {
-        self.reach_m() / self.speed_mps()
-    }
-
-    fn longest_look_ahead_s(&self) -> f64 {
-        let DriverParameters { t_n, t_f, .. } = self.driver;
-        t_n.max(t_f).max(self.guidance.t_n).max(self.guidance.t_f)
-    }
-}
-
-fn check_gains(gains: ArmGains) -> Result<(), String> {
-    in_range("K_d", gains.k_d, 0.0..=50.0, "N.m/rad")?;
-    in_range("K_hg", gains.k_hg, 0.0..=10.0, "")
 }

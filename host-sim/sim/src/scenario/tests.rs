@@ -10,10 +10,10 @@ fn parse(text: &str) -> Result<Scenario, InputError> {
 fn an_empty_file_is_tables_4_8_and_9() {
     let s = parse("").unwrap();
     assert_eq!(s, Scenario::default());
-    let d = s.driver;
-    assert_eq!((d.a1, d.a2, d.a3), (0.1, 0.05, 3.7));
+    let d = s.driver();
+    assert_eq!((d.a_1, d.a_2, d.a_3), (0.1, 0.05, 3.7));
     assert_eq!((d.t_n, d.t_f, d.t_nms, d.k_nms), (0.3, 1.0, 0.1, 1.0));
-    let g = s.guidance;
+    let g = s.guidance();
     assert_eq!(
         (g.controller.k_1, g.controller.a_1, g.controller.a_2),
         (0.25, 2.0, 0.05)
@@ -22,14 +22,14 @@ fn an_empty_file_is_tables_4_8_and_9() {
         (g.controller.a_3, g.controller.a_4, g.t_n, g.t_f),
         (40.0, 1.0, 0.3, 0.7)
     );
-    let v = s.vehicle;
+    let v = s.vehicle();
     assert_eq!((v.m, v.i, v.l_f, v.l_r), (1100.0, 2940.0, 1.0, 1.635));
     assert_eq!(
         (v.k_f, v.k_r, v.k_s, v.e_t),
         (53_300.0, 117_000.0, 48_510.0, 0.026)
     );
     assert_eq!((v.b_s, v.j_s, v.k_t), (0.57, 0.11, 1.0 / 17.0));
-    assert_eq!((s.gains.k_d, s.gains.k_hg, s.speed_kmh), (3.0, 0.5, 60.0));
+    assert_eq!((s.gains().k_d, s.gains().k_hg, s.speed_kmh()), (3.0, 0.5, 60.0));
 }
 
 #[test]
@@ -41,28 +41,28 @@ fn every_field_can_be_set() {
          [failure]\nkind = 'torque'\ntime = 50",
     )
     .unwrap();
-    assert_eq!((s.speed_kmh, s.sensors, s.seed), (80.0, Sensors::Exact, 9));
-    assert_eq!((s.driver.t_p, s.driver.remnant_sd_nm), (0.3, 0.1));
+    assert_eq!((s.speed_kmh(), s.sensors(), s.seed()), (80.0, Sensors::Exact, 9));
+    assert_eq!((s.driver().t_p, s.driver().remnant_sd_nm), (0.3, 0.1));
     assert_eq!(
-        (s.gains.k_d, s.gains.k_hg, s.condition),
+        (s.gains().k_d, s.gains().k_hg, s.condition()),
         (2.0, 0.25, Condition::Custom)
     );
-    assert_eq!((s.vehicle.m, s.vehicle.i), (1500.0, 3000.0));
+    assert_eq!((s.vehicle().m, s.vehicle().i), (1500.0, 3000.0));
     assert_eq!(
         (
-            s.guidance.controller.k_1,
-            s.guidance.controller.a_2,
-            s.guidance.t_f
+            s.guidance().controller.k_1,
+            s.guidance().controller.a_2,
+            s.guidance().t_f
         ),
         (0.5, 0.1, 0.8)
     );
-    assert_eq!(s.failure.at_s(), Some(50.0));
+    assert_eq!(s.failure().at_s(), Some(50.0));
     assert_eq!(
-        parse("condition = 'low'").unwrap().gains,
+        parse("condition = 'low'").unwrap().gains(),
         ArmGains { k_d: 4.0, k_hg: 1.0 }
     );
     assert_eq!(
-        parse("[driver]\nK_d = 2\nK_hg = 0").unwrap().condition,
+        parse("[driver]\nK_d = 2\nK_hg = 0").unwrap().condition(),
         Condition::High
     );
 }
@@ -97,15 +97,15 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ),
         (
             "[guidance]\na3 = 1e3",
-            "guidance.a3 = 1000 1/rad is outside 0 to 100 1/rad",
+            "guidance.a_3 = 1000 1/rad is outside 0 to 100 1/rad",
         ),
         (
             "[guidance]\na4 = -1",
-            "guidance.a4 = -1 s/rad is outside 0 to 100 s/rad",
+            "guidance.a_4 = -1 s/rad is outside 0 to 100 s/rad",
         ),
         (
             "[guidance]\nK_1 = 4\na1 = 9",
-            "guidance: K_1*a1 = 36 N.m/m is outside 0 to 32 N.m/m",
+            "guidance: K_1*a_1 = 36 N.m/m is outside 0 to 32 N.m/m",
         ),
         (
             "[guidance]\nt_f = 0.05",
@@ -169,36 +169,41 @@ fn a_manual_driver_has_nothing_that_needs_guidance() {
     }
     let own_arm =
         manual("[driver]\nK_d = 3\nK_hg = 0\n[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0").unwrap();
-    assert_eq!((own_arm.condition, own_arm.gains.k_d), (Condition::Manual, 3.0));
+    assert_eq!(
+        (own_arm.condition(), own_arm.gains().k_d),
+        (Condition::Manual, 3.0)
+    );
 }
 
 /// At 60 km/h, 516.7 m less 1 s of look-ahead are 30 s.
 #[test]
 fn what_happens_in_mid_drive_happens_before_the_run_ends() {
-    let after = |failure_s, kind| Scenario {
-        course: Course::from_toml("c", "[[segment]]\nlength = 516.7").unwrap(),
-        failure: Failure {
+    let after = |failure_s, kind| {
+        let failure = Failure {
             kind,
             time_s: failure_s,
-        },
-        ..Default::default()
+        };
+        let course = Course::from_toml("c", "[[segment]]\nlength = 516.7").unwrap();
+        let scenario = Scenario::builder().course(course).failure(failure);
+        scenario.build().unwrap()
     };
     assert!((after(0.0, FailureKind::None).duration_s() - 30.002).abs() < 1e-9);
     assert_eq!(after(30.0, FailureKind::Torque).check_times(), Ok(()));
     assert_eq!(after(70.0, FailureKind::None).check_times(), Ok(()));
     assert_eq!(
-        after(30.1, FailureKind::Input).check_times(),
+        after(30.1, FailureKind::Input)
+            .check_times()
+            .map_err(|e| e.to_string()),
         Err("failure.time = 30.1 s is outside 0 to 30 s: the run ends there".into())
     );
-    let changing = Scenario {
-        driver_change: Some(DriverChange {
-            time_s: 31.0,
-            k_d: 3.0,
-            k_hg: 0.5,
-        }),
-        ..after(0.0, FailureKind::None)
+    let change = DriverChange {
+        time_s: 31.0,
+        k_d: 3.0,
+        k_hg: 0.5,
     };
-    let error = changing.check_times().unwrap_err();
+    let changing = after(0.0, FailureKind::None).to_builder();
+    let changing = changing.driver_change(Some(change)).build().unwrap();
+    let error = changing.check_times().unwrap_err().to_string();
     assert!(error.starts_with("driver_change.time = 31 s"), "{error}");
 }
 
@@ -207,11 +212,8 @@ fn a_course_with_less_than_a_second_to_drive_is_refused() {
     let course = |length| Course::from_toml("c", &format!("[[segment]]\nlength = {length}")).unwrap();
     // 1.0 s of look-ahead and 1 s to drive, at 60 km/h, are 33.333 m.
     let short = |length| {
-        let scenario = Scenario {
-            course: course(length),
-            ..Default::default()
-        };
-        scenario.check()
+        let scenario = Scenario::builder().course(course(length));
+        scenario.build().map(|_| ()).map_err(|e| e.to_string())
     };
     assert_eq!(
         short(33.2),
@@ -220,4 +222,38 @@ fn a_course_with_less_than_a_second_to_drive_is_refused() {
             .into())
     );
     assert_eq!(short(33.4), Ok(()));
+}
+
+/// What a result holds of its scenario is enough to run it again.
+#[test]
+fn a_scenario_written_and_read_again_is_the_same() {
+    let course = "lane_width = 3.1\n[[segment]]\nlength = 150.5\n\
+                  [[segment]]\nlength = 1000\ncurvature_start = 0.0\ncurvature_end = -0.00123456789012345\n";
+    let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed = 71.3\nseed = 7\n\
+                  [driver]\nt_p = 0.1234567890123\nK_d = 3.21\nremnant_sd = 0.1\n\
+                  [guidance]\na2 = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
+                  [driver_change]\ntime = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm = 1234.5\n";
+    for text in ["", "condition = 'manual'", others] {
+        let load = |name: &str| Course::from_toml(name, course);
+        let scenario = Scenario::from_toml("s.toml", text, load).unwrap();
+        let written = scenario.to_toml();
+        let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+        assert_eq!(
+            Scenario::from_toml("again.toml", &written, none).unwrap(),
+            scenario,
+            "{written}"
+        );
+    }
+}
+
+#[test]
+fn a_bad_course_within_a_scenario_is_refused_like_one_in_a_file() {
+    let text = "[course]\nname = 'mine'\nlane_width = 3\n\
+                [[course.segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.5\n";
+    let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+    let error = Scenario::from_toml("s.toml", text, none).unwrap_err().to_string();
+    assert!(
+        error.contains("s.toml") && error.contains("segment 1: curvature_end = 0.5"),
+        "{error}"
+    );
 }

@@ -51,7 +51,7 @@ pub struct Centreline {
 
 /// The foot of the perpendicular from a point to the centreline.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Foot {
+pub struct Projection {
     /// Arc length, m. May lie up to 2 m beyond the ends of the course.
     pub s_m: f64,
     /// Signed distance of the point from the centreline, m, positive when the point lies to the left.
@@ -144,7 +144,7 @@ impl Centreline {
     /// within 1e-8 m. `None` where there is no unique foot nearby: more than 2 m beyond the ends, or close
     /// to the centre of curvature.
     #[inline]
-    pub fn project(&self, x_m: f64, y_m: f64, tracker: &mut Tracker) -> Option<Foot> {
+    pub fn project(&self, x_m: f64, y_m: f64, tracker: &mut Tracker) -> Option<Projection> {
         let mut s = tracker.s_m + tracker.advance_m;
         let mut index = tracker.cell;
         for _ in 0..MAX_NEWTON_STEPS {
@@ -187,7 +187,7 @@ impl Centreline {
                     s_m: s,
                     advance_m: s - tracker.s_m,
                 };
-                return Some(Foot {
+                return Some(Projection {
                     s_m: s,
                     offset_m,
                     heading_rad: cell.heading_rad + theta + curvature * step,
@@ -227,7 +227,7 @@ mod tests {
     }
 
     /// Projects a point near arc length `s`, as a fresh tracker sees it.
-    fn foot(line: &Centreline, x: f64, y: f64, s: f64) -> Option<Foot> {
+    fn foot(line: &Centreline, x: f64, y: f64, s: f64) -> Option<Projection> {
         line.project(x, y, &mut line.tracker(s))
     }
 

@@ -4,9 +4,13 @@
 //! left positive, default 0) or both `curvature_start` and `curvature_end`. Curvature may jump between
 //! segments (an arc without a clothoid); heading never does.
 
+use std::fmt;
+use std::sync::{Arc, LazyLock, OnceLock};
+
 use serde::Deserialize;
 
-use crate::input::{InputError, in_range, parse_toml};
+use super::Centreline;
+use crate::input::{InputError, RangeError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
 pub const PAPER_COURSE: &str = "paper-course";
@@ -18,7 +22,8 @@ const MIN_SEGMENT_M: f64 = 0.01;
 const MAX_COURSE_M: f64 = 200_000.0;
 /// Lane widths of roads, m. The lower end clears the vehicle's 1.7 m.
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=10.0;
-const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
+/// Width of a lane unless a course has its own, m: the paper's.
+pub const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
 
 /// A piece of road whose curvature is linear in arc length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,12 +37,43 @@ pub struct Segment {
 }
 
 /// A checked course: every segment finite, within range, and at least one of them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Course {
     name: String,
     lane_width_m: f64,
     segments: Vec<Segment>,
+    /// Made when first asked for, and shared with every clone.
+    centreline: Arc<OnceLock<Arc<Centreline>>>,
 }
+
+impl PartialEq for Course {
+    fn eq(&self, other: &Self) -> bool {
+        let of = |course: &Self| (course.name.clone(), course.lane_width_m);
+        of(self) == of(other) && self.segments == other.segments
+    }
+}
+
+/// Why there is no such course.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum CourseError {
+    /// A value out of range; of a segment, with its number from 1.
+    Range(Option<usize>, RangeError),
+    /// No segment at all.
+    Empty,
+}
+
+impl fmt::Display for CourseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range(Some(number), error) => write!(f, "segment {number}: {error}"),
+            Self::Range(None, error) => error.fmt(f),
+            Self::Empty => f.write_str("a course needs at least one [[segment]]"),
+        }
+    }
+}
+
+impl std::error::Error for CourseError {}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,42 +103,60 @@ impl Course {
     /// The paper prints no numbers for its figure 5; this course is this project's own, made so that t = 70 s
     /// at 60 km/h falls 6.7 m into the first arc, as the paper's failure needs.
     pub fn paper() -> Self {
-        let straight = |length_m| Segment {
-            length_m,
-            curvature_start_1pm: 0.0,
-            curvature_end_1pm: 0.0,
-        };
+        // Every caller's is a clone, so that its curve is made once.
+        static PAPER: LazyLock<Course> = LazyLock::new(Course::make_paper);
+        PAPER.clone()
+    }
+
+    fn make_paper() -> Self {
         let curve = |curvature_1pm: f64, clothoid_m, arc_m| {
             [
-                Segment {
-                    length_m: clothoid_m,
-                    curvature_start_1pm: 0.0,
-                    curvature_end_1pm: curvature_1pm,
-                },
-                Segment {
-                    length_m: arc_m,
-                    curvature_start_1pm: curvature_1pm,
-                    curvature_end_1pm: curvature_1pm,
-                },
-                Segment {
-                    length_m: clothoid_m,
-                    curvature_start_1pm: curvature_1pm,
-                    curvature_end_1pm: 0.0,
-                },
+                Segment::clothoid(clothoid_m, 0.0, curvature_1pm),
+                Segment::arc(arc_m, curvature_1pm),
+                Segment::clothoid(clothoid_m, curvature_1pm, 0.0),
             ]
         };
-        let mut segments = vec![straight(1080.0)];
+        let mut segments = vec![Segment::straight(1080.0)];
         segments.extend(curve(1.0 / 300.0, 80.0, 300.0));
-        segments.push(straight(200.0));
+        segments.push(Segment::straight(200.0));
         segments.extend(curve(-1.0 / 400.0, 80.0, 250.0));
-        segments.push(straight(200.0));
+        segments.push(Segment::straight(200.0));
         segments.extend(curve(1.0 / 600.0, 100.0, 400.0));
-        segments.push(straight(400.0));
+        segments.push(Segment::straight(400.0));
         Self {
             name: PAPER_COURSE.into(),
             lane_width_m: DEFAULT_LANE_WIDTH_M,
             segments,
+            centreline: Arc::default(),
         }
+    }
+
+    /// A course from its segments, in order of arc length. `name` stands for it in results and errors.
+    ///
+    /// # Errors
+    /// No segment; a lane width, a length or a curvature out of range; a course that is too long.
+    pub fn new(
+        name: impl Into<String>,
+        lane_width_m: f64,
+        segments: Vec<Segment>,
+    ) -> Result<Self, CourseError> {
+        let whole = |e| CourseError::Range(None, e);
+        in_range("lane_width", lane_width_m, LANE_WIDTH_M, "m").map_err(whole)?;
+        if segments.is_empty() {
+            return Err(CourseError::Empty);
+        }
+        for (i, segment) in segments.iter().enumerate() {
+            segment.check().map_err(|e| CourseError::Range(Some(i + 1), e))?;
+        }
+        let course = Self {
+            name: name.into(),
+            lane_width_m,
+            segments,
+            centreline: Arc::default(),
+        };
+        let length_m = course.length_m();
+        in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(whole)?;
+        Ok(course)
     }
 
     /// Checks the text of a course file; `name` stands for the file in errors and results.
@@ -113,31 +167,13 @@ impl Course {
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
         let file: CourseFile = parse_toml(name, text)?;
         let fail = |e: String| InputError::new(name, e);
-        in_range("lane_width", file.lane_width, LANE_WIDTH_M, "m").map_err(fail)?;
-        if file.segment.is_empty() {
-            return Err(InputError::new(name, "a course needs at least one [[segment]]"));
-        }
-        let mut segments = Vec::with_capacity(file.segment.len());
-        for (i, segment) in file.segment.iter().enumerate() {
-            segments.push(
-                segment
-                    .checked()
-                    .map_err(|e| fail(format!("segment {}: {e}", i + 1)))?,
-            );
-        }
-        let course = Self {
-            name: name.into(),
-            lane_width_m: file.lane_width,
-            segments,
-        };
-        in_range(
-            "course length",
-            course.length_m(),
-            MIN_SEGMENT_M..=MAX_COURSE_M,
-            "m",
-        )
-        .map_err(fail)?;
-        Ok(course)
+        let segments = file.segment.iter().enumerate().map(|(i, segment)| {
+            segment
+                .parsed()
+                .map_err(|e| fail(format!("segment {}: {e}", i + 1)))
+        });
+        let segments = segments.collect::<Result<_, _>>()?;
+        Self::new(name, file.lane_width, segments).map_err(|e| InputError::new(name, e))
     }
 
     /// `paper-course`, or the name the course was loaded under.
@@ -155,35 +191,59 @@ impl Course {
         &self.segments
     }
 
+    /// The course as a curve, made once for it and all its clones.
+    pub fn centreline(&self) -> Arc<Centreline> {
+        let made = self.centreline.get_or_init(|| Arc::new(Centreline::new(self)));
+        Arc::clone(made)
+    }
+
     /// Arc length of the whole centreline, m.
     pub fn length_m(&self) -> f64 {
         self.segments.iter().map(|s| s.length_m).sum()
     }
 }
 
-impl SegmentFile {
-    fn checked(&self) -> Result<Segment, String> {
-        in_range("length", self.length, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
-        let (start, end) = match (self.curvature, self.curvature_start, self.curvature_end) {
-            (constant, None, None) => (constant.unwrap_or(0.0), constant.unwrap_or(0.0)),
-            (None, Some(start), Some(end)) => (start, end),
-            (Some(_), _, _) => {
-                return Err(
-                    "give either `curvature` or `curvature_start` and `curvature_end`, not both".into(),
-                );
-            }
-            (None, ..) => return Err("`curvature_start` and `curvature_end` go together".into()),
-        };
-        let range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
-        let constant = self.curvature.is_some();
+impl Segment {
+    /// A straight.
+    pub fn straight(length_m: f64) -> Self {
+        Self::arc(length_m, 0.0)
+    }
+
+    /// A piece of constant curvature.
+    pub fn arc(length_m: f64, curvature_1pm: f64) -> Self {
+        Self::clothoid(length_m, curvature_1pm, curvature_1pm)
+    }
+
+    /// A piece whose curvature goes from one value to another.
+    pub fn clothoid(length_m: f64, curvature_start_1pm: f64, curvature_end_1pm: f64) -> Self {
+        Self {
+            length_m,
+            curvature_start_1pm,
+            curvature_end_1pm,
+        }
+    }
+
+    fn check(&self) -> Result<(), RangeError> {
+        in_range("length", self.length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
+        let (start, end) = (self.curvature_start_1pm, self.curvature_end_1pm);
+        let constant = start.to_bits() == end.to_bits();
         let name = |ramp| if constant { "curvature" } else { ramp };
+        let range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
         in_range(name("curvature_start"), start, range.clone(), "1/m")?;
-        in_range(name("curvature_end"), end, range, "1/m")?;
-        Ok(Segment {
-            length_m: self.length,
-            curvature_start_1pm: start,
-            curvature_end_1pm: end,
-        })
+        in_range(name("curvature_end"), end, range, "1/m")
+    }
+}
+
+impl SegmentFile {
+    fn parsed(&self) -> Result<Segment, &'static str> {
+        match (self.curvature, self.curvature_start, self.curvature_end) {
+            (constant, None, None) => Ok(Segment::arc(self.length, constant.unwrap_or(0.0))),
+            (None, Some(start), Some(end)) => Ok(Segment::clothoid(self.length, start, end)),
+            (Some(_), _, _) => {
+                Err("give either `curvature` or `curvature_start` and `curvature_end`, not both")
+            }
+            (None, ..) => Err("`curvature_start` and `curvature_end` go together"),
+        }
     }
 }
 

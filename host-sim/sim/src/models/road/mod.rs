@@ -7,5 +7,5 @@
 mod centreline;
 mod course;
 
-pub use centreline::{Centreline, Foot, Tracker};
-pub use course::{Course, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};
+pub use centreline::{Centreline, Projection, Tracker};
+pub use course::{Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};

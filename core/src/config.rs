@@ -1,0 +1,191 @@
+//! The parameters checked, and turned into the immutable configuration of every block.
+//!
+//! Everything is `const`, so that a firmware image checks its built-in set at compile time and carries no float code
+//! for it. Not here: the list of parameters with their ranges ([`crate::params`]).
+
+#![expect(
+    clippy::as_conversions,
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing,
+    reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
+)]
+
+use crate::envelope::Envelope;
+use crate::estimator::{BLOCK_S, Estimator};
+use crate::law::Law;
+use crate::monitor::Monitor;
+use crate::params::{ParamError, Params, in_range};
+use crate::plausibility::Plausibility;
+use crate::probe::Probe;
+use crate::quantity::{
+    AngularImpulse, CurvaturePerAngle, Metres, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+};
+use crate::redundant::words;
+
+words! {
+    /// The checked configuration of every block of the controller.
+    pub struct Config {
+        /// Equation (9).
+        pub law: Law,
+        /// Torque limits.
+        pub envelope: Envelope,
+        /// Margins of the input checks.
+        pub plausibility: Plausibility,
+        /// Slowest speed that is guided.
+        pub least_speed: Speed,
+        /// The probe.
+        pub probe: Probe,
+    }
+}
+
+/// Largest product K_1*a', in N.m per unit: keeps the law's wide sum inside an `i64`.
+const MAX_GAIN: f64 = 32.0;
+const PROBE_SLOPE: &str = "2 * pi * probe_amplitude_nm * probe_frequency_hz";
+/// Steepest slope of the probe, N.m/s.
+const MAX_PROBE_SLOPE: f64 = 3.5;
+
+impl Config {
+    /// The paper's parameters, checked at compile time.
+    pub const PAPER: Self = match Self::new(&Params::PAPER) {
+        Ok(config) => config,
+        Err(_) => panic!("the paper's parameters are in range"),
+    };
+
+    /// Checks every parameter, and their products.
+    ///
+    /// # Errors
+    /// The first that is not a number within its range.
+    pub const fn new(p: &Params) -> Result<Self, ParamError> {
+        if let Err(error) = p.check() {
+            return Err(error);
+        }
+        let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
+        let gains = [0.0, MAX_GAIN];
+        let products = [
+            in_range(PROBE_SLOPE, slope, [0.0, MAX_PROBE_SLOPE], "N.m/s"),
+            in_range("k_1 * a_1", p.k_1 * p.a_1, gains, "N.m/m"),
+            in_range("k_1 * a_2", p.k_1 * p.a_2, gains, "N.m.s/m"),
+            in_range("k_1 * a_3", p.k_1 * p.a_3, gains, "N.m/rad"),
+            in_range("k_1 * a_4", p.k_1 * p.a_4, gains, "N.m.s/rad"),
+        ];
+        let mut i = 0;
+        while i < products.len() {
+            if let Err(error) = products[i] {
+                return Err(error);
+            }
+            i += 1;
+        }
+        Ok(Self::of(p))
+    }
+
+    /// The configuration of parameters that are in range.
+    const fn of(p: &Params) -> Self {
+        let v = &p.vehicle;
+        Self {
+            law: Law {
+                e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
+                e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
+                e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
+                e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
+                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
+            },
+            envelope: Envelope {
+                absolute: Torque::from_nm(p.torque_limit_nm),
+                wind_up: TorqueRate::from_nm_per_s(p.wind_up_nm_per_s),
+                reduction: TorqueRate::from_nm_per_s(p.reduction_nm_per_s),
+                window: Torque::from_nm(1.2),
+                override_from: Torque::from_nm(0.8),
+                override_slope: Ratio::from_si(3.0),
+            },
+            plausibility: Plausibility {
+                curvature_gain: CurvaturePerAngle::from_per_m(v.curvature_gain_per_m),
+                stability_factor: StabilityFactor::from_s2_per_m2(v.stability_factor_s2_per_m2),
+                aligning_gain: TorquePerAcceleration::from_nm_s2_per_m(v.aligning_gain_nm_s2_per_m),
+                column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
+                far_time: Seconds::from_s(v.far_time_s),
+                lane_margin: Metres::from_m(0.4),
+                column_margin: AngularImpulse::from_nm_s(0.6),
+            },
+            least_speed: Speed::from_m_per_s(p.least_speed_m_per_s),
+            probe: Probe {
+                amplitude: Torque::from_nm(p.probe_amplitude_nm),
+                phase_per_us: phase_per_us(p.probe_frequency_hz),
+            },
+        }
+    }
+}
+
+/// 2^32 turns for each second's 10^6 microseconds.
+const fn phase_per_us(frequency_hz: f64) -> u32 {
+    (frequency_hz * 4_294.967_296 + 0.5) as u32
+}
+
+/// Everything that parameters decide: the controller's configuration, the monitor's and the estimator's.
+#[derive(Debug, Clone, Copy)]
+pub struct Setup {
+    /// Law, envelope, plausibility.
+    pub config: Config,
+    /// The monitor's own limits.
+    pub monitor: Monitor,
+    /// The estimator of K_hg.
+    pub estimator: Estimator,
+}
+
+impl Setup {
+    /// The paper's parameters.
+    pub const PAPER: Self = Self {
+        config: Config::PAPER,
+        monitor: Monitor::new(&Params::PAPER),
+        estimator: Estimator::new(&Params::PAPER),
+    };
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// The first parameter that is not a number within its range.
+    pub const fn new(p: &Params) -> Result<Self, ParamError> {
+        match Config::new(p) {
+            Ok(config) => Ok(Self {
+                config,
+                monitor: Monitor::new(p),
+                estimator: Estimator::new(p),
+            }),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+impl Estimator {
+    /// The estimator's settings.
+    #[must_use]
+    const fn new(p: &Params) -> Self {
+        let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
+        Self {
+            phase_per_us: phase_per_us(p.probe_frequency_hz),
+            periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
+            amplitude_nm: p.probe_amplitude_nm as f32,
+            lag: (turns * p.t_nms_s) as f32,
+            k_nms: p.k_nms as f32,
+        }
+    }
+}
+
+impl Monitor {
+    /// The monitor's own limits, straight from the SI parameters and past the configuration above.
+    #[must_use]
+    pub const fn new(p: &Params) -> Self {
+        Self {
+            limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
+            growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
+            probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
+            gains_mnm: [
+                (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
+            ],
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! State that must survive a bit flip: kept twice, the second copy inverted.
+//!
+//! A struct of [`words!`](self) holds integers and quantities only, so every bit pattern of it is a valid value and
+//! whatever a flip makes of it can be read, compared and refused. Not here: what a refusal leads to.
+
+use core::hint::black_box;
+
+/// A value made of 32-bit words, each of which may hold any bits.
+pub trait Words: Copy + PartialEq {
+    /// The value with every word changed, in the order of the fields.
+    #[must_use]
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self;
+
+    /// Whether every bit of `other` is the inverse of this value's. Looks at all words without a branch: a copy or a
+    /// comparison call for each is what a step would mostly do.
+    fn is_inverse_of(&self, other: &Self) -> bool;
+
+    /// The value with every bit inverted.
+    #[must_use]
+    fn complement(self) -> Self {
+        self.map_words(&mut |word| !word)
+    }
+}
+
+impl Words for u32 {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        change(self)
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        *self == !*other
+    }
+}
+
+impl Words for i32 {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        change(self.cast_unsigned()).cast_signed()
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        *self == !*other
+    }
+}
+
+impl<T: Words, const N: usize> Words for [T; N] {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        self.map(|item| item.map_words(change))
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        let pairs = self.iter().zip(other);
+        pairs.fold(true, |all, (item, other)| all & item.is_inverse_of(other))
+    }
+}
+
+/// Declares a struct of such fields, laid out as it is written, without padding.
+macro_rules! words {
+    ($(#[$doc:meta])* $vis:vis struct $name:ident { $($(#[$field_doc:meta])* $field_vis:vis $field:ident: $type:ty,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(C)]
+        $vis struct $name { $($(#[$field_doc])* $field_vis $field: $type,)* }
+
+        impl $crate::redundant::Words for $name {
+            fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+                Self { $($field: $crate::redundant::Words::map_words(self.$field, change),)* }
+            }
+
+            #[inline]
+            fn is_inverse_of(&self, other: &Self) -> bool {
+                true $(& $crate::redundant::Words::is_inverse_of(&self.$field, &other.$field))*
+            }
+        }
+    };
+}
+pub(crate) use words;
+
+/// A value and its inverted copy.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct Redundant<T> {
+    value: T,
+    inverted: T,
+}
+
+impl<T: Words> Redundant<T> {
+    /// Both copies.
+    #[must_use]
+    pub fn new(value: T) -> Self {
+        Self {
+            value,
+            inverted: value.complement(),
+        }
+    }
+
+    /// The value, if both copies still agree.
+    #[must_use]
+    pub fn get(&self) -> Option<&T> {
+        // Without the black box the compiler may prove, across the loop that owns this value, that the
+        // copies always agree, and drop the comparison. Around the reference, it costs no copy.
+        let Self { value, inverted } = black_box(self);
+        value.is_inverse_of(inverted).then_some(value)
+    }
+
+    /// Changes the value in place, if both copies still agree.
+    pub fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
+        self.get()?;
+        let result = change(&mut self.value);
+        self.inverted = self.value.complement();
+        Some(result)
+    }
+
+    /// Changes the words of both copies apart, as faults do.
+    #[cfg(feature = "fault-injection")]
+    pub(crate) fn change_copies(&mut self, change: &mut impl FnMut(u32) -> u32) {
+        self.value = self.value.map_words(change);
+        self.inverted = self.inverted.map_words(change);
+    }
+
+    /// Replaces both copies.
+    pub fn set(&mut self, value: T) {
+        self.value = value;
+        self.inverted = value.complement();
+    }
+}

@@ -1,0 +1,243 @@
+//! How a scenario is made, and why it is refused.
+
+use std::fmt;
+
+use haptic_core::config::Setup;
+
+use super::{
+    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, SPEED_KMH, Scenario,
+    Sensors, Values, names,
+};
+use crate::input::{RangeError, in_range};
+use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::road::Course;
+use crate::models::vehicle::VehicleParameters;
+
+/// Chooses the values of a [`Scenario`]; each has a default.
+#[derive(Debug, Clone, Default)]
+#[must_use]
+pub struct ScenarioBuilder {
+    pub(super) values: Values,
+}
+
+/// Why there is no such scenario.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum ScenarioError {
+    /// A value outside its range.
+    Range(RangeError),
+    /// An instant outside the run.
+    AfterTheEnd(RangeError),
+    /// A manual driver with something that takes guidance.
+    ManualWith {
+        /// The field, with its value.
+        what: String,
+        /// What to do about it.
+        cure: &'static str,
+    },
+    /// A course with less than a second to drive.
+    CourseTooShort {
+        /// Its name.
+        course: String,
+        /// Its length, m.
+        length_m: f64,
+        /// Speed, km/h.
+        speed_kmh: f64,
+        /// Look-ahead, m.
+        look_ahead_m: f64,
+        /// The same as time, s.
+        look_ahead_s: f64,
+    },
+}
+
+impl From<RangeError> for ScenarioError {
+    fn from(error: RangeError) -> Self {
+        Self::Range(error)
+    }
+}
+
+impl fmt::Display for ScenarioError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range(error) => error.fmt(f),
+            Self::AfterTheEnd(error) => write!(f, "{error}: the run ends there"),
+            Self::ManualWith { what, cure } => {
+                write!(f, "condition = \"manual\" has no guidance, but {what}; {cure}")
+            }
+            Self::CourseTooShort {
+                course,
+                length_m,
+                speed_kmh,
+                look_ahead_m,
+                look_ahead_s,
+            } => write!(
+                f,
+                "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {:.1} m: \
+                 {look_ahead_m:.1} m of look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive",
+                look_ahead_m + speed_kmh / 3.6 * LEAST_DURATION_S,
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ScenarioError {}
+
+impl From<ScenarioError> for String {
+    fn from(error: ScenarioError) -> Self {
+        error.to_string()
+    }
+}
+
+impl ScenarioBuilder {
+    /// The road.
+    pub fn course(mut self, course: Course) -> Self {
+        self.values.course = course;
+        self
+    }
+
+    /// Constant speed, km/h: 20 to 250.
+    pub fn speed_kmh(mut self, speed_kmh: f64) -> Self {
+        self.values.speed_kmh = speed_kmh;
+        self
+    }
+
+    /// How the driver drives, with the gains that the paper gives the condition. [`Condition::Custom`] is guidance
+    /// with whatever gains were chosen.
+    pub fn condition(mut self, condition: Condition) -> Self {
+        self.values.manual = condition == Condition::Manual;
+        if condition != Condition::Custom {
+            self.values.gains = condition.gains();
+        }
+        self
+    }
+
+    /// The driver's vision, delay, arm and remnant.
+    pub fn driver(mut self, driver: DriverParameters) -> Self {
+        self.values.driver = driver;
+        self
+    }
+
+    /// How the driver's arm weighs vision against guidance; call it behind [`ScenarioBuilder::condition`], which
+    /// has gains of its own.
+    pub fn gains(mut self, gains: ArmGains) -> Self {
+        self.values.gains = gains;
+        self
+    }
+
+    /// The vehicle.
+    pub fn vehicle(mut self, vehicle: VehicleParameters) -> Self {
+        self.values.vehicle = vehicle;
+        self
+    }
+
+    /// The controller and its camera.
+    pub fn guidance(mut self, guidance: GuidanceParameters) -> Self {
+        self.values.guidance = guidance;
+        self
+    }
+
+    /// Whether the host asks for the probe.
+    pub fn probe(mut self, probe: bool) -> Self {
+        self.values.guidance.probe = probe;
+        self
+    }
+
+    /// What the controller sees.
+    pub fn sensors(mut self, sensors: Sensors) -> Self {
+        self.values.sensors = sensors;
+        self
+    }
+
+    /// What fails.
+    pub fn failure(mut self, failure: Failure) -> Self {
+        self.values.failure = failure;
+        self
+    }
+
+    /// When the driver changes, if that happens.
+    pub fn driver_change(mut self, change: Option<DriverChange>) -> Self {
+        self.values.driver_change = change;
+        self
+    }
+
+    /// Root of all random numbers.
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.values.seed = seed;
+        self
+    }
+
+    /// Checks everything.
+    ///
+    /// # Errors
+    /// The first value out of range, by field, value and range; a manual driver with something that takes guidance;
+    /// a course with less than a second to drive.
+    pub fn build(self) -> Result<Scenario, ScenarioError> {
+        let values = self.values;
+        let within = |table: &'static str| move |e: RangeError| e.within(table);
+        in_range("speed", values.speed_kmh, SPEED_KMH, "km/h")?;
+        values.driver.check().map_err(within("driver"))?;
+        check_gains(values.gains).map_err(within("driver"))?;
+        values.vehicle.check().map_err(within("vehicle"))?;
+        in_range("t_n", values.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
+        // The controller's range: its plausibility checks divide by it.
+        in_range("t_f", values.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
+        let setup = Setup::new(&values.controller_params()).map_err(|e| names::in_words_of_the_file(&e))?;
+        in_range("time", values.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
+        if let Some(change) = &values.driver_change {
+            in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
+            check_gains(change.gains()).map_err(within("driver_change"))?;
+        }
+        let scenario = Scenario { values, setup };
+        scenario.check_length()?;
+        scenario.check_manual()?;
+        Ok(scenario)
+    }
+}
+
+impl Scenario {
+    fn check_length(&self) -> Result<(), ScenarioError> {
+        if self.duration_s() >= LEAST_DURATION_S {
+            return Ok(());
+        }
+        Err(ScenarioError::CourseTooShort {
+            course: self.course().name().into(),
+            length_m: self.course().length_m(),
+            speed_kmh: self.speed_kmh(),
+            look_ahead_m: self.look_ahead_m(),
+            look_ahead_s: self.longest_look_ahead_s(),
+        })
+    }
+
+    /// A manual driver has no guidance that could fail, probe or be weighed.
+    fn check_manual(&self) -> Result<(), ScenarioError> {
+        let values = &self.values;
+        if !values.manual {
+            return Ok(());
+        }
+        let refused = |what: String, cure| Err(ScenarioError::ManualWith { what, cure });
+        if values.failure.kind != FailureKind::None {
+            return refused(
+                format!("failure.kind = \"{}\"", values.failure.kind),
+                "leave it out",
+            );
+        }
+        if values.guidance.probe {
+            return refused("guidance.probe = true".into(), "leave it out");
+        }
+        let changed = values.driver_change.map_or(0.0, |change| change.k_hg);
+        for (field, k_hg) in [
+            ("driver.K_hg", values.gains.k_hg),
+            ("driver_change.K_hg", changed),
+        ] {
+            if k_hg != 0.0 {
+                return refused(format!("{field} = {k_hg}"), "it can only be 0");
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_gains(gains: ArmGains) -> Result<(), RangeError> {
+    in_range("K_d", gains.k_d, 0.0..=50.0, "N.m/rad")?;
+    in_range("K_hg", gains.k_hg, 0.0..=10.0, "")
+}
