@@ -39,8 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let course = open_course(&arguments.file, &arguments.lane.choice())?;
     let survey = survey(&course);
     if let Some(directory) = &arguments.out {
-        Output::begin(directory)?
-            .finish(|place| files::write(&survey, &course, place))?;
+        Output::begin(directory)?.finish(|place| files::write(&survey, &course, place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if let Some(path) = &arguments.save {
@@ -66,7 +65,11 @@ fn readable(survey: &Survey) -> String {
             road.road, road.lane
         ));
     }
-    format!("{text}\n\n{}\n{}", files::table(survey).to_text(), picture(survey))
+    format!(
+        "{text}\n\n{}\n{}",
+        files::table(survey).to_text(),
+        picture(survey)
+    )
 }
 
 /// The plan in dots, with one scale for both axes; o marks the start.

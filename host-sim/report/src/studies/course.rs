@@ -59,7 +59,9 @@ pub fn table(survey: &Survey) -> Table {
     };
     Table {
         caption: String::new(),
-        columns: ["Along the lane's centre", "Least", "Most", "Unit"].map(String::from).to_vec(),
+        columns: ["Along the lane's centre", "Least", "Most", "Unit"]
+            .map(String::from)
+            .to_vec(),
         rows: quantities.into_iter().map(row).collect(),
     }
 }

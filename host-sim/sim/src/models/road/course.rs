@@ -247,6 +247,14 @@ impl Course {
         &self.segments
     }
 
+    /// Whether no part of the course is banked. A grade does not move a vehicle of a given speed.
+    pub fn is_level(&self) -> bool {
+        match &self.pieces {
+            Some(pieces) => pieces.iter().all(|piece| piece.bank_rad == [0.0; 2]),
+            None => self.segments.iter().all(|segment| segment.bank_rad == [0.0; 2]),
+        }
+    }
+
     /// Whether the segments are all there is to the course.
     pub fn is_of_segments(&self) -> bool {
         self.pieces.is_none()
@@ -307,7 +315,11 @@ impl Segment {
     /// each at the start and at the end.
     #[must_use]
     pub fn with_surface(self, bank_rad: [f64; 2], grade: [f64; 2]) -> Self {
-        Self { bank_rad, grade, ..self }
+        Self {
+            bank_rad,
+            grade,
+            ..self
+        }
     }
 
     fn check(&self) -> Result<(), RangeError> {
@@ -320,7 +332,13 @@ impl Segment {
             ("grade", self.grade, GRADE, ""),
         ] {
             let constant = start.to_bits() == end.to_bits();
-            let name = |end: &str| if constant { quantity.into() } else { format!("{quantity}_{end}") };
+            let name = |end: &str| {
+                if constant {
+                    quantity.into()
+                } else {
+                    format!("{quantity}_{end}")
+                }
+            };
             in_range(&name("start"), start, range.clone(), unit)?;
             in_range(&name("end"), end, range, unit)?;
         }
