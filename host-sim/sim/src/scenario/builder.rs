@@ -10,7 +10,9 @@ use super::{
     Sensors, Values, file,
 };
 use crate::input::{InputError, RangeError, in_range};
+use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::real::WorldParameters;
 use crate::models::road::Course;
 use crate::models::vehicle::VehicleParameters;
 
@@ -174,6 +176,18 @@ impl ScenarioBuilder {
         self
     }
 
+    /// What is less than ideal in the world.
+    pub fn world(mut self, world: WorldParameters) -> Self {
+        self.values.world = world;
+        self
+    }
+
+    /// What the sensors add to the truth.
+    pub fn sensor_errors(mut self, errors: SensorErrors) -> Self {
+        self.values.sensor_errors = errors;
+        self
+    }
+
     /// Root of all random numbers.
     pub fn seed(mut self, seed: u64) -> Self {
         self.values.seed = seed;
@@ -201,6 +215,8 @@ impl ScenarioBuilder {
             in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
             check_gains(change.gains()).map_err(within("driver_change"))?;
         }
+        values.world.check().map_err(within("world"))?;
+        values.sensor_errors.check().map_err(within("sensor_errors"))?;
         let scenario = Scenario { values, setup };
         scenario.check_length()?;
         scenario.check_manual()?;
