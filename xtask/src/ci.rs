@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, boards, gate};
+use crate::{bench, boards, gate, trace};
 
 pub(crate) fn run_all() -> Result<()> {
     ensure(&[
@@ -17,7 +17,7 @@ pub(crate) fn run_all() -> Result<()> {
         ("python3", "python3"),
     ])?;
     let target_features = format!("{BOARD},gate,broken,bench");
-    let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
+    let checks: [(&str, &dyn Fn() -> Result<()>); 7] = [
         ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
         ("clippy", &|| {
             run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
@@ -35,6 +35,7 @@ pub(crate) fn run_all() -> Result<()> {
             ];
             run(cargo().args(package).args(target))
         }),
+        ("requirements", &|| trace::run(false)),
         ("gate", &gate::run),
         // Compares every frame of a whole run on each of QEMU's boards on the way.
         ("boards", &|| boards::check(false)),

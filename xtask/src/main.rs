@@ -18,6 +18,7 @@ mod seal;
 mod size;
 mod speed;
 mod tool;
+mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -80,6 +81,12 @@ enum Command {
         /// The ELF of steering-ecu, changed in place.
         elf: PathBuf,
     },
+    /// Requirements (docs/requirements.toml): exit code 1 if evidence is missing, or something has no requirement.
+    Trace {
+        /// Write docs/requirements.md.
+        #[arg(long)]
+        bless: bool,
+    },
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -127,6 +134,7 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Command::Trace { bless } => trace::run(bless),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };
