@@ -35,7 +35,11 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Everything that CI checks, the tests last. Installs the tools it needs where it may.
-    Ci,
+    Ci {
+        /// Format, clippy, documentation, tests of the libraries and doctests alone, for daily work: no QEMU, no valgrind.
+        #[arg(long)]
+        quick: bool,
+    },
     /// Proves on the linked image that the controller has no panic path and no float.
     Gate,
     /// Instructions of a control step: on the host, against xtask/golden.json; in QEMU; or cycles, on a board.
@@ -102,7 +106,8 @@ enum Bench {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Ci => ci::run_all(),
+        Command::Ci { quick: true } => ci::run_quick(),
+        Command::Ci { quick: false } => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
         Command::Mutants { by_hand: true, .. } => by_hand::run(),

@@ -9,6 +9,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //!
@@ -29,6 +30,7 @@
 
 pub mod bus_load;
 pub mod claims;
+pub mod course;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;

@@ -38,6 +38,7 @@ mod start_up;
 pub mod table;
 pub mod target;
 mod trial;
+mod trial_record;
 mod verdict;
 mod wire;
 

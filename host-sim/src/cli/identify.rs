@@ -10,6 +10,7 @@ use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
+use super::road::CourseArguments;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -32,9 +33,8 @@ pub(super) struct Arguments {
     /// may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
-    /// Let the identified driver drive this course (TOML, or paper-course)
-    #[arg(long, value_name = "FILE")]
-    course: Option<PathBuf>,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Speed on that course, km/h (20 to 250)
     #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
     speed: f64,
@@ -59,14 +59,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::Paper => Method::Paper,
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
+    let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
     let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
     let name = arguments.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, note.map(String::from));
-    if let Some(path) = &arguments.course {
-        drive.drive_again(haptic_batch::files::open_course(path)?, arguments.speed, &options)?;
+    if let Some(course) = course {
+        drive.drive_again(course, arguments.speed, &options)?;
     }
     output.finish(|place| files::write(&drive, place))?;
     if arguments.json {

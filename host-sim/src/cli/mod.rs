@@ -7,6 +7,7 @@
 //! One file per subcommand. Not here: anything that a study or a model decides.
 
 mod bus;
+mod course;
 mod evaluate;
 mod experiment;
 mod faults;
@@ -18,6 +19,7 @@ mod participants;
 mod pil;
 mod progress;
 mod reliance;
+mod road;
 mod run;
 mod series;
 
@@ -51,6 +53,8 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
+    Course(course::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
@@ -97,6 +101,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),

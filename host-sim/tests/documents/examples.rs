@@ -4,7 +4,8 @@
 //!
 //! - `sh`: every command runs, in a directory of the document's own with the repository's files in it. `exit=N` is the
 //!   exit code to expect. `cargo`: a test or a tool of the workspace that CI runs elsewhere; what it names has to be
-//!   there. `setup`: installs something; not run. `hardware`: a board, QEMU or another program is needed; the command and its options have to be known.
+//!   there. `hardware`: a board, QEMU or another program is needed; the command and its options have to be known.
+//!   `setup` installs something and is not run.
 //! - `toml file=NAME`, written there before the commands run. - `python` runs behind the commands before it;
 //!   `python hardware` only has to be Python.
 //! - `rust` runs as a doctest of `host-sim`; `rust file=PATH` is a part of that file.

@@ -4,9 +4,10 @@ use std::fmt;
 
 use haptic_core::config::Setup;
 
+use super::guidance_file::in_words_of_the_file;
 use super::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, SPEED_KMH, Scenario,
-    Sensors, Values, names,
+    Sensors, Values,
 };
 use crate::input::{RangeError, in_range};
 use crate::models::driver::{ArmGains, DriverParameters};
@@ -181,7 +182,7 @@ impl ScenarioBuilder {
         in_range("t_n", values.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
         // The controller's range: its plausibility checks divide by it.
         in_range("t_f", values.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
-        let setup = Setup::new(&values.controller_params()).map_err(|e| names::in_words_of_the_file(&e))?;
+        let setup = Setup::new(&values.controller_params()).map_err(|e| in_words_of_the_file(&e))?;
         in_range("time", values.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
         if let Some(change) = &values.driver_change {
             in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;

@@ -7,7 +7,7 @@
 
 mod builder;
 mod file;
-mod names;
+mod guidance_file;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +21,7 @@ pub use builder::{ScenarioBuilder, ScenarioError};
 
 use crate::input::{InputError, in_range};
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::Course;
+use crate::models::road::{Course, LaneChoice};
 use crate::models::vehicle::VehicleParameters;
 
 /// Speeds that a scenario may have, km/h. The controller guides from 5 m/s on.
@@ -272,7 +272,7 @@ impl Scenario {
     pub fn from_toml(
         name: &str,
         text: &str,
-        course: impl FnOnce(&str) -> Result<Course, InputError>,
+        course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
         let builder = file::parse(name, text, course)?;
         builder.build().map_err(|e| InputError::new(name, e))

@@ -3,7 +3,7 @@
 use super::*;
 
 fn parse(text: &str) -> Result<Scenario, InputError> {
-    Scenario::from_toml("s.toml", text, |name| Err(InputError::new(name, "not there")))
+    Scenario::from_toml("s.toml", text, |name, _| Err(InputError::new(name, "not there")))
 }
 
 #[test]
