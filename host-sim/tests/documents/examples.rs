@@ -8,7 +8,7 @@
 //!   `setup` installs something and is not run.
 //! - `toml file=NAME`, written there before the commands run. - `python` runs behind the commands before it;
 //!   `python hardware` only has to be Python.
-//! - `rust` runs as a doctest of `host-sim`; `rust file=PATH` is a part of that file.
+//! - `rust` runs as a doctest of `host-sim`. `rust file=PATH` and `python file=PATH` are a part of that file.
 //! - `text output`: lines that the commands before it printed; how many blanks lie between words does not matter.
 //! - `text`, `mermaid` and blocks without a word are not for running.
 //!
@@ -225,16 +225,16 @@ fn run_examples(name: &Path, text: &str) {
                     seen += 1;
                 }
             }
+            "python" | "rust" if block.value("file").is_some() => {
+                let file = block.value("file").unwrap_or_default();
+                let source = std::fs::read_to_string(root().join(file)).unwrap();
+                assert!(source.contains(&block.text), "{at}: {file} has other lines");
+            }
             "python" => python(&block, place.path(), &at),
             "rust" => {
-                if let Some(file) = block.value("file") {
-                    let source = std::fs::read_to_string(root().join(file)).unwrap();
-                    assert!(source.contains(&block.text), "{at}: {file} has other lines");
-                } else {
-                    let lib = include_str!("../../src/lib.rs");
-                    let shown = format!("include_str!(\"../../{}\")", name.display());
-                    assert!(lib.contains(&shown), "{at}: host-sim/src/lib.rs does not run it");
-                }
+                let lib = include_str!("../../src/lib.rs");
+                let shown = format!("include_str!(\"../../{}\")", name.display());
+                assert!(lib.contains(&shown), "{at}: host-sim/src/lib.rs does not run it");
             }
             "text" if block.has("output") => {
                 for line in block.text.lines().map(evenly) {
