@@ -107,14 +107,31 @@ fn spelling(field: &str) -> String {
 #[test]
 fn every_field_of_a_scenario_is_in_the_table_with_its_default() {
     let rows = rows("Scenario");
-    for table in ["", "driver", "vehicle", "guidance", "failure", "driver_change"] {
+    for table in [
+        "",
+        "driver",
+        "vehicle",
+        "guidance",
+        "failure",
+        "driver_change",
+        "world",
+        "sensor_errors",
+    ] {
         let probe = match table {
             "" => "no_such_field = 1".to_owned(),
             table => format!("[{table}]\nno_such_field = 1"),
         };
         let mut code = known(&scenario(&probe).unwrap_err());
         if table.is_empty() {
-            for sub in ["driver", "vehicle", "guidance", "failure", "driver_change"] {
+            for sub in [
+                "driver",
+                "vehicle",
+                "guidance",
+                "failure",
+                "driver_change",
+                "world",
+                "sensor_errors",
+            ] {
                 assert!(code.remove(&spelling(sub)), "{sub}");
             }
         }
@@ -171,7 +188,7 @@ fn every_range_of_a_scenario_is_the_codes() {
             );
         }
     }
-    assert_eq!(numbers, 42, "fields with a range of numbers");
+    assert_eq!(numbers, 69, "fields with a range of numbers");
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod seal;
 mod size;
 mod speed;
 mod tool;
+mod wheel;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -84,6 +85,8 @@ enum Command {
         /// The ELF of steering-ecu, changed in place.
         elf: PathBuf,
     },
+    /// Builds the Python wheel into target/dist, and says what it weighs and links.
+    Wheel(wheel::Options),
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -116,6 +119,7 @@ fn main() -> ExitCode {
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
+        Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed),
             ..

@@ -241,6 +241,7 @@ impl<'a> Problem<'a> {
             delay_profile: Vec::new(),
             refuted: Vec::new(),
             assumed: Vec::new(),
+            beyond: Vec::new(),
             starts: vec![Start {
                 from_t_p_s: TABLE_4[T_P].0,
                 to_t_p_s: p[T_P],

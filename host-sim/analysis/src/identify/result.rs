@@ -325,6 +325,8 @@ pub struct Identification {
     pub balance: Option<Balance>,
     /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.
     pub delay_profile: Vec<[f64; 2]>,
+    /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late.
+    pub beyond: Vec<(&'static str, Parameter)>,
     /// Assumptions that the record refutes: with any, nothing is identified.
     pub refuted: Vec<Refutation>,
     /// What was taken as true and cannot be seen in the record.

@@ -14,12 +14,14 @@
 
 mod recorder;
 mod repetitions;
+mod spoiled;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
+pub use spoiled::{POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
@@ -148,6 +150,16 @@ struct Driven {
 
 /// Lets a published driver drive, with a remnant and the paper's sensors.
 fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
+    driven_by(plan, number, truth, truth.parameters())
+}
+
+/// The same, by a driver who differs from the published one in what the log does not name.
+fn driven_by(
+    plan: &Plan,
+    number: u32,
+    truth: &PublishedDriver,
+    driver: DriverParameters,
+) -> Result<Driven, String> {
     let guided = truth.k_hg.is_some();
     let seed = plan
         .seed
@@ -161,7 +173,7 @@ fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, S
     };
     let driver = DriverParameters {
         remnant_sd_nm,
-        ..*scenario.driver()
+        ..driver
     };
     let scenario = scenario.to_builder().driver(driver).build()?;
     let mut recorder = Recorder::new(true);

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::guidance_file::GuidanceFile;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors};
 use crate::input::{InputError, parse_toml};
+use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::real::WorldParameters;
 use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
 use crate::models::vehicle::VehicleParameters;
 
@@ -75,6 +77,8 @@ pub(super) fn parse(
         .sensors(file.sensors)
         .failure(file.failure)
         .driver_change(file.driver_change)
+        .world(file.world.unwrap_or_default())
+        .sensor_errors(file.sensor_errors.unwrap_or_default())
         .seed(file.seed))
 }
 
@@ -92,6 +96,8 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         sensors,
         failure,
         driver_change,
+        world,
+        sensor_errors,
         seed,
     } = &scenario.values;
     let built_in = *course == Course::paper();
@@ -129,6 +135,8 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         guidance: GuidanceFile(*guidance),
         failure: *failure,
         driver_change: *driver_change,
+        world: (*world != WorldParameters::default()).then_some(*world),
+        sensor_errors: (*sensor_errors != SensorErrors::default()).then_some(*sensor_errors),
     })
 }
 
@@ -248,6 +256,10 @@ struct ScenarioFile {
     guidance: GuidanceFile,
     failure: Failure,
     driver_change: Option<DriverChange>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    world: Option<WorldParameters>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensor_errors: Option<SensorErrors>,
 }
 
 impl Default for ScenarioFile {
@@ -265,6 +277,8 @@ impl Default for ScenarioFile {
             guidance: GuidanceFile::default(),
             failure: Failure::default(),
             driver_change: None,
+            world: None,
+            sensor_errors: None,
         }
     }
 }

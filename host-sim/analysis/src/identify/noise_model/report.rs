@@ -152,6 +152,11 @@ impl Problem<'_> {
             delay_profile,
             refuted: Vec::new(),
             assumed: Vec::new(),
+            beyond: [K_NMS, T_NMS, H_LATE, D_LATE]
+                .into_iter()
+                .filter(|&i| self.is_free(i))
+                .filter_map(|i| Some((NAMES[i]?, parameter(i))))
+                .collect(),
             starts,
             loss_history: optimum.history.clone(),
             termination: optimum.termination,
@@ -212,8 +217,23 @@ impl Problem<'_> {
         alternatives: &[Alternative],
         errors: &DMatrix<f64>,
     ) {
-        let mut refuted: Vec<Refutation> = found.balance.iter().flat_map(verdict::of_balance).collect();
-        refuted.extend(verdict::of_residuals(&found.whiteness, &found.input_correlation));
+        let mut refuted: Vec<Refutation> = Vec::new();
+        if options.manual && self.log.guidance_torque_nm.iter().any(|t| t.abs() > GUIDED_NM) {
+            // All else that is wrong follows from it.
+            found.balance = None;
+            refuted.push(Refutation {
+                assumption: "the drive was a manual one",
+                evidence: "guidance_torque_nm is not zero".to_owned(),
+                cause: "--manual was given for a guided drive".to_owned(),
+                cure: "leave --manual out".to_owned(),
+            });
+        }
+        refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
+        refuted.extend(verdict::of_residuals(
+            found.fit_percent,
+            &found.whiteness,
+            &found.input_correlation,
+        ));
         refuted.extend(self.beside_nothing(optimum));
         let p = &optimum.point;
         let tolerance = |i: usize| match i {
@@ -241,14 +261,6 @@ impl Problem<'_> {
                 ),
                 cause: format!("{name} is near {drawn:.3}, not {assumed:.3}"),
                 cure: format!("--estimate {name}, or --fix {name}=VALUE if it is known"),
-            });
-        }
-        if options.manual && self.log.guidance_torque_nm.iter().any(|t| t.abs() > GUIDED_NM) {
-            refuted.push(Refutation {
-                assumption: "the drive was a manual one",
-                evidence: "guidance_torque_nm is not zero".to_owned(),
-                cause: "--manual was given for a guided drive".to_owned(),
-                cure: "leave --manual out".to_owned(),
             });
         }
         if !refuted.is_empty() {

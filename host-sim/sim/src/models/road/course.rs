@@ -247,6 +247,14 @@ impl Course {
         &self.segments
     }
 
+    /// Whether no part of the course is banked. A grade does not move a vehicle of a given speed.
+    pub fn is_level(&self) -> bool {
+        match &self.pieces {
+            Some(pieces) => pieces.iter().all(|piece| piece.bank_rad == [0.0; 2]),
+            None => self.segments.iter().all(|segment| segment.bank_rad == [0.0; 2]),
+        }
+    }
+
     /// Whether the segments are all there is to the course.
     pub fn is_of_segments(&self) -> bool {
         self.pieces.is_none()
