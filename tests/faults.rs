@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use haptic_campaign::table::{Place, Row, rows};
+use haptic_campaign::table::{FaultCase, Place, rows};
 use haptic_campaign::{World, campaign, document};
 
 #[test]
 fn every_fault_with_a_few_seeds_breaks_no_rule() {
-    let here: Vec<&'static Row> = rows().filter(|row| row.place != Place::Target).collect();
+    let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
     let campaign = campaign::run(&World::new(), &here, 1..5, || ());
     let failed: Vec<_> = campaign.failures().collect();
     assert!(failed.is_empty(), "{failed:#?}");
@@ -35,7 +35,7 @@ fn contradictions_are_seen() {
     }
 }
 
-/// The list that a controller has to survive, by the number of rows that each entry needs at least.
+/// The list that a controller has to survive: each of its entries is a row of the table.
 #[test]
 fn names_are_unique_and_every_group_is_there() {
     let names: BTreeSet<&str> = rows().map(|row| row.name).collect();

@@ -37,6 +37,7 @@ impl Actuator {
 
     /// Takes the command of the last step; `false` when the motor has been away from what it was told for
     /// more than 10 ms. Without a measurement there is nothing to say: its silence is a fault of the column.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn obeys(&mut self, commanded: Torque) -> bool {
         self.commanded[self.oldest % COMMANDS] = commanded;
         self.oldest = self.oldest.wrapping_add(1);

@@ -49,6 +49,7 @@ impl Background {
 
     /// The work for one step, and the telemetry when it is its turn. A step that took a new sample has decoded and
     /// checked it: the estimator gets it one step later, and the telemetry stands back for up to [`PATIENCE`].
+    #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]
     pub(crate) fn step(&mut self) -> Option<Frame> {
         let [new, sample] = &self.samples;
         let mut is_free = new.is_none();
@@ -59,7 +60,7 @@ impl Background {
                 *none = Some(self.estimator.start());
                 is_free = false;
             }
-            // What a driver did before is no evidence of what he does now.
+            // What a driver did before is no evidence of what the driver does now.
             (state, None) => *state = None,
         }
         let steps = self.steps;

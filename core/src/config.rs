@@ -3,6 +3,14 @@
 //! Everything is `const`, so that a firmware image checks its built-in set at compile time and carries no float code
 //! for it. Not here: the list of parameters with their ranges ([`crate::params`]).
 
+#![expect(
+    clippy::as_conversions,
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing,
+    reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
+)]
+
 use crate::envelope::Envelope;
 use crate::estimator::{BLOCK_S, Estimator};
 use crate::law::Law;

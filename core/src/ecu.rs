@@ -261,6 +261,7 @@ impl Ecu {
         (Memory::new(faults, now), inputs)
     }
 
+    #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]
     fn guidance(&self, command: &Command, steps: u32) -> Frame {
         Guidance {
             torque: command.torque,
@@ -274,6 +275,10 @@ impl Ecu {
     }
 
     /// A warning in the step that needs it, then one each turn; a line of the fault history each turn.
+    #[expect(
+        clippy::as_conversions,
+        reason = "a counter is cut to its four bits; there are at most 32 lines"
+    )]
     fn others(&mut self, command: &Command, steps: u32) -> Vec<Frame, 2> {
         let mut frames = Vec::new();
         let due = |since: u32| steps.wrapping_sub(since).is_multiple_of(TURN);
@@ -305,6 +310,12 @@ impl Ecu {
             }
         }
         frames
+    }
+
+    /// Whether the vehicle stands, by both of its speeds; not when they are unknown.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        self.receivers.stands()
     }
 
     /// The configuration in use, if its copies agree.

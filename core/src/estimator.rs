@@ -25,10 +25,17 @@
 //!
 //! Not here: when to run. Without a probe there is nothing to read, and the ECU starts anew with the next.
 
-use heapless::Deque;
+#![expect(
+    clippy::as_conversions,
+    clippy::float_arithmetic,
+    reason = "the estimate of K_hg is in f32; it moves nothing, and runs when the torque is on its way"
+)]
+
+mod average;
 
 use crate::quantity::{Instant, Radians, Ratio, Torque};
 use crate::sine::{ONE, QUARTER, sine};
+use average::{Average, Change, Work};
 
 /// What the estimator knows of the probe and the driver's arm; immutable.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,75 +112,8 @@ impl Complex {
     }
 }
 
-/// What is left to do for the last block.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Work {
-    Nothing,
-    /// Take a reading into the average.
-    Average(f32),
-    /// Look for a change before the last `length` readings, whose sum is `sum`; the best so far.
-    Compare {
-        length: u8,
-        sum: f32,
-        best: Change,
-    },
-    /// Drop the memory before the change, if it was one, and report.
-    Conclude(Change),
-}
-
-/// A supposed change: its significance, 1 where it is one, and the mean and the number of readings since.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Change {
-    significance: f32,
-    mean: f32,
-    count: u8,
-}
-
-/// The readings so far.
-#[derive(Debug, Clone, PartialEq)]
-struct Average {
-    mean: f32,
-    /// Readings in the mean, at most [`MEMORY`].
-    count: u8,
-    /// Weighted sum of squared innovations, and the sum of the weights.
-    squares: f32,
-    weights: f32,
-    /// Readings since the start, at most [`FIRST_REPORT`].
-    total: u8,
-    recent: Deque<f32, LONGEST>,
-}
-
 /// A block lasts the whole number of periods that is nearest to this, s.
 pub(crate) const BLOCK_S: f64 = 2.0;
-/// The average forgets beyond so many readings (40 s).
-const MEMORY: u8 = 40;
-/// No report before so many: 6 s.
-const FIRST_REPORT: u8 = 5;
-/// A change is looked for among so many of the last readings.
-const LONGEST: usize = 14;
-/// The fewest readings on either side of a change.
-const SHORTEST: u8 = 3;
-/// How many standard deviations the means before and after a change differ by, at least; more where few
-/// readings are all there is. Noise alone drops the memory once in 15 minutes. Squared.
-const CHANGE: f32 = 3.1 * 3.1;
-const CHANGE_OF_FEW: f32 = 3.8 * 3.8;
-/// So many are few no longer.
-const FEW: u8 = 6;
-/// Variance of a reading before the first one, at the amplitude of [`PRIOR_NM`], and how many readings this
-/// prior counts for: 0.1 N.m of driver noise gives 0.15 to 0.2.
-const PRIOR_VARIANCE: f32 = 0.18 * 0.18;
-const PRIOR_NM: f32 = 0.2;
-const PRIOR_WEIGHT: f32 = 8.0;
-/// The spread is remembered over so many readings.
-const SPREAD_MEMORY: f32 = 60.0;
-/// An innovation counts for at most this many variances: a change is no spread.
-const OUTLIER: f32 = 9.0;
-/// Overlapping neighbours are correlated: the variance of a mean of n readings is 1.2/n of one's, and that of
-/// the difference of two means 1.25 times what independent readings would have.
-const OVERLAP_MEAN: f32 = 1.2;
-const OVERLAP_DIFFERENCE: f32 = 1.25;
-/// Deviation that no averaging takes away: the driver's eyes do play a small part.
-const FLOOR: f32 = 0.02 * 0.02;
 /// A block in which limits left less than half of the probe says nothing.
 const LEAST_SHARE: f32 = 0.5;
 
@@ -181,7 +121,6 @@ impl Estimator {
     /// Nothing seen yet.
     #[must_use]
     pub fn start(&self) -> EstimatorState {
-        let scale = PRIOR_NM / self.amplitude_nm;
         EstimatorState {
             last_phase: None,
             window: 0,
@@ -194,14 +133,7 @@ impl Estimator {
             ],
             work: Work::Nothing,
             spared: false,
-            average: Average {
-                mean: 0.0,
-                count: 0,
-                squares: PRIOR_WEIGHT * PRIOR_VARIANCE * scale * scale,
-                weights: PRIOR_WEIGHT,
-                total: 0,
-                recent: Deque::new(),
-            },
+            average: Average::new(self.amplitude_nm),
             reading: None,
         }
     }
@@ -293,76 +225,6 @@ impl EstimatorState {
     #[must_use]
     pub fn reading(&self) -> Option<Reading> {
         self.reading
-    }
-}
-
-impl Average {
-    fn take(&mut self, reading: f32) {
-        if self.recent.is_full() {
-            self.recent.pop_front();
-        }
-        // There is room: the oldest has just left.
-        let _ = self.recent.push_back(reading);
-        let count = f32::from(self.count);
-        let innovation = reading - self.mean;
-        if self.count > 0 {
-            // Less the spread of the mean itself.
-            let square = innovation * innovation * count / (count + 1.0);
-            let square = square.min(OUTLIER * self.variance());
-            let kept = 1.0 - 1.0 / SPREAD_MEMORY;
-            self.squares = self.squares * kept + square;
-            self.weights = self.weights * kept + 1.0;
-        }
-        self.count = self.count.saturating_add(1).min(MEMORY);
-        self.total = self.total.saturating_add(1).min(FIRST_REPORT);
-        self.mean += innovation / f32::from(self.count);
-    }
-
-    /// Variance of one reading.
-    fn variance(&self) -> f32 {
-        self.squares / self.weights
-    }
-
-    /// One more reading to the supposed new ones, and how significant a change before it would be.
-    fn compare(&self, length: u8, sum: f32, best: Change) -> Work {
-        let next = self.recent.iter().rev().nth(usize::from(length));
-        let length = length.saturating_add(1);
-        let before = self.count.saturating_sub(length);
-        let (Some(next), true) = (next, before >= SHORTEST) else {
-            return Work::Conclude(best);
-        };
-        let sum = sum + next;
-        let (new, old) = (f32::from(length), f32::from(before));
-        let mean = sum / new;
-        let mean_before = (f32::from(self.count) * self.mean - sum) / old;
-        let difference = mean - mean_before;
-        let variance = OVERLAP_DIFFERENCE * self.variance() * (1.0 / new + 1.0 / old);
-        let least = if length < FEW { CHANGE_OF_FEW } else { CHANGE };
-        let significance = difference * difference / (variance * least);
-        let better = length >= SHORTEST && significance > best.significance;
-        let best = if better {
-            Change {
-                significance,
-                mean,
-                count: length,
-            }
-        } else {
-            best
-        };
-        Work::Compare { length, sum, best }
-    }
-
-    fn conclude(&mut self, change: Change) -> Option<Reading> {
-        if change.significance > 1.0 {
-            (self.mean, self.count) = (change.mean, change.count);
-        }
-        let variance = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;
-        // An integer root is exact, and the same everywhere: 2^-28 in, 2^-14 out.
-        let deviation = ((variance * 268_435_456.0) as u32).isqrt();
-        (self.total >= FIRST_REPORT).then(|| Reading {
-            k_hg: Ratio::from_f32(self.mean),
-            deviation: Ratio::from_wide(i64::from(deviation) << 10),
-        })
     }
 }
 

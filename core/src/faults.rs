@@ -100,11 +100,18 @@ faults! {
     12 SelfTest: C, Known;
     /// Locked: no good copy of the parameters.
     13 Parameters: Locked, Known;
-    /// Locked: three resets within 10 s.
+    /// Locked: three resets within 10 s, or ten since power-up.
     14 ResetLoop: Locked, Known;
+    /// B: lane previews arrive, and for 30 ms each is too far from the last one used to be true.
+    15 LaneStep: B, Known;
+    /// B: speeds arrive, and for 30 ms each is too far from the last one used to be true.
+    16 SpeedStep: B, Known;
+    /// B: another node sends under an identifier of this ECU; for a second after the last such frame.
+    17 OwnIdentifier: B, Known;
 }
 
 // The word has 32 bits, and a fault's code is its place in the list.
+#[expect(clippy::as_conversions, clippy::indexing_slicing, reason = "at compile time")]
 const _: () = {
     assert!(Fault::COUNT <= 32, "the fault word is full");
     let mut i = 0;
@@ -128,6 +135,7 @@ impl FaultSet {
     /// What forbids to leave Boot.
     pub const LOCKING: Self = Self::of(Class::Locked);
     /// Inputs that arrive, but cannot be true: since when is unknown.
+    #[expect(clippy::indexing_slicing, reason = "at compile time")]
     pub const IMPLAUSIBLE: Self = {
         let (mut set, mut i) = (0, 0);
         while i < Fault::COUNT {
@@ -143,6 +151,12 @@ impl FaultSet {
 
     /// Every fault of a class.
     #[must_use]
+    #[expect(
+        clippy::as_conversions,
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        reason = "the index stays below the count"
+    )]
     pub const fn of(class: Class) -> Self {
         let (mut set, mut i) = (0, 0);
         while i < Fault::COUNT {
@@ -214,6 +228,7 @@ impl FaultSet {
         Self(self.0 & !other.0)
     }
 
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     const fn bit(fault: Fault) -> u32 {
         1_u32.wrapping_shl(fault as u32)
     }
@@ -293,6 +308,7 @@ impl History {
     }
 
     /// Every fault that ever appeared, in the order of the bits.
+    #[expect(clippy::as_conversions, reason = "at most 65,535")]
     pub fn records(&self) -> impl Iterator<Item = Record> {
         let lines = self.counts.iter().zip(&self.seen_s);
         let records = Fault::ALL.into_iter().zip(lines);

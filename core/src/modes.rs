@@ -95,6 +95,11 @@ impl Mode {
     }
 
     /// The events that change the mode, from the table.
+    #[expect(
+        clippy::as_conversions,
+        clippy::indexing_slicing,
+        reason = "the table is built at compile time, and a mode has a place in it"
+    )]
     const fn changing(self) -> Events {
         const CHANGING: [Events; Mode::ALL.len()] = {
             let mut all = [Events(0); Mode::ALL.len()];
@@ -129,11 +134,13 @@ pub struct Events(u32);
 impl Events {
     /// One event.
     #[must_use]
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     pub const fn of(event: Event) -> Self {
         Self(1 << event as u32)
     }
 
     /// Adds an event if it was raised.
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     pub const fn insert_if(&mut self, raised: bool, event: Event) {
         self.0 |= (raised as u32) << event as u32;
     }

@@ -164,6 +164,10 @@ impl Monitor {
         torque.saturating_abs() <= bound.saturating_add(OVERRIDE_SLACK_MNM)
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the span is at least a millisecond"
+    )]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
         if state.lane.age_us > OLDEST_LANE_US && torque != 0 {
             return false;
@@ -171,9 +175,16 @@ impl Monitor {
         let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
         let (lane, before) = (&state.lane, &state.before);
         let span_ms = (before.age_us.saturating_sub(lane.age_us) / 1000).max(1);
-        let e_y_mmps = lane.e_y_mm.saturating_sub(before.e_y_mm).saturating_mul(1000) / span_ms;
-        let e_theta_urps =
-            (lane.e_theta_urad.saturating_sub(before.e_theta_urad) / span_ms).saturating_mul(1000);
+        let e_y_mmps = lane
+            .e_y_mm
+            .saturating_sub(before.e_y_mm)
+            .saturating_mul(1000)
+            .saturating_div(span_ms);
+        let e_theta_urps = lane
+            .e_theta_urad
+            .saturating_sub(before.e_theta_urad)
+            .saturating_div(span_ms)
+            .saturating_mul(1000);
         let position = per_m
             .saturating_mul(lane.e_y_mm)
             .saturating_div(1000)
@@ -218,7 +229,7 @@ impl Monitor {
         }
         state.torque_mnm = torque.saturating_sub(grown);
         // The least count that is cut to so many mN.m again.
-        let count = torque.saturating_mul(4096) / 1000 + 1;
+        let count = torque.saturating_mul(4096).saturating_div(1000).saturating_add(1);
         let [count, mode] = [count, mode].map(|field| u64::from(field.cast_unsigned()));
         let word = (count << 12).saturating_add(mode << 32);
         (state, word.to_le_bytes())
@@ -254,6 +265,7 @@ impl MonitorState {
 }
 
 /// A signed little-endian bit field.
+#[expect(clippy::as_conversions, reason = "fewer bits than an i32 has")]
 fn field(bytes: &[u8; 8], start: u32, length: u32) -> i32 {
     let up = 64_u32.wrapping_sub(start).wrapping_sub(length);
     let down = 64_u32.wrapping_sub(length);

@@ -8,7 +8,14 @@
 //!
 //! Not here: ranges that make sense for a signal. Those belong to the bus messages and the parameters.
 
-use fixed::types::I8F24;
+#![expect(
+    clippy::as_conversions,
+    clippy::arithmetic_side_effects,
+    clippy::float_arithmetic,
+    reason = "the one file where SI values become bits: `as` saturates from floats, and widens integers"
+)]
+
+use core::fmt;
 
 use crate::redundant::Words;
 
@@ -16,16 +23,16 @@ macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $from:ident, $get:ident, $unit:literal) => {
         $(#[$doc])*
         /// Format I8F24: LSB 2^-24, range -128 to 128 (exclusive).
-        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-        pub struct $name(I8F24);
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $name(i32);
 
         impl $name {
             /// Zero.
-            pub const ZERO: Self = Self(I8F24::ZERO);
+            pub const ZERO: Self = Self(0);
             /// The least value, -128.
-            pub const MIN: Self = Self(I8F24::MIN);
+            pub const MIN: Self = Self(i32::MIN);
             /// The largest value, 128 - 2^-24.
-            pub const MAX: Self = Self(I8F24::MAX);
+            pub const MAX: Self = Self(i32::MAX);
 
             #[doc = concat!("From ", $unit, ": rounds to nearest, saturates at the ends of the range.")]
             #[must_use]
@@ -36,13 +43,13 @@ macro_rules! quantity {
             #[doc = concat!("The value in ", $unit, " (exact).")]
             #[must_use]
             pub const fn $get(self) -> f64 {
-                self.0.to_bits() as f64 / ONE as f64
+                self.0 as f64 / ONE as f64
             }
 
             /// As f32, rounded to nearest: for what is advisory only.
             #[must_use]
             pub const fn to_f32(self) -> f32 {
-                self.0.to_bits() as f32 * (1.0 / ONE as f32)
+                self.0 as f32 * (1.0 / ONE as f32)
             }
 
             /// So many times itself, saturating: from counts of a converter, itself being one of them.
@@ -58,7 +65,7 @@ macro_rules! quantity {
             }
 
             pub(crate) const fn from_bits(bits: i32) -> Self {
-                Self(I8F24::from_bits(bits))
+                Self(bits)
             }
 
             /// From a count of 2^-24, saturating.
@@ -67,7 +74,13 @@ macro_rules! quantity {
             }
 
             pub(crate) const fn bits(self) -> i32 {
-                self.0.to_bits()
+                self.0
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.debug_tuple(stringify!($name)).field(&self.$get()).finish()
             }
         }
 

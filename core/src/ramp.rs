@@ -97,11 +97,13 @@ impl History {
     }
 
     /// The output that is `back` places older than the newest.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     const fn output(&self, back: usize) -> (Instant, Torque) {
         self.outputs[self.newest.wrapping_sub(back) % RING]
     }
 
     /// Remembers an output.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn push(&mut self, now: Instant, torque: Torque) {
         if now.since(self.output(0).0) >= HISTORY_STEP {
             self.newest = self.newest.wrapping_add(1);

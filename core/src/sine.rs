@@ -5,6 +5,11 @@
 //! polynomial of degree 7 on the quarter wave. Error: at most 7e-7 of full scale, a twentieth of an LSB of
 //! the bus for the largest probe (the test below asserts it against f64). Cost: about 30 instructions.
 
+#![expect(
+    clippy::as_conversions,
+    reason = "a phase is any 32 bits, and a product of two fits an i64"
+)]
+
 /// One, in the sine's format.
 pub(crate) const ONE: i32 = 1 << 30;
 

@@ -5,6 +5,8 @@
 //! - `boards`: the [`boards::Board`] trait and one file per board; a feature of the same name chooses it.
 //! - `log`: defmt over the board's log port.
 //! - `product`: the product's loop. [`reset`]: why the processor started. `stack`: its guard and its budget.
+//! - [`image`]: whether the image in the flash is the one that was built.
+//! - [`eccr`]: where in the STM32G4's flash an error lies.
 //! - [`analogue`]: a motor stage and the column's sensors, in counts of converters.
 //! - [`storage`]: parameters in flash, [`nor`]: a model of a flash.
 //! - `host`: words from the machine that runs QEMU.
@@ -20,6 +22,9 @@
 #![cfg_attr(target_os = "none", no_std)]
 
 pub mod analogue;
+#[cfg(any(feature = "nucleo-g474re", not(target_os = "none")))]
+pub mod eccr;
+pub mod image;
 #[cfg(any(not(target_os = "none"), feature = "semihosting"))]
 pub mod nor;
 #[cfg(any(target_os = "none", test))]

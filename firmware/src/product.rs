@@ -3,27 +3,39 @@
 //! What is broken does not steer: a panic or a fault brings the torque to zero and resets the processor with
 //! the cause on record; a loop that hangs, or that the monitor does not permit, loses the watchdog. The
 //! controller comes up in Standby, or in the Fault that it had latched, says why on the bus, and locks after three
-//! resets within 10 s.
+//! resets within 10 s, or ten since power-up.
 //!
-//! Its parameters are the newest good set of the flash. Without any it has those built into the image, unless both
-//! copies are damaged: then it locks. A set that comes over the bus is stored at the restart that it causes: the
-//! flash is never touched while the loop runs, since an erase takes longer than the watchdog waits.
+//! Its parameters are the newest good set of the flash. Without any, both copies blank or damaged, it locks and waits
+//! for a set over the bus; an image for the bench (feature `bench`) takes the paper's on a blank flash. A set that comes
+//! over the bus is stored at the restart that it causes: the flash is never touched while the loop runs, since an erase
+//! takes longer than the watchdog waits. At every start a copy that cannot be read is written anew.
+//!
+//! An image that is not as it was built begins in Fault ([`image`]); a chip with other options than the memory map's
+//! locks, and its flash is not touched.
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
-use haptic_core::bus::messages::{Column, Message, ParameterStatus, ResetCause};
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::{Column, Message, ParameterStatus, ParameterValue, Rejection, ResetCause};
 use haptic_core::config::Setup;
-use haptic_core::download::Download;
+use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::faults::FaultSet;
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
+use haptic_core::params::Params;
+use haptic_core::rejections::Rejections;
 
 use crate::boards::{Board, ThisBoard};
 use crate::storage::{self, Found};
-use crate::{analogue, reset, stack};
+use crate::{analogue, image, reset, stack};
 
 /// Steps between two lines of the log: one second.
 const STEPS_PER_REPORT: u32 = 1000;
+/// Steps between two parameters in use, and two counts of rejections, on the bus; these half a turn apart, and neither in
+/// a step with a warning or a line of the fault history, which come on multiples of 50.
+const STEPS_PER_LINE: u32 = 100;
+const VALUE_AT: u32 = 25;
+const REJECTION_AT: u32 = 75;
 /// Steps after which earlier resets no longer count: 10 s.
 const STEPS_TO_SETTLE: u32 = 10_000;
 
@@ -32,25 +44,43 @@ const STEPS_TO_SETTLE: u32 = 10_000;
 struct Counts {
     steps: u32,
     received: u32,
-    rejected: u32,
+    rejected: Rejections,
     unsent: u32,
     /// Cycles of the frames received since the last step, and the most that they and a step took.
     receiving: u32,
     worst_cycles: u32,
+    /// The last count that the log told.
+    told: Option<Rejection>,
+    /// Faults that the record of resets holds already.
+    latched: FaultSet,
 }
 
 /// What has to do with parameters.
 struct Service {
     download: Download,
-    /// The mode of the last step.
+    /// As the download sees it, of the last step.
     mode: Mode,
     found: Found,
+    /// The set in use; None while the controller is locked for want of one.
+    in_use: Option<Params>,
+    boot: Boot,
 }
 
 impl Service {
     fn status(&self) -> ParameterStatus {
         let is_damaged = self.found.damaged != [false, false];
         self.download.status(self.found.stored.as_ref(), is_damaged)
+    }
+
+    /// What a set finds that comes now.
+    fn conditions(&self, ecu: &Ecu, steps: u32) -> Conditions {
+        Conditions {
+            mode: self.mode,
+            stands: ecu.stands(),
+            settled: self.boot.reset == ResetCause::PowerOn || steps >= STEPS_TO_SETTLE,
+            in_use: self.found.stored.map_or(0, |stored| stored.sequence),
+            now_ms: steps,
+        }
     }
 }
 
@@ -59,13 +89,24 @@ impl Service {
 pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot, u32)) -> ! {
     stack::paint();
     let mut board = ThisBoard::start();
-    let boot = reset::boot(board.reset_source());
-    let found = parameters(&mut board);
-    let ecu = begin(ecu, &found, boot);
+    let mut boot = reset::boot(board.reset_source());
+    let image = image::look();
+    boot.latched.insert_if(!image.is_good(), Fault::Memory);
+    let is_sound = image.is_good() && board.has_expected_options();
+    let found = if is_sound {
+        parameters(&mut board)
+    } else {
+        Found::default()
+    };
+    let params = params(&found).filter(|_| is_sound);
+    let setup = params.and_then(|params| Setup::new(&params).ok());
+    let ecu = begin(ecu, setup.as_ref(), boot);
     let mut service = Service {
         download: Download::NEW,
         mode: Mode::Boot,
         found,
+        in_use: params,
+        boot,
     };
     let mut counts = Counts::default();
     defmt::info!(
@@ -75,6 +116,14 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
         boot.recent_resets,
         found.stored.map_or(0, |stored| stored.sequence)
     );
+    match image {
+        image::State::Whole => {}
+        image::State::Unsealed => defmt::warn!("nobody sealed this image (cargo xtask seal)"),
+        image::State::Damaged => defmt::error!("the image is not as it was built"),
+    }
+    if !board.has_expected_options() {
+        defmt::error!("the chip's options are not those of the memory map: the flash is left alone");
+    }
     board.start_tick();
     board.start_watchdog();
     loop {
@@ -86,12 +135,14 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
                 continue;
             }
             let start = ThisBoard::cycles();
-            if ecu.receive(&frame, ThisBoard::now()).is_err() {
-                counts.rejected = counts.rejected.wrapping_add(1);
-            }
+            let received = ecu.receive(&frame, ThisBoard::now());
             let cycles = ThisBoard::cycles().wrapping_sub(start);
             counts.receiving = counts.receiving.wrapping_add(cycles);
-            if let Some(params) = service.download.receive(&frame, service.mode) {
+            if let Err(reason) = received {
+                counts.rejected.count(frame.id(), reason);
+            }
+            let conditions = service.conditions(ecu, counts.steps);
+            if let Some(params) = service.download.receive(&frame, &conditions) {
                 ThisBoard::zero_torque();
                 reset::restart_with(&params);
             }
@@ -103,31 +154,35 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     }
 }
 
-/// Stores the set that the last run left, if it did, and looks at what there is.
+/// Stores the set that the last run left, if it did, looks at what there is, and repairs it.
 #[inline(never)]
 fn parameters(board: &mut ThisBoard) -> Found {
-    let found = storage::load(board.flash());
-    let Some(params) = reset::take_parameters() else {
-        return found;
-    };
-    if storage::save(board.flash(), &params, found.stored.as_ref()).is_err() {
-        defmt::error!("the parameters could not be stored");
+    let mut found = storage::load(board.flash());
+    if let Some(params) = reset::take_parameters() {
+        if storage::save(board.flash(), &params, found.stored.as_ref()).is_err() {
+            defmt::error!("the parameters could not be stored");
+        }
+        found = storage::load(board.flash());
+    }
+    if storage::repair(board.flash(), &found).is_err() {
+        defmt::error!("a copy of the parameters could not be repaired");
     }
     storage::load(board.flash())
 }
 
 /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
 #[inline(never)]
-fn begin(ecu: &'static mut Option<Ecu>, found: &Found, boot: Boot) -> &'static mut Ecu {
-    ecu.insert(Ecu::new(setup(found).as_ref(), boot, ThisBoard::now()))
+fn begin(ecu: &'static mut Option<Ecu>, setup: Option<&Setup>, boot: Boot) -> &'static mut Ecu {
+    ecu.insert(Ecu::new(setup, boot, ThisBoard::now()))
 }
 
 /// What the controller starts with; None locks it.
-fn setup(found: &Found) -> Option<Setup> {
+fn params(found: &Found) -> Option<Params> {
     match found.stored {
-        Some(stored) => Setup::new(&stored.params).ok(),
+        Some(stored) => Some(stored.params),
         None if found.damaged == [true, true] => None,
-        None => Some(Setup::PAPER),
+        // A vehicle that was set up for less must not get the paper's 5 N.m because its flash was erased.
+        None => cfg!(feature = "bench").then_some(Params::PAPER),
     }
 }
 
@@ -140,8 +195,8 @@ fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
     {
         // By the codec, as from the bus: what judges a sample there judges it here.
         let frame = column.encode(counts.steps as u8);
-        if ecu.receive(&frame, ThisBoard::now()).is_err() {
-            counts.rejected = counts.rejected.wrapping_add(1);
+        if let Err(reason) = ecu.receive(&frame, ThisBoard::now()) {
+            counts.rejected.count(frame.id(), reason);
         }
     }
     let start = ThisBoard::cycles();
@@ -155,8 +210,11 @@ fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
     if step.permitted {
         board.feed_watchdog();
     }
-    if step.command.faults.intersects(FaultSet::CRITICAL) {
-        reset::latch(step.command.faults.common(FaultSet::CRITICAL));
+    let critical = step.command.faults.common(FaultSet::CRITICAL);
+    if critical != counts.latched {
+        // Once: it stays in the record, whose checks cost more than a look at what was written.
+        counts.latched = critical;
+        reset::latch(critical);
     }
     step
 }
@@ -170,13 +228,14 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
-    service.mode = step.command.mode;
+    service.mode = mode_for_parameters(step.command.mode, step.command.faults);
     // The torque is on its way; what follows may take its time.
     let status = counts.steps.is_multiple_of(STEPS_PER_REPORT).then(|| {
         let turn = counts.steps / STEPS_PER_REPORT;
         service.status().encode(turn as u8)
     });
-    for frame in ecu.background_step().iter().chain(&status) {
+    let line = line(service, counts);
+    for frame in ecu.background_step().iter().chain(&status).chain(&line) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }
@@ -194,12 +253,36 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, worst step {=u32} cycles, stack {=u32} of {=u32}",
             counts.steps,
             counts.received,
-            counts.rejected,
+            counts.rejected.total(),
             counts.unsent,
             counts.worst_cycles,
             stack::used(),
             stack::budget()
         );
+    }
+}
+
+/// A parameter in use or a count of rejections, when it is its turn.
+fn line(service: &Service, counts: &mut Counts) -> Option<Frame> {
+    let turn = counts.steps / STEPS_PER_LINE;
+    match counts.steps % STEPS_PER_LINE {
+        VALUE_AT => {
+            let value: ParameterValue = download::value(service.in_use.as_ref()?, turn)?;
+            Some(value.encode(turn as u8))
+        }
+        REJECTION_AT => {
+            let line: Rejection = counts.rejected.line()?;
+            if counts.told.replace(line) != Some(line) {
+                defmt::warn!(
+                    "message {=u16:#05x} was not used {=u16} times, reason {=u8}",
+                    line.id,
+                    line.count,
+                    line.reason as u8
+                );
+            }
+            Some(line.encode(turn as u8))
+        }
+        _ => None,
     }
 }
 

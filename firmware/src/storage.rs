@@ -6,6 +6,9 @@
 //! not loaded, reads it back, and only then the other one. So power may go at any moment: the last good set, or
 //! the new one, is there.
 //!
+//! [`repair`] brings a copy that cannot be read, or that a cut left behind, up to the other one: at the next start, not
+//! at the next write, so that one rotten copy never waits for a second.
+//!
 //! The copies lie in the last four pages of the flash they are given; the board's memory map leaves these out.
 //!
 //! Why a region each and the read-back: the crate's own map recovers from a cut write too, but a store that it
@@ -72,6 +75,26 @@ pub fn save<F: NorFlash>(flash: &mut F, params: &Params, last: Option<&Stored>) 
         write(flash, copy, &bytes)?;
     }
     Ok(())
+}
+
+/// Brings the copy that is not in use up to the one that is, if they differ. Touches the other one only.
+///
+/// # Errors
+/// It does not read back.
+pub fn repair<F: NorFlash>(flash: &mut F, found: &Found) -> Result<(), WriteFailed> {
+    let Some(Stored {
+        params,
+        sequence,
+        copy,
+    }) = &found.stored
+    else {
+        return Ok(());
+    };
+    let bytes = stored::save(params, *sequence);
+    if read(flash, 1 - copy).as_ref() == Some(&bytes) {
+        return Ok(());
+    }
+    write(flash, 1 - copy, &bytes)
 }
 
 /// First and last byte of a copy's region.

@@ -6,7 +6,7 @@
 
 use haptic_core::params::Params;
 use haptic_firmware::nor::{Nor, PAGE};
-use haptic_firmware::storage::{Found, WriteFailed, load, save};
+use haptic_firmware::storage::{Found, WriteFailed, load, repair, save};
 
 type Memory = [u8; 4 * PAGE];
 
@@ -137,6 +137,98 @@ fn a_rotten_copy_is_told_and_the_other_one_used() {
     }
     // 2 x 164 bytes of which few are 0xFF; marks of pages are not part of a block.
     assert!(bits > 200 && told * 10 > bits * 8, "{told} of {bits}");
+}
+
+/// What a start makes of the memory, with the supply cut after `operations`, and whether it was.
+fn repaired(memory: &Memory, operations: Option<u32>) -> (Memory, bool) {
+    let mut flash = Nor::new(*memory);
+    let found = load(&mut flash);
+    if let Some(operations) = operations {
+        flash.cut_after(operations);
+    }
+    let result = repair(&mut flash, &found);
+    let is_cut = flash.is_cut();
+    assert!(is_cut || result == Ok(()), "{result:?}");
+    (flash.into_memory(), is_cut)
+}
+
+/// A copy rots, the start that finds it repairs it, and then the other one may rot: the set is still there.
+#[test]
+fn a_rotten_copy_is_repaired_at_once_and_power_may_go_meanwhile() {
+    let memory = write(&BLANK, 1, None).0;
+    let mut cuts = 0;
+    for at in (0..memory.len()).filter(|at| memory[*at] != 0xFF) {
+        let mut rotten = memory;
+        rotten[at] ^= 0x10;
+        let (after, _) = repaired(&rotten, None);
+        assert_eq!(found(&after).damaged, [false, false], "byte {at}");
+        assert_eq!(
+            found(&after).stored.map(|s| (s.params, s.sequence)),
+            Some((set(1), 1))
+        );
+        // Every byte of the copy that was good before.
+        for other in (0..after.len()).filter(|other| after[*other] != 0xFF && at % 41 == 0) {
+            let mut both = after;
+            both[other] ^= 0x10;
+            assert_eq!(
+                found(&both).stored.map(|s| s.params),
+                Some(set(1)),
+                "bytes {at}, {other}"
+            );
+        }
+        for operations in 1.. {
+            let (cut, is_cut) = repaired(&rotten, Some(operations));
+            if !is_cut {
+                break;
+            }
+            assert_one_of(&cut, 1, 1, &format!("byte {at}, repair cut after {operations}"));
+            let again = repaired(&cut, None).0;
+            assert_eq!(found(&again).damaged, [false, false], "byte {at}, {operations}");
+            cuts += 1;
+        }
+    }
+    assert!(cuts > 2000, "{cuts} cuts");
+}
+
+/// A write that is cut after its first copy leaves an old set in the second: rotting later, it must not come back.
+#[test]
+fn a_copy_that_a_cut_left_behind_is_brought_up_to_the_new_set() {
+    let mut memory = write(&BLANK, 1, None).0;
+    let mut left_behind = 0;
+    for number in 2..30 {
+        for operations in 1.. {
+            let (cut, is_cut) = write(&memory, number, Some(operations));
+            if !is_cut {
+                break;
+            }
+            let in_use = found(&cut).stored.unwrap().sequence;
+            let (after, _) = repaired(&cut, None);
+            let sequences: Vec<_> = [0, 1]
+                .map(|copy| {
+                    // The other copy gone: pages of 2 KiB, copy 1 first.
+                    let mut alone = after;
+                    let from = if copy == 0 { 0 } else { 2 * PAGE };
+                    alone[from..from + 2 * PAGE].fill(0xFF);
+                    found(&alone).stored.map(|s| s.sequence)
+                })
+                .into();
+            assert_eq!(
+                sequences,
+                [Some(in_use); 2],
+                "write {number} cut after {operations}"
+            );
+            left_behind += u32::from(in_use == number);
+        }
+        memory = write(&memory, number, None).0;
+    }
+    assert!(left_behind > 100, "{left_behind}");
+}
+
+#[test]
+fn nothing_is_repaired_where_nothing_is_stored_or_wrong() {
+    assert_eq!(repaired(&BLANK, Some(1)), (BLANK, false));
+    let memory = write(&BLANK, 1, None).0;
+    assert_eq!(repaired(&memory, Some(1)), (memory, false));
 }
 
 #[test]

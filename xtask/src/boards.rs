@@ -11,6 +11,7 @@ use serde_json::Value;
 use crate::code::{CONTROLLER, Code, PRODUCT};
 use crate::golden::{self, Figure};
 use crate::image::{self, Image, M4F};
+use crate::seal;
 use crate::size;
 use crate::tool::{self, Usage, cargo, run};
 
@@ -59,8 +60,19 @@ impl Board {
         }
     }
 
+    /// Builds an image. QEMU's is for the bench (`firmware/Cargo.toml`); a board's product is sealed.
     pub(crate) fn build(self, image: Image) -> Result<PathBuf> {
-        image::elf_of(&mut image::build_command(image.bin(), M4F, self.feature()))
+        let is_machine = self.chip().is_none();
+        let features = if is_machine {
+            format!("{},bench", self.feature())
+        } else {
+            self.feature().to_owned()
+        };
+        let elf = image::elf_of(&mut image::build_command(image.bin(), M4F, &features))?;
+        if !is_machine && image == Image::SteeringEcu {
+            seal::seal(&elf)?;
+        }
+        Ok(elf)
     }
 }
 

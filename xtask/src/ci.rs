@@ -5,16 +5,22 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, boards, gate};
+use crate::{bench, bindings_agree, boards, c_library, gate, wheel};
 
 pub(crate) fn run_all() -> Result<()> {
     ensure(&[
         ("qemu-system-arm", "qemu-system-arm"),
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+        ("g++", "g++"),
+        // For the examples of the documents.
+        ("python3", "python3"),
+        ("python3", "python3-venv"),
     ])?;
-    let target_features = format!("{BOARD},gate,broken");
-    let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
+    let target_features = format!("{BOARD},gate,broken,bench");
+    let checks: [(&str, &dyn Fn() -> Result<()>); 9] = [
         ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
         ("clippy", &|| {
             run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
@@ -36,6 +42,9 @@ pub(crate) fn run_all() -> Result<()> {
         // Compares every frame of a whole run on each of QEMU's boards on the way.
         ("boards", &|| boards::check(false)),
         ("instructions on the host", &|| bench::run(false)),
+        ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
+        ("C library", &c_library::check),
+        ("bindings agree", &bindings_agree::check),
     ];
     let mut failed = Vec::new();
     for (name, check) in checks {

@@ -9,17 +9,21 @@ use serde_json::Value;
 use crate::tool::{self, cargo, run};
 
 /// What decides or guards a torque, with the tests that must notice a defect in it.
-const MUTATED: [(&str, &[&str]); 10] = [
+const MUTATED: [(&str, &[&str]); 14] = [
     ("envelope.rs", &["envelope"]),
     ("modes.rs", &["modes"]),
-    ("bus/e2e.rs", &["e2e"]),
+    ("bus/e2e.rs", &["e2e", "edges"]),
     ("monitor.rs", &["monitor", "probe"]),
     ("plausibility.rs", &["plausibility"]),
-    ("controller.rs", &["ecu", "probe"]),
-    ("ecu.rs", &["ecu", "memory", "probe"]),
-    ("ecu/receivers.rs", &["ecu", "memory"]),
-    ("ramp.rs", &["ramp", "ecu"]),
-    ("vital.rs", &["memory"]),
+    ("controller.rs", &["ecu", "probe", "edges", "endurance"]),
+    ("ecu.rs", &["ecu", "memory", "probe", "edges", "endurance"]),
+    ("ecu/receivers.rs", &["ecu", "memory", "edges", "endurance"]),
+    ("ramp.rs", &["ramp", "ecu", "endurance"]),
+    ("redundant.rs", &["memory"]),
+    ("stored.rs", &["stored"]),
+    ("download.rs", &["download"]),
+    ("actuator.rs", &["edges", "ecu"]),
+    ("faults.rs", &["faults", "ecu", "dbc", "edges"]),
 ];
 
 /// Line and region coverage of `core/` by its own tests; less than all of it is an error.
@@ -74,23 +78,39 @@ pub(crate) fn coverage() -> Result<()> {
     Ok(())
 }
 
-/// A defect in each expression of what guards a torque; those that no test notices are printed.
-pub(crate) fn mutants() -> Result<()> {
+/// A defect in each expression of what guards a torque, or only in those that differ from `base`; those that no test
+/// notices are printed, and are an error where only a difference was tried.
+pub(crate) fn mutants(base: Option<&str>) -> Result<()> {
     if !tool::exists("cargo-mutants") {
         bail!("cargo-mutants is missing: cargo install cargo-mutants");
     }
+    let all = tool::root().join("target/mutants");
+    fs::create_dir_all(&all)?;
     let mut survivors = Vec::new();
     for (file, tests) in MUTATED {
-        let place = tool::root().join("target/mutants").join(file.replace('/', "-"));
+        let source = format!("core/src/{file}");
+        let place = all.join(file.replace('/', "-"));
         fs::create_dir_all(&place)?;
-        println!("== {file}");
-        let status = cargo()
+        let mut command = cargo();
+        command
             .args(["mutants", "--package", "haptic-core", "--no-shuffle"])
-            .args(["-f", &format!("core/src/{file}")])
+            .args(["-f", &source])
             .arg("--output")
             .arg(&place)
-            .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")))
-            .status()?;
+            .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")));
+        if let Some(base) = base {
+            let difference = tool::output(tool::command("git").args(["diff", base, "--", &source]))?;
+            if difference.is_empty() {
+                continue;
+            }
+            let path = place.join("changed.diff");
+            fs::write(&path, difference)?;
+            command.arg("--in-diff").arg(path);
+        }
+        println!("== {file}");
+        // A difference that holds nothing to mutate leaves the lists of an earlier run alone.
+        let _ = fs::remove_dir_all(place.join("mutants.out"));
+        let status = command.status()?;
         // 2 and 3: some were missed, or ran into a time limit.
         ensure!(
             matches!(status.code(), Some(0 | 2 | 3)),
@@ -98,13 +118,20 @@ pub(crate) fn mutants() -> Result<()> {
         );
         for outcome in ["missed.txt", "timeout.txt"] {
             let path = place.join("mutants.out").join(outcome);
+            if base.is_some() && !path.exists() {
+                continue;
+            }
             let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
             survivors.extend(text.lines().map(str::to_owned));
         }
     }
     println!("\n{} survivors", survivors.len());
-    for survivor in survivors {
+    for survivor in &survivors {
         println!("  {survivor}");
     }
+    ensure!(
+        base.is_none() || survivors.is_empty(),
+        "no test notices these defects in the changed lines"
+    );
     Ok(())
 }

@@ -12,9 +12,9 @@
 
 use std::path::Path;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
-use crate::code::is_soft_float;
+use crate::code::{CONTROLLER, Code, is_soft_float};
 use crate::image::{BOARD, M3, M4F, build_command, elf_of};
 use crate::tool;
 
@@ -56,6 +56,32 @@ pub(crate) fn run() -> Result<()> {
         "the gate does not see a float operation that is there"
     );
     println!("gate: it finds a panic and a float operation that were put there");
+    injection_leaves_nothing()
+}
+
+/// An ECU that nothing is injected into is the product's, whether or not Cargo switches the feature on: as much memory,
+/// as many functions on its torque path, no call through a pointer (which injected faults would need), and as much code,
+/// but for what the compiler orders otherwise.
+fn injection_leaves_nothing() -> Result<()> {
+    let measure = |features| {
+        let elf = elf_of(&mut gate(features, M4F))?;
+        let functions = Code::of(&elf)?.torque_path(CONTROLLER)?.functions;
+        let sections = tool::output(tool::llvm("llvm-size")?.arg("-A").arg(elf))?;
+        let size = |name: &str| {
+            let line = sections.lines().find(|line| line.starts_with(name));
+            let bytes = line.and_then(|line| line.split_whitespace().nth(1)?.parse::<u64>().ok());
+            bytes.with_context(|| format!("no section {name}:\n{sections}"))
+        };
+        let memory = [size(".rodata")?, size(".data")?, size(".bss")?];
+        Ok::<_, anyhow::Error>((functions, memory, size(".text")?))
+    };
+    let (without, with) = (measure("gate")?, measure("gate,broken")?);
+    ensure!(
+        (without.0, without.1) == (with.0, with.1) && with.2 * 100 <= without.2 * 101,
+        "fault injection leaves something in the product's ECU (functions, memory, code): {without:?} without the \
+         feature, {with:?} with it"
+    );
+    println!("gate: the feature fault-injection adds nothing to an ECU without it");
     Ok(())
 }
 

@@ -4,6 +4,9 @@
 
 mod bench;
 mod boards;
+mod by_hand;
+mod bindings_agree;
+mod c_library;
 mod callgrind;
 mod ci;
 mod code;
@@ -13,6 +16,7 @@ mod golden;
 mod identify;
 mod image;
 mod qemu;
+mod seal;
 mod size;
 mod speed;
 mod tool;
@@ -50,9 +54,17 @@ enum Command {
     },
     /// Line and region coverage of the core by its tests: all of it, or exit code 1.
     Coverage,
-    /// A defect in every expression of envelope, modes, E2E, monitor and plausibility (needs cargo-mutants); prints
+    /// A defect in every expression of what decides or guards a torque (needs cargo-mutants); prints
     /// those that no test notices.
-    Mutants,
+    Mutants {
+        /// Only in lines that differ from this commit, branch or tag, for minutes instead of hours; then a survivor is an
+        /// error.
+        #[arg(long, value_name = "BASE")]
+        in_diff: Option<String>,
+        /// Instead, the defects made by hand of core/tests/mutants.toml: exit code 1 if one is not noticed.
+        #[arg(long, conflicts_with = "in_diff")]
+        by_hand: bool,
+    },
     /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
     /// instructions against xtask/golden.json.
     Boards {
@@ -66,8 +78,18 @@ enum Command {
     Run(boards::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
+    /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++, and runs
+    /// its example natively and in QEMU.
+    C,
+    /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
+    BindingsAgree,
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
     Wheel(wheel::Options),
+    /// Writes an image's CRC-32 into its ELF, which the product looks for at every start. `flash` and `run` do it too.
+    Seal {
+        /// The ELF of steering-ecu, changed in place.
+        elf: PathBuf,
+    },
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -93,11 +115,14 @@ fn main() -> ExitCode {
         Command::Ci => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
-        Command::Mutants => evidence::mutants(),
+        Command::Mutants { by_hand: true, .. } => by_hand::run(),
+        Command::Mutants { in_diff, .. } => evidence::mutants(in_diff.as_deref()),
         Command::Boards { bless } => boards::check(bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
+        Command::C => c_library::check(),
+        Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed),
@@ -115,6 +140,7 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };
     match result {

@@ -1,10 +1,10 @@
 //! Runs an image in QEMU: its log, decoded, on standard error; its bus on any of QEMU's character devices.
 
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, ExitCode, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
 use std::str::FromStr;
 use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
@@ -42,11 +42,12 @@ pub(crate) struct Options {
     /// `tcp:127.0.0.1:3333,server,nowait`. With `stdio` the run ends with the input.
     #[arg(long, default_value = "null")]
     can: String,
-    /// The machine's clock: `off`, the host's; or SHIFT, 0 to 10: it counts instructions, 2^SHIFT ns each. Then a busy
-    /// host makes the machine slower and never late; on the host's clock the watchdog fires whenever the host pauses
-    /// for 16 ms. 5 is about the board's speed, and the default of steering-ecu; a smaller one gives whoever is on the
-    /// bus more time to answer. lockstep takes its time from the bus: off.
-    #[arg(long, value_name = "SHIFT|off")]
+    /// The machine's clock: `paced`, the default of steering-ecu on a bus: it counts instructions, 32 ns each, about the
+    /// board's speed, and waits for real time where it is ahead; a host too busy for that is told. SHIFT, 0 to 10: it
+    /// counts instructions, 2^SHIFT ns each, as fast as the host can; a smaller one gives whoever is on the bus more
+    /// time to answer. `off`: the host's clock; then the watchdog fires whenever the host pauses for 16 ms. lockstep
+    /// takes its time from the bus: off.
+    #[arg(long, value_name = "paced|SHIFT|off")]
     icount: Option<Clock>,
     /// Stop after this many seconds, with exit code 124. Default: 60 with `--can null`; else the run lasts until
     /// Ctrl-C.
@@ -60,6 +61,8 @@ enum Clock {
     Host,
     /// 2^n ns an instruction.
     Instructions(u8),
+    /// 2^[`BOARD_SPEED`] ns an instruction, and no faster than real time.
+    Paced,
 }
 
 impl FromStr for Clock {
@@ -68,8 +71,9 @@ impl FromStr for Clock {
     fn from_str(text: &str) -> Result<Self, String> {
         match (text, text.parse()) {
             ("off", _) => Ok(Self::Host),
+            ("paced", _) => Ok(Self::Paced),
             (_, Ok(shift @ 0..=10)) => Ok(Self::Instructions(shift)),
-            _ => Err("neither a number from 0 to 10 nor off".to_owned()),
+            _ => Err("neither paced, nor off, nor a number from 0 to 10".to_owned()),
         }
     }
 }
@@ -77,7 +81,11 @@ impl FromStr for Clock {
 impl Options {
     fn clock(&self) -> Clock {
         self.icount.unwrap_or(match self.image {
-            Image::SteeringEcu => Clock::Instructions(BOARD_SPEED),
+            // Nobody is there whose time it would be.
+            Image::SteeringEcu if matches!(self.can.as_str(), "null" | "stdio") => {
+                Clock::Instructions(BOARD_SPEED)
+            }
+            Image::SteeringEcu => Clock::Paced,
             Image::Lockstep => Clock::Host,
         })
     }
@@ -91,8 +99,17 @@ impl Options {
 /// What the threads around QEMU see.
 enum Event {
     Log(Vec<u8>),
+    /// A line of QEMU's own.
+    Said(String),
     InputEnded,
+    /// Ctrl-C, or somebody asks us to terminate.
+    Interrupted,
 }
+
+/// Exit code of a run that was interrupted, as a shell has it for Ctrl-C.
+const INTERRUPTED: u8 = 130;
+/// Begins QEMU's line about a paced machine that is behind.
+const LATE: &str = "Warning: The guest is now late by";
 
 /// A QEMU that ends with its owner.
 struct Machine(Child);
@@ -121,12 +138,17 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
         can_recover: table.encoding().can_recover(),
     };
     let (events, seen) = channel();
+    let interrupted = events.clone();
+    // QEMU ends with us, also when we are asked to.
+    ctrlc::set_handler(move || drop(interrupted.send(Event::Interrupted))).context("signals")?;
     let mut machine = start(&elf, options, &events)?;
     let start = Instant::now();
     let code = loop {
         match seen.recv_timeout(GLANCE) {
             Ok(Event::Log(bytes)) => log.print(&bytes)?,
+            Ok(Event::Said(line)) => pass_on(&line),
             Ok(Event::InputEnded) => break ExitCode::SUCCESS,
+            Ok(Event::Interrupted) => break ExitCode::from(INTERRUPTED),
             // The other end keeps a sender, so this is a time-out: a moment to look around.
             Err(_) => {
                 if let Some(status) = machine.0.try_wait()? {
@@ -156,7 +178,7 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
     command
         .args(["-machine", options.board.feature()])
         .args(["-display", "none", "-monitor", "none"])
-        .args(["-serial", &options.can])
+        .args(["-serial", &bus(&options.can)])
         .args(["-serial", &format!("tcp:{}", log.local_addr()?)])
         // For the lock-step image, which takes its channel from here.
         .args([
@@ -169,16 +191,61 @@ fn start(elf: &Path, options: &Options, events: &Sender<Event>) -> Result<Machin
             Stdio::piped()
         } else {
             Stdio::null()
+        })
+        .stdout(if options.can == "stdio" {
+            Stdio::inherit()
+        } else {
+            Stdio::piped()
         });
-    if let Clock::Instructions(shift) = options.clock() {
-        command.args(["-icount", &format!("shift={shift}")]);
+    match options.clock() {
+        Clock::Host => {}
+        Clock::Instructions(shift) => drop(command.args(["-icount", &format!("shift={shift}")])),
+        Clock::Paced => drop(command.args(["-icount", &format!("shift={BOARD_SPEED},align=on")])),
     }
     let mut child = command.spawn().context("qemu-system-arm does not start")?;
+    if let Some(from) = child.stdout.take() {
+        forward_words(from, events.clone());
+    }
     if let Some(to) = child.stdin.take() {
         forward_input(to, events.clone());
     }
     forward_log(log, events.clone());
     Ok(Machine(child))
+}
+
+/// QEMU's name of the bus. On TCP without Nagle's algorithm, which holds a frame back until the last one was acknowledged:
+/// a client in lock step would see 21 ticks a second instead of 1,100.
+fn bus(can: &str) -> String {
+    let is_tcp = can.starts_with("tcp:");
+    if is_tcp && !can.contains("nodelay") {
+        format!("{can},nodelay=on")
+    } else {
+        can.to_owned()
+    }
+}
+
+/// Prints a line of QEMU's; that of a paced machine which is behind, in words that say what it means.
+fn pass_on(line: &str) {
+    // "Warning: The guest is now late by 0.0 to 1.0 seconds"
+    let late = line.strip_prefix(LATE).and_then(|rest| rest.split_once(" to "));
+    match late {
+        Some((_, most)) => eprintln!(
+            "(this host is too busy: the machine is up to {} behind real time; a client on the clock of the wall may be \
+             too early or too late for it)",
+            most.trim_end_matches("econds").trim_end()
+        ),
+        None => eprintln!("{line}"),
+    }
+}
+
+fn forward_words(from: ChildStdout, events: Sender<Event>) {
+    std::thread::spawn(move || {
+        for line in BufReader::new(from).lines().map_while(Result::ok) {
+            if events.send(Event::Said(line)).is_err() {
+                return;
+            }
+        }
+    });
 }
 
 /// Passes our standard input on and tells when it ends: with it whoever started this run is gone.
@@ -248,6 +315,29 @@ impl Log<'_> {
                 Err(DecodeError::Malformed) if self.can_recover => eprintln!("(a damaged message)"),
                 Err(DecodeError::Malformed) => bail!("the log does not fit the image"),
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_on_tcp_has_no_delay_unless_the_user_says_otherwise() {
+        let tcp = "tcp:127.0.0.1:3333,server,nowait";
+        assert_eq!(bus(tcp), "tcp:127.0.0.1:3333,server,nowait,nodelay=on");
+        assert_eq!(bus(&format!("{tcp},nodelay=off")), format!("{tcp},nodelay=off"));
+        assert_eq!(bus("pty"), "pty");
+    }
+
+    #[test]
+    fn clocks_by_name() {
+        assert_eq!("paced".parse(), Ok(Clock::Paced));
+        assert_eq!("off".parse(), Ok(Clock::Host));
+        assert_eq!("10".parse(), Ok(Clock::Instructions(10)));
+        for wrong in ["11", "-1", "", "fast"] {
+            assert!(wrong.parse::<Clock>().unwrap_err().contains("paced"), "{wrong}");
         }
     }
 }

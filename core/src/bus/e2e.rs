@@ -10,6 +10,8 @@
 //! last accepted frame, modulo 16; *clean* is a frame that is intact, the next in count, and in range. (A preview
 //! that says of itself that it is not valid is clean: its sender is heard, and honest.)
 
+use crc::{CRC_8_AUTOSAR, Crc};
+
 use crate::redundant::words;
 
 /// Data IDs, one for each counter value.
@@ -20,44 +22,22 @@ const DATA_IDS: [u8; 16] = [
 /// Clean frames in a row before a resumed sender is trusted.
 pub const CLEAN_FRAMES_TO_TRUST: u32 = 3;
 
-const CRC_TABLE: [u8; 256] = {
-    let mut table = [0; 256];
-    let mut i = 0;
-    while i < 256 {
-        let mut crc = i as u8;
-        let mut bit = 0;
-        while bit < 8 {
-            crc = if crc & 0x80 == 0 {
-                crc << 1
-            } else {
-                (crc << 1) ^ 0x2F
-            };
-            bit += 1;
-        }
-        table[i] = crc;
-        i += 1;
-    }
-    table
-};
+static CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
 
 /// CRC-8/AUTOSAR: polynomial 0x2F, init 0xFF, xorout 0xFF, not reflected.
 #[must_use]
 pub fn crc8(bytes: &[u8]) -> u8 {
-    !crc_more(0xFF, bytes)
-}
-
-fn crc_more(crc: u8, bytes: &[u8]) -> u8 {
-    // A u8 always indexes a table of 256, so there is no bounds check to panic.
-    bytes
-        .iter()
-        .fold(crc, |crc, byte| CRC_TABLE[usize::from(crc ^ byte)])
+    CRC.checksum(bytes)
 }
 
 /// The CRC of a frame whose bytes 1..7 are in place. `list` is the data ID list of its message.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "a counter of four bits in a list of sixteen"
+)]
 fn frame_crc(data: &[u8; 8], list: &[u8; 16]) -> u8 {
-    let [_, counter, ..] = *data;
-    let [_, payload @ ..] = data;
-    !crc_more(crc_more(0xFF, payload), &[list[usize::from(counter & 0x0F)]])
+    let [_, b1, b2, b3, b4, b5, b6, b7] = *data;
+    crc8(&[b1, b2, b3, b4, b5, b6, b7, list[usize::from(b1 & 0x0F)]])
 }
 
 /// The protection of one message: the data ID list XORed with the message's constant.
@@ -69,6 +49,11 @@ pub struct Protection {
 impl Protection {
     /// Protection with the list of this bus and a message's own constant.
     #[must_use]
+    #[expect(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        reason = "at compile time"
+    )]
     pub const fn new(constant: u8) -> Self {
         let mut list = DATA_IDS;
         let mut i = 0;
@@ -101,6 +86,7 @@ impl Protection {
 /// Why a frame was not accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
+#[repr(u8)]
 pub enum Reject {
     /// Not eight bytes long.
     Length,
@@ -118,6 +104,31 @@ pub enum Reject {
     Step,
     /// The sample was true before the last one was.
     Older,
+    /// The identifier is this ECU's: another node sends in its name.
+    OwnIdentifier,
+}
+
+impl Reject {
+    /// Every reason, in the order of its codes on the bus.
+    pub const ALL: [Self; 9] = [
+        Self::Length,
+        Self::Crc,
+        Self::Repeated,
+        Self::Jump,
+        Self::NotTrusted,
+        Self::Range,
+        Self::Step,
+        Self::Older,
+        Self::OwnIdentifier,
+    ];
+
+    /// The reason of a code on the bus.
+    #[must_use]
+    pub fn from_code(code: i64) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|reason| i64::from(*reason as u8) == code)
+    }
 }
 
 words! {

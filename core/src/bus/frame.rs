@@ -16,6 +16,7 @@ impl Frame {
 
     /// A frame, or `None` for an identifier above 0x7FF or more than eight bytes.
     #[must_use]
+    #[expect(clippy::as_conversions, reason = "at most eight bytes")]
     pub fn new(id: u16, bytes: &[u8]) -> Option<Self> {
         if id > Self::MAX_ID {
             return None;

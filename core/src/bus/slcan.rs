@@ -5,6 +5,8 @@
 //! Commands answered here: `O` open, `C` close, `Sn` bit rate, `V` version, `N` serial number, `F` flags.
 //! Not here: extended and remote frames (answered with an error), time stamps, and the port itself.
 
+#![expect(clippy::as_conversions, reason = "digits of four bits, cut to a byte")]
+
 use heapless::Vec;
 
 use super::frame::Frame;

@@ -65,6 +65,12 @@ pub trait Board: Sized {
     /// The status light.
     fn status(&mut self) -> &mut Self::Status;
 
+    /// Whether the chip's options are those that the memory map and the parameters' pages were laid out for. With
+    /// others nothing is read from the flash or written to it, and the controller locks.
+    fn has_expected_options(&self) -> bool {
+        true
+    }
+
     /// The flash. Only touched before the tick starts: while it erases, some boards' processors stand still.
     fn flash(&mut self) -> &mut Self::Flash;
 

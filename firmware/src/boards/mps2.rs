@@ -97,8 +97,8 @@ impl Board for Mps2 {
     }
 
     fn reset_source(&mut self) -> reset::Hardware {
-        // The machine has no register that says.
-        reset::Hardware::Watchdog
+        // QEMU has no register that says.
+        reset::Hardware::Unknown
     }
 
     fn start_watchdog(&mut self) {

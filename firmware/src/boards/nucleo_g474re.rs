@@ -15,9 +15,10 @@
 //! The log goes to the debug probe (RTT). SysTick is the tick, TIM2 the microseconds, DWT the cycles, IWDG the
 //! watchdog. Compiled and linked in CI; it has never met the board.
 //!
-//! The flash is one of two banks, as the chip is delivered (option bit DBANK); the parameters are in the last four
-//! pages of the second. A word whose programming lost power reads as an error that no code of correction mends:
-//! the chip then raises the non-maskable interrupt, and what was read fails its CRC.
+//! The flash is one of two banks, as the chip is delivered (option bit DBANK, which is looked at); the parameters are in
+//! the last four pages of the second. A word whose programming lost power reads as an error that no code of correction
+//! mends: the chip then raises the non-maskable interrupt. Among the parameters what was read fails its CRC, and that is
+//! all; anywhere else it is code or a constant, and the torque goes to zero and the processor is reset.
 //!
 //! The column's sensors are read with the feature `nucleo-g474re-sensors` alone, since pins that float read anything.
 //! Without it the column is on the bus.
@@ -50,7 +51,7 @@ use haptic_core::quantity::{Instant, Torque};
 use rtt_target::{ChannelMode, UpChannel, rtt_init};
 
 use super::{Board, WATCHDOG};
-use crate::{analogue, reset, stack};
+use crate::{analogue, eccr, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 170_000_000;
 const TICK_HZ: u32 = 1000;
@@ -152,6 +153,10 @@ impl Board for NucleoG474re {
         &mut self.led
     }
 
+    fn has_expected_options(&self) -> bool {
+        pac::FLASH.optr().read().dbank()
+    }
+
     fn flash(&mut self) -> &mut Self::Flash {
         &mut self.flash
     }
@@ -244,11 +249,13 @@ impl Board for NucleoG474re {
     }
 }
 
-/// A word of the flash cannot be corrected: whoever read it has a CRC to tell by. Nothing else is told to raise this
-/// interrupt here. A lost crystal is not: nobody watches it but the watchdog, which has a clock of its own.
+/// Nothing is told to raise this interrupt here but a word of the flash that cannot be corrected. A lost crystal is
+/// not: nobody watches it but the watchdog, which has a clock of its own.
 #[exception]
 unsafe fn NonMaskableInt() {
-    if pac::FLASH.eccr().read().eccd() {
+    let error = pac::FLASH.eccr().read();
+    let place = (error.bk_ecc(), error.sysf_ecc(), error.addr_ecc());
+    if error.eccd() && !error.eccd2() && eccr::is_in_parameters(place) {
         pac::FLASH.eccr().modify(|w| w.set_eccd(true));
         return;
     }

@@ -134,6 +134,13 @@ impl Board for SamE54Xpro {
         &mut self.led
     }
 
+    /// No blocks at the end of the flash given to the chip's own emulation of an EEPROM, and all of 1 MiB there.
+    fn has_expected_options(&self) -> bool {
+        // SAFETY: a look at what the HAL's driver owns.
+        let nvmctrl = unsafe { pac::Nvmctrl::steal() };
+        nvmctrl.seestat().read().sblk().bits() == 0 && retrieve_flash_size() == 1024 * 1024
+    }
+
     fn flash(&mut self) -> &mut Self::Flash {
         &mut self.flash
     }

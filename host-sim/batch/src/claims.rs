@@ -8,7 +8,7 @@
 
 use serde::Serialize;
 
-use super::evaluate::{DRIVERS_T_P, Results};
+use super::evaluate::{DRIVERS_T_P, EvaluationResults};
 use haptic_analysis::metrics::Window;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
@@ -99,7 +99,7 @@ pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
     comparable && window == super::record::default_window(base.course())
 }
 
-pub(super) fn check(results: &Results) -> Vec<Claim> {
+pub(super) fn check(results: &EvaluationResults) -> Vec<Claim> {
     let mut claims = vec![numbers(results)];
     let peak = |t_p, condition, failure| {
         let record = results.record(t_p, condition, failure);
@@ -199,7 +199,7 @@ pub(super) fn check(results: &Results) -> Vec<Claim> {
     claims
 }
 
-fn numbers(results: &Results) -> Claim {
+fn numbers(results: &EvaluationResults) -> Claim {
     let (share, floor_m) = tolerance(results.sensors);
     let (mut worst_m, mut count, mut holds) = (0.0_f64, 0, true);
     for reference in TABLE {

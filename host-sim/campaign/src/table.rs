@@ -1,4 +1,4 @@
-//! The table of faults: what a row is, and all of them. The rows themselves are in `rows`.
+//! The table of faults: what a row is, and all of them. The rows themselves are in `inputs`, `bus`, `time` and `memory`.
 //!
 //! | class | when | what |
 //! |---|---|---|
@@ -107,7 +107,7 @@ pub enum Expect {
 
 /// One fault of the list.
 #[derive(Debug, Clone, Copy)]
-pub struct Row {
+pub struct FaultCase {
     /// By which it is asked for.
     pub name: &'static str,
     /// What is injected.
@@ -138,7 +138,7 @@ pub struct Group {
     /// Its name.
     pub name: &'static str,
     /// Its rows.
-    pub rows: &'static [Row],
+    pub rows: &'static [FaultCase],
 }
 
 /// Every row.
@@ -162,7 +162,7 @@ pub const GROUPS: [Group; 4] = [
 ];
 
 /// Every row, in order.
-pub fn rows() -> impl Iterator<Item = &'static Row> {
+pub fn rows() -> impl Iterator<Item = &'static FaultCase> {
     GROUPS.iter().flat_map(|group| group.rows)
 }
 
@@ -179,8 +179,8 @@ const MOTOR_MS: u32 = 15;
 const ORDINARY_NM: f64 = 2.0;
 
 /// A row that goes on unless it says otherwise.
-const fn row(name: &'static str, injected: &'static str, injections: &'static [Injection]) -> Row {
-    Row {
+const fn row(name: &'static str, injected: &'static str, injections: &'static [Injection]) -> FaultCase {
+    FaultCase {
         name,
         injected,
         class: Class::L,
@@ -200,7 +200,7 @@ const fn reaches(mode: u64) -> Expect {
     Expect::Reaches { mode, fading: false }
 }
 
-impl Row {
+impl FaultCase {
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.
     pub fn deadline_ms(&self) -> Option<u32> {
         let asked = !matches!(
@@ -229,7 +229,7 @@ impl Row {
     const fn fades(self, deadline_ms: u32) -> Self {
         Self {
             class: Class::A,
-            expect: reaches(super::guard::FADE),
+            expect: reaches(super::invariants::FADE),
             deadline_ms,
             ..self
         }
@@ -238,7 +238,7 @@ impl Row {
     const fn hands_over(self, deadline_ms: u32) -> Self {
         Self {
             class: Class::B,
-            expect: reaches(super::guard::HANDOVER),
+            expect: reaches(super::invariants::HANDOVER),
             deadline_ms,
             ..self
         }
@@ -264,7 +264,7 @@ impl Row {
     const fn stops(self, deadline_ms: u32) -> Self {
         Self {
             class: Class::C,
-            expect: reaches(super::guard::FAULT),
+            expect: reaches(super::invariants::FAULT),
             deadline_ms,
             ..self
         }
@@ -273,7 +273,7 @@ impl Row {
     const fn locks(self) -> Self {
         Self {
             class: Class::C,
-            expect: reaches(super::guard::LOCKED),
+            expect: reaches(super::invariants::LOCKED),
             deadline_ms: 20,
             torque_nm: 0.0,
             ..self
@@ -322,7 +322,7 @@ impl Row {
     const fn after_fade(self) -> Self {
         Self {
             expect: Expect::Reaches {
-                mode: super::guard::FAULT,
+                mode: super::invariants::FAULT,
                 fading: true,
             },
             ..self
@@ -341,7 +341,7 @@ impl Row {
 
     const fn engages(self) -> Self {
         Self {
-            expect: reaches(super::guard::ACTIVE),
+            expect: reaches(super::invariants::ACTIVE),
             deadline_ms: 12,
             ..self
         }

@@ -6,12 +6,13 @@ use clap::{Args, ValueEnum};
 use haptic_analysis::metrics::Window;
 use haptic_batch::check_window;
 use haptic_batch::evaluate::{Evaluation, RUNS, evaluate};
+use haptic_report::studies::evaluation as files;
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, Failure, SPEED_KMH, Scenario, Sensors};
 
 use super::output::Output;
-use super::table::{self, number};
+use super::series::SeriesArgument;
 use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
@@ -34,9 +35,12 @@ pub(super) struct Arguments {
     /// Print the results as one JSON object instead of a table
     #[arg(long)]
     json: bool,
-    /// Directory for figures, time series, results and report
+    /// Directory for figures, results and report
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    /// Also every sample of the 30 runs, in the directory's runs/: 172 MB as CSV, a fifth of it compressed
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = SeriesArgument::None)]
+    series: SeriesArgument,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -77,9 +81,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let bar = progress::bar(RUNS as u64, "runs");
     let evaluation = evaluate(&base, window, || bar.inc(1))?;
     bar.finish_and_clear();
-    output.finish(|place| haptic_report::studies::evaluation::write(&evaluation, place))?;
+    output.finish(|place| files::write(&evaluation, arguments.series.into(), place))?;
     if arguments.json {
-        print_json(&evaluation.results)?;
+        print_json(&files::stamped(&evaluation))?;
     } else {
         print(&readable(&evaluation))?;
     }
@@ -92,50 +96,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })
 }
 
+/// What a reader of the table cannot guess.
+const LEGEND: &str = "t_p: the driver's delay. condition: how much the driver relies on the guidance.
+failure: nothing, the guidance torque lost at once, or its input lost and handed over.
+e: lateral error. T_h: torque of the guidance. T_d: torque of the driver.";
+
 fn readable(evaluation: &Evaluation) -> String {
     let results = &evaluation.results;
-    let headings = [
-        "t_p/s",
-        "condition",
-        "failure",
-        "peak |e|/m",
-        "mean |e|/m",
-        "peak |T_h|/N.m",
-        "peak |T_d|/N.m",
-        "",
-    ];
-    let mut lines = vec![headings.map(String::from).to_vec()];
-    for run in &results.runs {
-        let m = &run.metrics;
-        lines.push(vec![
-            run.t_p.to_string(),
-            run.condition.to_string(),
-            run.failure.to_string(),
-            number(m.peak_lateral_error_m, 4),
-            number(m.mean_abs_lateral_error_m, 4),
-            number(m.peak_guidance_torque_nm, 3),
-            number(m.peak_driver_torque_nm, 3),
-            if run.diverged {
-                format!("diverged at {:.0} m", run.end_m)
-            } else {
-                String::new()
-            },
-        ]);
-    }
     let [from, to] = results.window_m;
     let mut text = format!(
-        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}",
+        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}\n{LEGEND}\n",
         results.course,
         results.speed_kmh,
         from,
         to,
         results.course_length_m,
         results.failure_time_s,
-        table::text(&lines)
+        files::table(results).to_text()
     );
-    for claim in &results.claims {
-        let mark = if claim.holds { "holds " } else { "BROKEN" };
-        text.push_str(&format!("\n{mark}  {}\n        {}", claim.claim, claim.evidence));
+    if !results.claims.is_empty() {
+        text.push_str(&format!("\n{}", files::claims_table(results).to_text()));
     }
     text
 }

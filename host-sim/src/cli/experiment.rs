@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_analysis::identify::Muscle;
 use haptic_batch::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
+
+use haptic_report::studies::experiment as files;
 
 use super::output::Output;
 use super::participants::Participants;
-use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
@@ -16,7 +16,8 @@ pub(super) struct Arguments {
     /// Participants: numbers and ranges such as 1,3..5
     #[arg(long, value_name = "LIST", default_value = "1..14")]
     participants: Participants,
-    /// Amplitude of the probe in the guided drives, N.m (0: none)
+    /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
+    /// the driver's answer to it tells K_hg
     #[arg(
         long,
         value_name = "AMPLITUDE",
@@ -66,12 +67,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     bar.finish_and_clear();
     output.finish(|place| {
         if arguments.logs {
-            haptic_report::studies::experiment::write_logs(&result, &place.join("logs"))?;
+            files::write_logs(&result, &place.join("logs"))?;
         }
-        haptic_report::studies::experiment::write(&result, place)
+        files::write(&result, place)
     })?;
     if arguments.json {
-        print_json(&result)?;
+        print_json(&files::stamped(&result))?;
     } else {
         print(&readable(&result))?;
     }
@@ -80,72 +81,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
 }
 
 fn readable(result: &Experiment) -> String {
-    let headings = [
-        "no",
-        "drive",
-        "",
-        "fit %",
-        "gain_1",
-        "gain_2",
-        "gain_3",
-        "t_p/s",
-        "K_hg",
-        "std error",
-        "path/m",
-    ];
-    let mut lines = vec![headings.map(String::from).to_vec()];
-    for drive in &result.drives {
-        lines.push(truth(drive));
-        for finding in [&drive.noise_model, &drive.paper] {
-            let found = &finding.identification;
-            let p = &found.parameters;
-            // The published method names a number whatever the data say.
-            let value = |p: &haptic_analysis::identify::Parameter, decimals| {
-                number(
-                    if found.method == "paper" {
-                        p.optimum
-                    } else {
-                        p.estimate
-                    },
-                    decimals,
-                )
-            };
-            lines.push(vec![
-                String::new(),
-                String::new(),
-                found.method.into(),
-                number(Some(found.fit_percent), 1),
-                value(&p.gain_1, 3),
-                value(&p.gain_2, 3),
-                value(&p.gain_3, 2),
-                value(&p.t_p, 3),
-                value(&p.k_hg, 3),
-                number(p.k_hg.standard_error, 3),
-                number(finding.trajectory_error_m, 3),
-            ]);
-        }
-    }
-    let mean = |guided: bool, value: fn(&Drive) -> Option<f64>| {
+    let mean = |guided: bool, value: fn(&Drive) -> Option<f64>| -> String {
         let values: Vec<f64> = result
             .drives
             .iter()
             .filter(|d| d.guided == guided)
             .filter_map(value)
             .collect();
-        number(
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64),
-            3,
-        )
+        match values.len() {
+            0 => "-".into(),
+            count => format!("{:.3}", values.iter().sum::<f64>() / count as f64),
+        }
     };
     let [low, middle, high] = result.published_trajectory_error_m;
     format!(
-        "{}, probe {} N.m, seed {}; a dash: not identified\n\n{}\n\
+        "{}, probe {} N.m, seed {}; a dash: not identified\n\nManual\n{}\nGuided\n{}\n{}\n\
          Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69)\n\
          Mean trajectory error, guided: noise model {} m, published method {} m (the paper: {middle}, {low} to {high})",
         result.course,
         result.probe_nm,
         result.seed,
-        table::text(&lines),
+        files::truth_table(result, false).to_text(),
+        files::truth_table(result, true).to_text(),
+        files::trajectory_table(result).to_text(),
         mean(false, |d| Some(d.paper.identification.fit_percent)),
         mean(true, |d| Some(d.paper.identification.fit_percent)),
         mean(true, |d| d.noise_model.trajectory_error_m),
@@ -153,55 +111,12 @@ fn readable(result: &Experiment) -> String {
     )
 }
 
-fn truth(drive: &Drive) -> Vec<String> {
-    let t = &drive.truth;
-    let sum = t.k_d + Muscle::default().k_nms;
-    vec![
-        drive.participant.to_string(),
-        if drive.guided { "guided" } else { "manual" }.into(),
-        "truth".into(),
-        number(Some(t.fitness), 1),
-        number(Some(sum * t.a_1), 3),
-        number(Some(sum * t.a_2), 3),
-        number(Some(sum * t.a_3), 2),
-        number(Some(t.t_p), 3),
-        number(t.k_hg, 3),
-        number(None, 0),
-        number(None, 0),
-    ]
-}
-
 fn repeated(result: &Repetitions) -> String {
-    let headings = [
-        "participant",
-        "parameter",
-        "drives",
-        "identified",
-        "coverage of 95 %",
-        "bias",
-        "rms error",
-        "largest error",
-        "mean std error",
-    ];
-    let mut lines = vec![headings.map(String::from).to_vec()];
-    for line in result.participants.iter().chain(&result.pooled) {
-        lines.push(vec![
-            line.participant.map_or("all".into(), |n| n.to_string()),
-            line.parameter.into(),
-            line.drives.to_string(),
-            number(Some(line.identified), 3),
-            number(Some(line.coverage), 3),
-            number(line.bias, 4),
-            number(line.rms, 4),
-            number(line.largest, 4),
-            number(line.standard_error, 4),
-        ]);
-    }
     format!(
         "{} repetitions of each guided drive, probe {} N.m, seeds from {}; errors where identified\n\n{}",
         result.repetitions,
         result.probe_nm,
         result.seed,
-        table::text(&lines)
+        files::repetitions_table(result).to_text()
     )
 }

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_campaign::campaign::{self, Campaign};
-use haptic_campaign::table::{self as rows, Place, Row};
+use haptic_campaign::table::{self as rows, FaultCase, Place};
 use haptic_campaign::{World, document, target};
-use haptic_report::document::{write_file, write_json};
+use haptic_report::studies::faults as files;
 
 use super::output::Output;
-use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
@@ -32,7 +31,7 @@ pub(super) struct Arguments {
     /// Print the results as one JSON object instead of a table
     #[arg(long)]
     json: bool,
-    /// Directory for the results (JSON) and the table of faults (Markdown); default: no files
+    /// Directory for a figure, the results (JSON), the table of faults (Markdown) and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -57,16 +56,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     bar.finish_and_clear();
     if let Some(output) = output {
-        output.finish(|place| {
-            write_json(&place.join("faults.json"), &campaign)?;
-            let text = document::table_of_faults();
-            Ok(write_file(&place.join("faults.md"), |f| {
-                f.write_all(text.as_bytes())
-            })?)
-        })?;
+        output.finish(|place| files::write(&campaign, place))?;
     }
     if arguments.json {
-        print_json(&campaign)?;
+        print_json(&files::stamped(&campaign))?;
     } else {
         print(&readable(&campaign))?;
         if let Some(seed) = arguments.seed {
@@ -82,8 +75,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })
 }
 
-fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static Row>, BadInput> {
-    let runs = |row: &&'static Row| match row.place {
+fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, BadInput> {
+    let runs = |row: &&'static FaultCase| match row.place {
         Place::Host => !in_qemu,
         Place::Both => true,
         Place::Target => false,
@@ -109,57 +102,16 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static Row>, BadInput
 }
 
 fn readable(campaign: &Campaign) -> String {
-    let headings = [
-        "fault",
-        "class",
-        "runs",
-        "seen",
-        "cycles",
-        "reaction/ms",
-        "deadline/ms",
-        "peak |T|/N.m",
-        "bound/N.m",
-        "",
-    ];
-    let mut lines = vec![headings.map(String::from).to_vec()];
-    for row in &campaign.rows {
-        let reaction = row.deadline_ms.and(row.worst_reaction_ms);
-        let verdict = match row.failures.len() {
-            0 => "pass".into(),
-            n => format!("FAIL in {n}"),
-        };
-        lines.push(vec![
-            row.name.into(),
-            row.class.to_string(),
-            row.runs.to_string(),
-            row.seen.to_string(),
-            row.cycles.to_string(),
-            number(reaction.map(f64::from), 0),
-            number(row.deadline_ms.map(f64::from), 0),
-            number(Some(row.peak_torque_nm), 3),
-            number(Some(row.torque_bound_nm), 1),
-            verdict,
-        ]);
-    }
-    let mut text = table::text(&lines);
+    let mut text = files::table(campaign).to_text();
     for failure in campaign.failures() {
-        text.push_str(&format!(
-            "\n{} seed {}, cycle {}: {}\n    {}\n",
-            failure.row, failure.seed, failure.cycle, failure.what, failure.replay
-        ));
+        text.push_str(&format!("\n{}\n", files::failure(failure)));
     }
-    text.push_str(&format!(
-        "\n{} rows, {} runs, {} cycles checked, {} failed",
-        campaign.rows.len(),
-        campaign.runs,
-        campaign.cycles,
-        campaign.failures().count()
-    ));
+    text.push_str(&format!("\n{}", files::summary(campaign)));
     text
 }
 
 /// What the ECU reported in one run.
-fn story(world: &World, row: &'static Row, seed: u64) -> String {
+fn story(world: &World, row: &'static FaultCase, seed: u64) -> String {
     let outcome = world.run(row, seed);
     let mut text = format!(
         "\n{}: {}; {}, {} km/h, fault at {:.3} s\n",

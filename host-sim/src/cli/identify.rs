@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::{Identification, Options, open_recording};
+use haptic_analysis::identify::{Options, open_recording};
 use haptic_batch::identify::{IdentifiedDrive, Method, identify};
+use haptic_report::studies::identify as files;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
-use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -21,14 +21,15 @@ pub(super) struct Arguments {
     /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
-    /// A drive without guidance: there is no K_hg, and guidance_torque_nm may be missing
+    /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
+    /// missing
     #[arg(long)]
     manual: bool,
     /// Prediction errors with a disturbance model, or the published way
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
     /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms);
-    /// may be repeated
+    /// may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
     /// Let the identified driver drive this course (TOML, or paper-course)
@@ -67,9 +68,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(path) = &arguments.course {
         drive.drive_again(haptic_batch::files::open_course(path)?, arguments.speed, &options)?;
     }
-    output.finish(|place| haptic_report::studies::identify::write(&drive, place))?;
+    output.finish(|place| files::write(&drive, place))?;
     if arguments.json {
-        print_json(&drive.results)?;
+        print_json(&files::stamped(&drive))?;
     } else {
         print(&readable(&drive))?;
     }
@@ -85,122 +86,21 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.method,
         found.rows,
         found.fit_percent,
-        parameters(found)
+        files::parameters(found).to_text()
     );
     if !found.combinations.is_empty() {
-        let mut lines = vec![
-            ["determined instead", "estimate", "std error"]
-                .map(String::from)
-                .to_vec(),
-        ];
-        for c in &found.combinations {
-            lines.push(vec![
-                c.name.clone(),
-                number(Some(c.estimate), 4),
-                number(Some(c.standard_error), 4),
-            ]);
-        }
-        text.push_str(&format!("\n{}", table::text(&lines)));
+        text.push_str(&format!("\n{}", files::combinations(found).to_text()));
     }
-    text.push_str(&format!("\nCorrelation of the errors\n{}", correlation(found)));
-    text.push_str(&format!("\n{}", residuals(found)));
-    let losses: Vec<String> = found.loss_history.iter().map(|l| format!("{l:.6e}")).collect();
-    text.push_str(&format!(
-        "\nLoss {}\nEnded: {}\n",
-        losses.join(", "),
-        found.termination
-    ));
+    text.push_str(&format!("\n{}", files::correlation(found).to_text()));
+    text.push_str(&format!("\n{}\n", files::input_tests(found).to_text()));
+    for (name, value) in files::facts(found) {
+        text.push_str(&format!("{name}: {value}\n"));
+    }
     for note in &found.notes {
         text.push_str(&format!("\n- {note}"));
     }
-    if let Some(again) = &drive.results.drives_again {
-        let m = &again.metrics;
-        text.push_str(&format!(
-            "\n\nOn the course the identified driver's peak lateral error is {} m, in the mean {} m{}",
-            number(m.peak_lateral_error_m, 4),
-            number(m.mean_abs_lateral_error_m, 4),
-            if again.diverged {
-                "; it leaves the road"
-            } else {
-                ""
-            }
-        ));
-    }
-    text
-}
-
-fn parameters(found: &Identification) -> String {
-    let headings = [
-        "parameter",
-        "estimate",
-        "std error",
-        "95 % from",
-        "to",
-        "unit",
-        "verdict",
-    ];
-    let mut lines = vec![headings.map(String::from).to_vec()];
-    for (name, unit, p) in found.parameters.list() {
-        let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
-        let identified = if p.fixed {
-            "given"
-        } else if p.identified {
-            "identified"
-        } else {
-            "not identified"
-        };
-        lines.push(vec![
-            name.into(),
-            number(p.estimate, 4),
-            number(p.standard_error, 4),
-            number(low, 4),
-            number(high, 4),
-            unit.into(),
-            format!("{identified}{}", if p.on_bound { ", on a bound" } else { "" }),
-        ]);
-    }
-    table::text(&lines)
-}
-
-fn correlation(found: &Identification) -> String {
-    let names = &found.correlation.names;
-    let mut lines = vec![
-        std::iter::once("")
-            .chain(names.iter().copied())
-            .map(String::from)
-            .collect::<Vec<_>>(),
-    ];
-    for (name, row) in names.iter().zip(&found.correlation.matrix) {
-        let cells = row.iter().map(|&c| number(c, 3));
-        lines.push(std::iter::once((*name).to_owned()).chain(cells).collect());
-    }
-    table::text(&lines)
-}
-
-fn residuals(found: &Identification) -> String {
-    let w = found.whiteness;
-    let mut text = format!(
-        "Residuals {}: Ljung-Box {:.1} over {} lags, p = {:.3}",
-        if w.white { "white" } else { "NOT WHITE" },
-        w.statistic,
-        w.lags,
-        w.p_value
-    );
-    for test in &found.input_correlation {
-        let verdict = if test.independent {
-            "independent of"
-        } else {
-            "CORRELATED with"
-        };
-        text.push_str(&format!(
-            "\nResiduals {verdict} {}: {:.2} standard deviations",
-            test.input, test.largest_z
-        ));
-    }
-    if let Some(remnant) = found.remnant
-        && let (Some(corner), Some(sd)) = (remnant.corner_hz, remnant.sd_nm)
-    {
-        text.push_str(&format!("\nRemnant {sd:.4} N.m, corner {corner:.3} Hz"));
+    if let Some(again) = files::drives_again(drive) {
+        text.push_str(&format!("\n\n{}", again.to_text()));
     }
     text
 }

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::reliance::{NEAR, Plan, Results, SETTLING_S, study};
+use haptic_batch::reliance::{Plan, RelianceResults, study};
+use haptic_report::studies::reliance as files;
 
 use super::output::Output;
 use super::participants::Participants;
-use super::table::{self, number};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
@@ -18,7 +18,7 @@ pub(super) struct Arguments {
     /// Drives of each participant, each with its own remnant
     #[arg(long, value_name = "N", default_value_t = 20)]
     seeds: u32,
-    /// Frequency of the probe, Hz
+    /// Frequency of the probe, Hz: a small sine added to the guidance torque, whose answer tells K_hg
     #[arg(long, value_name = "HZ", default_value_t = 2.5, allow_negative_numbers = true)]
     frequency: f64,
     /// Amplitude of the probe, N.m
@@ -45,10 +45,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let results = study(&plan, || bar.inc(1))?;
     bar.finish_and_clear();
     if let Some(output) = output {
-        output.finish(|place| haptic_report::studies::reliance::write(&results, place))?;
+        output.finish(|place| files::write(&results, place))?;
     }
     if arguments.json {
-        print_json(&results)?;
+        print_json(&files::stamped(&results))?;
     } else {
         print(&readable(&results))?;
     }
@@ -58,57 +58,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     Ok(Outcome::Good)
 }
 
-fn readable(results: &Results) -> String {
-    let times = || results.pooled.iter().map(|a| format!("{} s", a.after_s));
-    let head = ["participant", "K_hg", "estimate"].map(String::from).into_iter();
-    let head = head
-        .chain(times().map(|t| format!("bias {t}")))
-        .chain(times().map(|t| format!("rms {t}")));
-    let mut lines = vec![head.collect::<Vec<_>>()];
-    for p in &results.participants {
-        let line = [
-            p.participant.to_string(),
-            number(Some(p.truth), 3),
-            number(Some(p.estimate), 3),
-        ];
-        let bias = p.accuracy.iter().map(|a| number(Some(a.bias), 3));
-        let rms = p.accuracy.iter().map(|a| number(Some(a.rms), 3));
-        lines.push(line.into_iter().chain(bias).chain(rms).collect());
-    }
-    let heads = [
-        "after",
-        "estimates",
-        "bias",
-        "rms",
-        "deviation reported",
-        "coverage of 95 %",
-    ];
-    let mut pooled = vec![heads.map(String::from).to_vec()];
-    for a in &results.pooled {
-        pooled.push(vec![
-            format!("{} s", a.after_s),
-            a.count.to_string(),
-            number(Some(a.bias), 4),
-            number(Some(a.rms), 4),
-            number(Some(a.deviation), 4),
-            number(Some(a.coverage), 3),
-        ]);
-    }
-    let settling = &results.settling;
-    let [limited, steps] = results.limited_steps;
+fn readable(results: &RelianceResults) -> String {
     format!(
-        "Reliance read live: probe {} N.m at {} Hz, {} seeds\n\n{}\n{}\n{} changes of the driver: {:.1} % within \
-         {NEAR} after {SETTLING_S} s (changes by more than 0.3: {:.1} %), rms {:.3}\nlimited: {limited} of {steps} \
-         steps; diverged: {} drives",
+        "Reliance read live: probe {} N.m at {} Hz, {} seeds\n\n{}\n{}\n{}",
         results.amplitude_nm,
         results.frequency_hz,
         results.seeds,
-        table::text(&lines),
-        table::text(&pooled),
-        settling.count,
-        100.0 * settling.near,
-        100.0 * settling.near_after_large,
-        settling.rms,
-        results.diverged,
+        files::participants_table(results).to_text(),
+        files::pooled_table(results).to_text(),
+        files::settling(results),
     )
 }

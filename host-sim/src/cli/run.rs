@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_analysis::metrics::DEFINITIONS;
 use haptic_batch::run::{SingleRun, run as simulate};
+use haptic_report::studies::run as files;
 use haptic_sim::input::InputError;
 
 use super::output::Output;
-use super::table::{self, number};
+use super::series::SeriesArgument;
 use super::{BadInput, Outcome, print, print_json, print_notes};
 
 #[derive(Debug, Args)]
@@ -19,6 +19,9 @@ pub(super) struct Arguments {
     /// Directory for a figure, the time series, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// How the time series is written: as CSV, compressed, or not at all
+    #[arg(long, value_enum, value_name = "FORMAT", requires = "out", default_value_t = SeriesArgument::Csv)]
+    series: SeriesArgument,
     /// Also every frame of the bus, as `candump -L` writes it (bus.log, some 14 MB for paper-course); read it with
     /// `cantools decode core/haptic.dbc < bus.log`
     #[arg(long, requires = "out")]
@@ -34,11 +37,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let single = simulate(scenario, arguments.bus_log)
         .map_err(|e| InputError::new(arguments.scenario.display(), e))?;
     if let (Some(output), Some(directory)) = (output, &arguments.out) {
-        output.finish(|place| haptic_report::studies::run::write(&single, place))?;
+        output.finish(|place| files::write(&single, arguments.series.into(), place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if arguments.json {
-        print_json(&single.results)?;
+        print_json(&files::stamped(&single))?;
     } else {
         print(&readable(&single))?;
     }
@@ -50,19 +53,6 @@ fn readable(single: &SingleRun) -> String {
     let results = &single.results;
     let record = &results.record;
     let [from, to] = results.window_m;
-    let mut lines = vec![["metric", "value", "unit"].map(String::from).to_vec()];
-    for definition in DEFINITIONS {
-        let value = number((definition.value)(&record.metrics), 4);
-        lines.push(vec![definition.label.into(), value, definition.unit.into()]);
-    }
-    if let Some([k_hg, deviation]) = results.reliance {
-        let line = [
-            "K_hg, as the ECU reads it",
-            &format!("{k_hg:.3}"),
-            &format!("+- {deviation:.3}"),
-        ];
-        lines.push(line.map(String::from).to_vec());
-    }
     let ended = if record.diverged {
         format!("DIVERGED at {:.0} m", record.end_m)
     } else {
@@ -76,6 +66,6 @@ fn readable(single: &SingleRun) -> String {
         record.condition,
         record.failure,
         results.course_length_m,
-        table::text(&lines),
+        files::table(results).to_text(),
     )
 }

@@ -42,6 +42,7 @@ impl Message for LanePreview {
             | put(i64::from(self.valid), 55, 1)
     }
 
+    #[expect(clippy::as_conversions, reason = "masked to nine bits")]
     fn unpack(word: u64) -> Option<Self> {
         let e_y = signed(word, 12, 17);
         let e_theta = signed(word, 29, 17);

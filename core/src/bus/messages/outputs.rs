@@ -1,5 +1,10 @@
 //! What the ECU says.
 
+#![expect(
+    clippy::as_conversions,
+    reason = "a code is its discriminant, and a field is masked to fewer bits than its type has"
+)]
+
 use super::{Info, Message, from_lsb, info, put, signed, to_lsb, unsigned};
 use crate::bus::frame::Frame;
 use crate::envelope::LimitReason;

@@ -9,23 +9,30 @@
 //!
 //! What is not here: driving (the models do that), sets of drives (the studies), and the command line.
 
+mod balance;
 mod bus_trace;
 mod diagnostics;
+mod lane;
 mod log;
 mod noise_model;
 mod options;
 mod paper;
+mod prepare;
 mod result;
 mod search;
 mod signals;
 mod tracking;
+mod verdict;
 
+pub use balance::Balance;
 pub use bus_trace::open_recording;
 pub use diagnostics::{autocorrelation, fit_percent};
+pub use lane::LaneNoise;
 pub use log::{COLUMNS, DriveLog, LogError};
 pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};
 pub use options::{FixError, Options};
 pub use paper::{TABLE_4, identify as identify_as_published};
+pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use result::{
     Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start,
     Traces, Whiteness,
@@ -33,3 +40,4 @@ pub use result::{
 pub use search::Termination;
 pub use signals::Muscle;
 pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, track};
+pub use verdict::Refutation;

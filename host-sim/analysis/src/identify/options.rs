@@ -17,7 +17,7 @@ impl fmt::Display for FixError {
 impl std::error::Error for FixError {}
 
 /// How a drive is to be identified.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// A drive without guidance: K_hg is not part of the model.
     pub manual: bool,
@@ -33,6 +33,35 @@ pub struct Options {
     pub k_d: Option<f64>,
     /// Known K_hg.
     pub k_hg: Option<f64>,
+    /// Known lateness of the recorded T_h and of the recorded T_d, s.
+    pub late_s: [f64; 2],
+    /// Ranges in which K_nms, t_nms, and the lateness of T_h and of T_d are estimated instead of taken as known.
+    pub estimate: [Option<[f64; 2]>; 4],
+    /// The stretches to use, from and to, s of the log's time; all if empty.
+    pub stretches: Vec<(f64, f64)>,
+    /// Whether the camera's noise is estimated and removed.
+    pub lane_noise: bool,
+    /// Whether hands-off, standstill and lane changes are looked for and left out.
+    pub leave_out: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            manual: false,
+            muscle: Muscle::default(),
+            a: [None; 3],
+            gain: [None; 3],
+            t_p_s: None,
+            k_d: None,
+            k_hg: None,
+            late_s: [0.0; 2],
+            estimate: [None; 4],
+            stretches: Vec::new(),
+            lane_noise: true,
+            leave_out: true,
+        }
+    }
 }
 
 /// Names that can be fixed, with the range of each.

@@ -278,6 +278,11 @@ impl<'a> Problem<'a> {
             remnant: None,
             whiteness: diagnostics::whiteness(&residual, 0),
             input_correlation: diagnostics::input_correlation(&residual, &inputs, self.log.dt_s),
+            preflight: None,
+            balance: None,
+            delay_profile: Vec::new(),
+            refuted: Vec::new(),
+            assumed: Vec::new(),
             starts: vec![Start {
                 from_t_p_s: TABLE_4[T_P].0,
                 to_t_p_s: p[T_P],

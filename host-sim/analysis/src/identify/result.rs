@@ -16,7 +16,10 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use super::balance::Balance;
+use super::prepare::Preflight;
 use super::search::{Bounds, Termination};
+use super::verdict::Refutation;
 
 /// One parameter of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -146,6 +149,29 @@ pub struct Parameters {
 }
 
 impl Parameters {
+    /// Takes the verdict from all that was estimated: the model that it was estimated with does not hold.
+    pub(crate) fn take_back(&mut self) {
+        for p in [
+            &mut self.a_1,
+            &mut self.a_2,
+            &mut self.a_3,
+            &mut self.t_p,
+            &mut self.k_d,
+            &mut self.k_hg,
+            &mut self.gain_1,
+            &mut self.gain_2,
+            &mut self.gain_3,
+        ] {
+            if !p.fixed {
+                *p = Parameter {
+                    on_bound: p.on_bound,
+                    optimum: p.optimum,
+                    ..Parameter::ABSENT
+                };
+            }
+        }
+    }
+
     /// Every parameter with its key and unit, in the order of print.
     pub fn list(&self) -> [(&'static str, &'static str, &Parameter); 9] {
         [
@@ -185,8 +211,10 @@ pub struct Correlation {
 impl Correlation {
     /// Of the `free` parameters that have a name, from the covariance of the errors.
     pub(crate) fn new(names: &[Option<&'static str>], errors: &DMatrix<f64>, free: &[usize]) -> Self {
-        let shown: Vec<(usize, &'static str)> =
-            free.iter().filter_map(|&i| names[i].map(|n| (i, n))).collect();
+        let shown: Vec<(usize, &'static str)> = free
+            .iter()
+            .filter_map(|&i| names.get(i).copied().flatten().map(|n| (i, n)))
+            .collect();
         let entry = |i: usize, j: usize| {
             let c = errors[(i, j)] / (errors[(i, i)] * errors[(j, j)]).sqrt();
             c.is_finite()
@@ -291,6 +319,16 @@ pub struct Identification {
     pub whiteness: Whiteness,
     /// Test of the residuals against each input.
     pub input_correlation: Vec<InputCorrelation>,
+    /// What was found in the log and done about it; none for the published method, which takes it as it is.
+    pub preflight: Option<Preflight>,
+    /// The torques on the column against its motion.
+    pub balance: Option<Balance>,
+    /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.
+    pub delay_profile: Vec<[f64; 2]>,
+    /// Assumptions that the record refutes: with any, nothing is identified.
+    pub refuted: Vec<Refutation>,
+    /// What was taken as true and cannot be seen in the record.
+    pub assumed: Vec<String>,
     /// Starts of the search; the first is the one reported.
     pub starts: Vec<Start>,
     /// Loss at the start and after every accepted step.

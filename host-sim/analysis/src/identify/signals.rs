@@ -128,8 +128,13 @@ pub(crate) struct Signals {
     pub t_nms_s: f64,
     /// e_y, Int e_y and e_theta.
     pub visual: [Lagged; 3],
-    /// The muscle's response to T_h.
+    /// T_h and the muscle's response to it.
     pub guidance: Vec<f64>,
+    pub guidance_raw: Vec<f64>,
+    /// The wheel angle and the muscle's response to it.
+    pub wheel: Lagged,
+    /// T_d.
+    pub torque: Vec<f64>,
     /// T_d + K_nms * L[phi]: what the visual and the haptic part have to explain.
     pub target: Vec<f64>,
     /// Whether T_h is other than zero anywhere.
@@ -158,6 +163,9 @@ impl Signals {
             t_nms_s,
             visual,
             guidance,
+            guidance_raw: log.guidance_torque_nm.clone(),
+            wheel: phi,
+            torque: log.driver_torque_nm.clone(),
             target,
             guided,
         }

@@ -12,14 +12,12 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
-mod participants;
 mod recorder;
 mod repetitions;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use participants::{Participant, PublishedDriver, participants};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
 
@@ -30,6 +28,7 @@ use haptic_log::trace::Trace;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::Course;
+use haptic_sim::participants::{Participant, PublishedDriver, participants};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
 use haptic_sim::simulation;
 
@@ -147,7 +146,7 @@ struct Driven {
     path: Vec<(f64, f64)>,
 }
 
-/// Lets a published driver drive, with his remnant and the paper's sensors.
+/// Lets a published driver drive, with a remnant and the paper's sensors.
 fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
     let guided = truth.k_hg.is_some();
     let seed = plan
@@ -217,18 +216,9 @@ fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scena
         guidance.controller.probe_amplitude_nm = plan.probe_nm;
     }
     let scenario = Scenario::builder()
-        .driver(DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
-            ..DriverParameters::default()
-        })
+        .driver(driver.parameters())
         .condition(condition)
-        .gains(ArmGains {
-            k_d: driver.k_d,
-            k_hg: driver.k_hg.unwrap_or(0.0),
-        })
+        .gains(driver.gains())
         .guidance(guidance)
         .seed(seed);
     Ok(scenario.build()?)
@@ -247,9 +237,9 @@ pub(super) fn identified_driver(
     let sum = k_d + muscle.k_nms;
     let a = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| gain.optimum.unwrap_or(0.0) / sum);
     let driver = DriverParameters {
-        a1: a[0],
-        a2: a[1],
-        a3: a[2],
+        a_1: a[0],
+        a_2: a[1],
+        a_3: a[2],
         t_p: p.t_p.optimum.unwrap_or(0.0).max(STEP_S),
         t_nms: muscle.t_nms_s,
         k_nms: muscle.k_nms,

@@ -1,16 +1,15 @@
 //! A report as HTML: structure and style sheet.
 //!
-//! Text goes through the template's escaping; the only raw insertions are the style sheet below and drawings
-//! made by `plot`, which escapes its own text. The content security policy forbids the browser to load or run
-//! anything.
+//! Text goes through the template's escaping; the only raw insertions are the style sheets, the script, the data of
+//! the figures, in which nothing can end the script, and drawings made by `plot`, which escapes its own text. The
+//! content security policy forbids the browser to load anything, and to run anything but that script. Without the
+//! script, and on paper, the drawings show.
 
 use haptic_log::Event;
 
-use super::{Block, Cell, Report, Section, Table};
-use crate::plot::PlotError;
+use super::{Block, Cell, Provenance, Report, Section, Table, chart};
+use crate::plot::{Figure, PlotError};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 
 /// Figures keep white paper in the dark: their colours are chosen for it.
 const STYLE: &str = include_str!("report.css");
@@ -22,15 +21,19 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
         .enumerate()
         .map(|(i, s)| section(i, s))
         .collect::<Result<Vec<_>, _>>()?;
+    let policy = format!(
+        "default-src 'none'; style-src 'unsafe-inline'; script-src '{}'",
+        chart::script_hash()
+    );
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta http-equiv="Content-Security-Policy" content=(policy);
                 title { (report.title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(chart::STYLE)) (PreEscaped(STYLE)) }
             }
             body {
                 header {
@@ -43,6 +46,8 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
                     }
                 }
                 main { @for section in &sections { (section) } }
+                @if let Some(provenance) = &report.provenance { (footer(provenance)) }
+                script { (PreEscaped(chart::SCRIPT)) }
             }
         }
     };
@@ -50,7 +55,12 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
 }
 
 fn section(index: usize, section: &Section) -> Result<Markup, PlotError> {
-    let blocks = section.blocks.iter().map(block).collect::<Result<Vec<_>, _>>()?;
+    let blocks = section
+        .blocks
+        .iter()
+        .enumerate()
+        .map(|(i, b)| block(&format!("{index}-{i}"), b))
+        .collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
         section id={ "section-" (index + 1) } {
             h2 { (section.heading) }
@@ -59,18 +69,44 @@ fn section(index: usize, section: &Section) -> Result<Markup, PlotError> {
     })
 }
 
-fn block(block: &Block) -> Result<Markup, PlotError> {
+/// `id` tells the block from the others of the page.
+fn block(id: &str, block: &Block) -> Result<Markup, PlotError> {
     Ok(match block {
         Block::Text(text) => html! { p { (text) } },
         Block::Table(t) => table(t),
-        Block::Figure { figure, caption } => {
-            let svg = figure.to_svg()?;
-            html! {
-                figure { (PreEscaped(svg)) figcaption { (caption) } }
-            }
-        }
+        Block::Figure { figure, caption } => self::figure(id, figure, caption)?,
         Block::Events(list) => events(list),
     })
+}
+
+fn figure(id: &str, figure: &Figure, caption: &str) -> Result<Markup, PlotError> {
+    // Names of clip paths have to differ from those of the page's other drawings.
+    let svg = figure.to_svg()?.replace("kuva-clip-", &format!("clip-{id}-"));
+    let data = chart::data(figure);
+    Ok(html! {
+        figure {
+            (PreEscaped(svg))
+            figcaption {
+                (caption)
+                @if data.is_some() { span.hint { " Drag to zoom, double-click to see all again." } }
+            }
+            @if let Some(data) = data { script type="application/json" { (PreEscaped(data)) } }
+        }
+    })
+}
+
+fn footer(provenance: &Provenance) -> Markup {
+    html! {
+        footer {
+            p { (provenance.program) " " (provenance.version) ", commit " (provenance.commit) "." }
+            @if let Some(scenario) = &provenance.scenario {
+                details {
+                    summary { "The scenario, to be run again" }
+                    pre { (scenario) }
+                }
+            }
+        }
+    }
 }
 
 fn table(table: &Table) -> Markup {
@@ -112,15 +148,7 @@ fn cell(cell: &Cell) -> Markup {
 pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
     match value.filter(|v| v.is_finite()) {
         None => "\u{2013}".into(),
-        Some(value) => {
-            let text = format!("{value:.decimals$}");
-            let is_zero = !text.contains(|c: char| ('1'..='9').contains(&c));
-            if is_zero {
-                text.trim_start_matches('-').into()
-            } else {
-                text
-            }
-        }
+        Some(value) => haptic_log::table::fixed(value, decimals),
     }
 }
 

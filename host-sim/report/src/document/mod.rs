@@ -1,22 +1,26 @@
 //! What a study hands over: one self-contained HTML report, time series as CSV, results as JSON.
 //!
-//! A [`Report`] is a title and sections; a [`Section`] is a heading and blocks: text, tables, figures, events.
+//! A [`Table`] is one value, shown on a page and on a terminal ([`Table::to_text`]). A [`Report`] is a title and sections; a [`Section`] is a heading and blocks: text, tables, figures, events.
 //! Everything in it is data and is escaped when it is written, so a name from a scenario file can hold any
 //! character. The HTML loads nothing from anywhere. Files are written whole or not at all ([`write_file`]), and
 //! those of a study together or not at all ([`FileSet`]).
 //!
 //! What to report is decided by studies, NOT here.
 
+mod chart;
 mod file_set;
 mod files;
 mod html;
 mod metric_tables;
+mod provenance;
+mod text;
 mod trace_csv;
 
 pub use file_set::FileSet;
 pub use files::{WriteError, write_file, write_json};
 pub use metric_tables::{definitions_table, metrics_table};
-pub use trace_csv::write_trace_csv;
+pub use provenance::{Provenance, Stamped};
+pub use trace_csv::{SeriesFormat, write_trace};
 
 use haptic_log::Event;
 
@@ -31,6 +35,8 @@ pub struct Report {
     pub summary: String,
     /// In reading order.
     pub sections: Vec<Section>,
+    /// Which program made it, of what.
+    pub provenance: Option<Provenance>,
 }
 
 /// A part of a report.
@@ -98,6 +104,16 @@ pub enum Cell {
         /// Digits after the point.
         decimals: usize,
     },
+}
+
+impl Cell {
+    /// A number that there is.
+    pub fn number(value: f64, decimals: usize) -> Self {
+        Self::Number {
+            value: Some(value),
+            decimals,
+        }
+    }
 }
 
 impl Report {

@@ -1,7 +1,7 @@
 //! What a reader and a file system rely on.
 
 use super::*;
-use crate::plot::{Axis, Line, Panel};
+use crate::plot::{Axis, Panel, Series};
 use haptic_analysis::metrics::{DEFINITIONS, Metrics};
 use std::fs;
 use std::io;
@@ -15,6 +15,7 @@ fn report_of(blocks: Vec<Block>) -> String {
         title: "A <b>title</b>".into(),
         summary: "Course: ours.".into(),
         sections: vec![section],
+        provenance: Some(Provenance::of(Some("seed = 1 # </pre><b>".into()))),
     }
     .to_html()
     .unwrap()
@@ -25,7 +26,10 @@ fn text_from_outside_cannot_become_markup() {
     let evil = "</td><script>alert('x')</script>";
     let figure = Figure {
         title: evil.into(),
-        panels: vec![Panel::default()],
+        panels: vec![Panel {
+            title: evil.into(),
+            ..Panel::default()
+        }],
         ..Figure::default()
     };
     let html = report_of(vec![
@@ -40,12 +44,24 @@ fn text_from_outside_cannot_become_markup() {
             what: evil.into(),
         }]),
     ]);
-    assert!(!html.contains("<script") && !html.contains("<b>"));
+    assert!(
+        !html.contains("alert('x')</script>") && !html.contains("<script>alert") && !html.contains("<b>")
+    );
+    // The figure's data, and the page's own script.
+    assert_eq!(
+        (html.matches("<script").count(), html.matches("</script>").count()),
+        (2, 2)
+    );
     assert_eq!(
         html.matches("&lt;script&gt;").count(),
-        7,
+        8,
         "each place shows the text"
     );
+    assert!(
+        html.contains("\\u003c/td>\\u003cscript>"),
+        "so does the chart's data"
+    );
+    assert!(html.contains("seed = 1 # &lt;/pre&gt;&lt;b&gt;"));
     assert!(html.contains("Results &amp; more"));
 }
 
@@ -59,10 +75,30 @@ fn a_report_loads_nothing() {
         figure,
         caption: String::new(),
     }]);
-    let namespace = "xmlns=\"http://www.w3.org/2000/svg\"";
-    for outside in ["http:", "https:", "src=", "url(", "@import", "<link"] {
-        assert!(!html.replace(namespace, "").contains(outside), "{outside}");
+    // Names that are no addresses to load from: the namespace of SVG, the banner of the chart library, and the clip
+    // paths of the page itself.
+    let mut rest = html.replace("url(#", "");
+    for name in [
+        "http://www.w3.org/2000/svg",
+        "/*! https://github.com/leeoniya/uPlot (v1.6.32) */",
+    ] {
+        assert!(rest.contains(name), "{name}");
+        rest = rest.replace(name, "");
     }
+    for outside in [
+        "http:",
+        "https:",
+        "src=",
+        "url(",
+        "@import",
+        "<link",
+        "fetch(",
+        "XMLHttpRequest",
+        "import(",
+    ] {
+        assert!(!rest.contains(outside), "{outside}");
+    }
+    assert!(html.contains("default-src 'none'") && html.contains("script-src 'sha256-"));
 }
 
 #[test]
@@ -92,6 +128,7 @@ fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
     let x = Axis {
         label: "x".into(),
         limits: Some((1.0, 0.0)),
+        ..Axis::default()
     };
     let figure = Figure {
         title: "Figure 8".into(),
@@ -196,13 +233,9 @@ fn a_report_of_long_records_stays_small() {
         .map(|i| f64::from(i) / 200.0)
         .map(|t| (t, (3.0 * t).sin()))
         .collect();
-    let line = |style| Line {
-        label: format!("run {style}"),
-        style,
-        points: points.clone(),
-    };
+    let line = |style| Series::line(&format!("run {style}"), style, points.clone());
     let panel = Panel {
-        lines: (0..4).map(line).collect(),
+        series: (0..4).map(line).collect(),
         ..Panel::default()
     };
     let figure = Figure {

@@ -1,181 +1,179 @@
-//! Draws a laid-out page: title, legend, and each panel from its background to its frame.
+//! A figure as an SVG document.
 
-use super::ink::{DrawResult, GRID, INK, Key, MARKER, band_colour, draw_line, draw_marker, frame};
-use super::page::{
-    KEY_WIDTH, LEGEND_ROW, MARGIN, PANEL_HEIGHT, Page, TEXT_SIZE, TICK, TICK_TEXT_SIZE, TITLE_HEIGHT,
-    TITLE_SIZE, UNIT,
-};
-use super::{Panel, axis, polyline};
-use plotters::coord::Shift;
-use plotters::element::{PathElement, Rectangle};
-use plotters::prelude::{DrawingArea, DrawingBackend, Text};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, FontStyle, FontTransform, IntoTextStyle, WHITE};
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::LegendPlot;
+use kuva::plot::legend::{LegendEntry, LegendShape};
+use kuva::render::figure::Figure as Grid;
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
 
-/// Most points of one line: two for each point of the page's width.
-const MOST_POINTS: usize = 1800;
+use super::frame::Frame;
+use super::{Figure, Mark, style};
 
-/// How far a drawn line may be from the curve, units; more shows as corners.
-const TOLERANCE: f64 = 0.35;
+pub(super) const PAGE_WIDTH: f64 = 900.0;
+pub(super) const PANEL_HEIGHT: f64 = 190.0;
+pub(super) const LEFT: f64 = 76.0;
+pub(super) const RIGHT: f64 = 16.0;
+pub(super) const TEXT_SIZE: u32 = 14;
+/// About the width of a letter of that size.
+const LETTER: f64 = 8.2;
+const LEGEND_LINE: f64 = 22.0;
 
-impl Page<'_> {
-    pub(super) fn draw<DB: DrawingBackend>(&self, area: &DrawingArea<DB, Shift>) -> DrawResult<DB> {
-        area.fill(&WHITE)?;
-        if !self.figure.title.is_empty() {
-            let style = self
-                .font(TITLE_SIZE, FontStyle::Bold)
-                .into_text_style(area)
-                .color(&INK);
-            area.draw(&Text::new(
-                self.figure.title.as_str(),
-                (self.left, MARGIN * UNIT),
-                style,
-            ))?;
-        }
-        self.draw_legend(area)?;
-        for (i, panel) in self.figure.panels.iter().enumerate() {
-            self.draw_panel(area, i, panel)?;
-        }
-        let style = self.text(TEXT_SIZE, HPos::Center, VPos::Bottom, area);
-        let centre = ((self.left + self.right) / 2, self.height - MARGIN * UNIT);
-        area.draw(&Text::new(self.figure.x.label.as_str(), centre, style))?;
-        area.present()
+pub(super) const STEM_DOT: f64 = 2.2;
+pub(super) const INTERVAL_OPACITY: f64 = 0.25;
+
+pub(super) fn svg(figure: &Figure) -> String {
+    let legend = legend(figure);
+    let columns = if figure.rows.is_empty() {
+        1
+    } else {
+        figure.panels.len().max(1)
+    };
+    let mut page = Page::default();
+    if !legend.is_empty() {
+        page.put_legend(legend, columns);
     }
-
-    fn text<DB: DrawingBackend>(
-        &self,
-        size: i32,
-        h: HPos,
-        v: VPos,
-        area: &DrawingArea<DB, Shift>,
-    ) -> plotters::style::TextStyle<'static> {
-        self.font(size, FontStyle::Normal)
-            .into_text_style(area)
-            .color(&INK)
-            .pos(Pos::new(h, v))
+    let first = page.structure.len() * columns;
+    for (i, (panel, y_limits)) in figure.panels.iter().zip(figure.y_limits()).enumerate() {
+        let frame = Frame::new(figure, i, y_limits);
+        page.structure.push(vec![first + i]);
+        page.cells.push(frame.plots(panel));
+        page.layouts.push(frame.layout(panel));
+        if columns == 1 || i == 0 {
+            page.heights.push(frame.height);
+        }
     }
+    let rows = page.heights.len().max(1);
+    let mut grid = Grid::new(rows, columns)
+        .with_structure(page.structure)
+        .with_plots(page.cells)
+        .with_layouts(page.layouts)
+        .with_spacing(0.0)
+        .with_padding(6.0)
+        .with_cell_size(PAGE_WIDTH / columns as f64, PANEL_HEIGHT);
+    if columns > 1 {
+        let names = names_room(figure) - LEFT;
+        let width = (PAGE_WIDTH - names) / columns as f64;
+        for column in 0..columns {
+            grid = grid.with_col_width(column, if column == 0 { width + names } else { width });
+        }
+    }
+    for (row, height) in page.heights.into_iter().enumerate() {
+        grid = grid.with_row_height(row, height);
+    }
+    if !figure.title.is_empty() {
+        grid = grid.with_title(&figure.title).with_title_size(TEXT_SIZE + 2);
+    }
+    tidy(&SvgBackend::new().render_scene(&grid.render()))
+}
 
-    fn draw_legend<DB: DrawingBackend>(&self, area: &DrawingArea<DB, Shift>) -> DrawResult<DB> {
-        let title = if self.figure.title.is_empty() {
-            0
-        } else {
-            TITLE_HEIGHT
+/// Round joins, because a mitred join of a zigzag reaches beyond the data. The names of clip paths, which the
+/// drawing library counts up for as long as the program runs, start from zero, so that equal figures are equal text.
+fn tidy(svg: &str) -> String {
+    let svg = svg.replacen("<svg ", "<svg stroke-linejoin=\"round\" ", 1);
+    const NAME: &str = "kuva-clip-";
+    let number = |text: &str| {
+        text.split(|c: char| !c.is_ascii_digit())
+            .next()?
+            .parse::<u64>()
+            .ok()
+    };
+    let mut pieces = svg.split(NAME);
+    let mut tidied = pieces.next().unwrap_or_default().to_owned();
+    let first = pieces.clone().filter_map(number).min().unwrap_or(0);
+    for piece in pieces {
+        let digits = piece.len() - piece.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let renumbered = number(piece).map_or(0, |n| n - first);
+        tidied.push_str(&format!("{NAME}{renumbered}{}", &piece[digits..]));
+    }
+    tidied
+}
+
+/// The cells of a page under construction.
+#[derive(Default)]
+struct Page {
+    structure: Vec<Vec<usize>>,
+    cells: Vec<Vec<Plot>>,
+    layouts: Vec<Layout>,
+    heights: Vec<f64>,
+}
+
+impl Page {
+    fn put_legend(&mut self, entries: Vec<LegendEntry>, columns: usize) {
+        let widest = entries.iter().map(|e| e.label.chars().count()).max().unwrap_or(0);
+        let fitting = (PAGE_WIDTH - LEFT - RIGHT) / (LETTER * widest as f64 + 44.0);
+        let across = (fitting.max(1.0) as usize).min(entries.len());
+        self.heights
+            .push(LEGEND_LINE * entries.len().div_ceil(across) as f64 + 14.0);
+        let plot = LegendPlot::from_entries(entries)
+            .with_cols(across)
+            .with_max_cols(across)
+            .without_box();
+        self.cells.push(vec![Plot::LegendPlot(plot)]);
+        let layout = Layout::new((0.0, 1.0), (0.0, 1.0)).with_body_size(TEXT_SIZE);
+        let layout = layout
+            .with_force_margins(LEFT, RIGHT)
+            .with_force_margins_y(10.0, 0.0);
+        self.layouts.push(layout);
+        self.structure.push((0..columns).collect());
+    }
+}
+
+/// Room for the names of the rows.
+pub(super) fn names_room(figure: &Figure) -> f64 {
+    let longest = figure
+        .rows
+        .iter()
+        .map(|name| name.chars().count())
+        .max()
+        .unwrap_or(0);
+    (0.82 * LETTER * longest as f64 + 16.0).max(LEFT)
+}
+
+fn legend(figure: &Figure) -> Vec<LegendEntry> {
+    let mut entries: Vec<LegendEntry> = Vec::new();
+    let mut add = |label: &str, colour: &str, shape, dash: &str| {
+        if !label.is_empty() && entries.iter().all(|e| e.label != label) {
+            entries.push(LegendEntry {
+                label: label.into(),
+                color: colour.into(),
+                shape,
+                dasharray: (!dash.is_empty()).then(|| dash.into()),
+            });
+        }
+    };
+    for series in figure.panels.iter().flat_map(|p| &p.series) {
+        let style = style::of(series.style);
+        let (colour, shape) = match series.mark {
+            Mark::Line => (style.colour.to_owned(), LegendShape::Line),
+            Mark::Interval(_) => (paler(style.colour, INTERVAL_OPACITY), LegendShape::Rect),
+            Mark::Dots | Mark::Whiskers(_) => (style.colour.to_owned(), LegendShape::Marker(style.marker)),
+            Mark::Stems => (style.colour.to_owned(), LegendShape::CircleSize(STEM_DOT)),
         };
-        for (i, row) in self.legend.iter().enumerate() {
-            let y = (MARGIN + title + LEGEND_ROW * i as i32 + LEGEND_ROW / 2) * UNIT;
-            for &(key, label, x) in row {
-                let (end, half) = (x + KEY_WIDTH * UNIT, 7 * UNIT);
-                match key {
-                    Key::Line(style) => draw_line(area, vec![(x, y), (end, y)], style)?,
-                    Key::Marker => draw_marker(area, (x + end) / 2, y - half, y + half)?,
-                    Key::Band { dark } => {
-                        let corners = [(x, y - half), (end, y + half)];
-                        area.draw(&Rectangle::new(corners, band_colour(dark).filled()))?;
-                        area.draw(&frame(corners, GRID.stroke_width(UNIT as u32)))?;
-                    }
-                }
-                let style = self.text(TEXT_SIZE, HPos::Left, VPos::Center, area);
-                area.draw(&Text::new(label, (end + 8 * UNIT, y + self.text_drop), style))?;
-            }
-        }
-        Ok(())
+        add(&series.label, &colour, shape, style.dash);
     }
-
-    fn draw_panel<DB: DrawingBackend>(
-        &self,
-        area: &DrawingArea<DB, Shift>,
-        index: usize,
-        panel: &Panel,
-    ) -> DrawResult<DB> {
-        let (x_limits, y_limits) = (self.x_limits, self.y_limits[index]);
-        let (left, right, top) = (self.left, self.right, self.tops[index]);
-        let bottom = top + PANEL_HEIGHT * UNIT;
-        let share = |v: f64, (low, high): (f64, f64)| (v - low) / (high - low);
-        let exact_x = |x: f64| f64::from(left) + share(x, x_limits) * f64::from(right - left);
-        let exact_y = |y: f64| f64::from(bottom) - share(y, y_limits) * f64::from(bottom - top);
-        let to_x = |x: f64| exact_x(x).round() as i32;
-        let to_y = |y: f64| exact_y(y).round() as i32;
-        let inside = |x: f64| x.clamp(x_limits.0, x_limits.1);
-
-        for band in &self.figure.bands {
-            if band.to > x_limits.0 && band.from < x_limits.1 {
-                let corners = [(to_x(inside(band.from)), top), (to_x(inside(band.to)), bottom)];
-                area.draw(&Rectangle::new(corners, band_colour(band.dark).filled()))?;
-            }
-        }
-
-        let hairline = GRID.stroke_width(UNIT as u32);
-        let ink = INK.stroke_width(UNIT as u32);
-        let (ticks, decimals) = axis::ticks(y_limits, axis::Y_TICKS);
-        for tick in ticks {
-            let y = to_y(tick);
-            area.draw(&PathElement::new(vec![(left, y), (right, y)], hairline))?;
-            area.draw(&PathElement::new(vec![(left - TICK * UNIT, y), (left, y)], ink))?;
-            let style = self.text(TICK_TEXT_SIZE, HPos::Right, VPos::Center, area);
-            let place = (left - (TICK + 4) * UNIT, y + self.text_drop);
-            area.draw(&Text::new(axis::label(tick, decimals), place, style))?;
-        }
-        let (ticks, decimals) = axis::ticks(x_limits, axis::X_TICKS);
-        let is_last = index + 1 == self.figure.panels.len();
-        for tick in ticks {
-            let x = to_x(tick);
-            area.draw(&PathElement::new(vec![(x, top), (x, bottom)], hairline))?;
-            area.draw(&PathElement::new(
-                vec![(x, bottom), (x, bottom + TICK * UNIT)],
-                ink,
-            ))?;
-            if is_last {
-                let style = self.text(TICK_TEXT_SIZE, HPos::Center, VPos::Top, area);
-                let place = (x, bottom + (TICK + 4) * UNIT);
-                area.draw(&Text::new(axis::label(tick, decimals), place, style))?;
-            }
-        }
-        if y_limits.0 < 0.0 && y_limits.1 > 0.0 {
-            let zero = MARKER.stroke_width(UNIT as u32 / 2);
-            area.draw(&PathElement::new(
-                vec![(left, to_y(0.0)), (right, to_y(0.0))],
-                zero,
-            ))?;
-        }
-        for marker in self
-            .figure
-            .markers
-            .iter()
-            .filter(|m| m.x >= x_limits.0 && m.x <= x_limits.1)
-        {
-            draw_marker(area, to_x(marker.x), top, bottom)?;
-        }
-        for line in &panel.lines {
-            for piece in polyline::clip(&line.points, x_limits, y_limits) {
-                let path: Vec<_> = polyline::thin(&piece, MOST_POINTS)
-                    .into_iter()
-                    .map(|(x, y)| (exact_x(x), exact_y(y)))
-                    .collect();
-                let path = polyline::simplify(&path, TOLERANCE).into_iter();
-                let mut path: Vec<_> = path.map(|(x, y)| (x.round() as i32, y.round() as i32)).collect();
-                path.dedup();
-                draw_line(area, path, line.style)?;
-            }
-        }
-        area.draw(&frame([(left, top), (right, bottom)], ink))?;
-
-        let style = self
-            .font(TEXT_SIZE, FontStyle::Bold)
-            .into_text_style(area)
-            .color(&INK);
-        let style = style.pos(Pos::new(HPos::Left, VPos::Bottom));
-        area.draw(&Text::new(panel.title.as_str(), (left, top - 5 * UNIT), style))?;
-        let font = self
-            .font(TEXT_SIZE, FontStyle::Normal)
-            .transform(FontTransform::Rotate270);
-        let style = font
-            .into_text_style(area)
-            .color(&INK)
-            .pos(Pos::new(HPos::Center, VPos::Top));
-        area.draw(&Text::new(
-            panel.y.label.as_str(),
-            (MARGIN * UNIT, (top + bottom) / 2),
-            style,
-        ))
+    for marker in &figure.markers {
+        add(&marker.label, style::MARKER, LegendShape::Line, "2 2");
     }
+    for band in &figure.bands {
+        add(
+            &band.label,
+            &paler("#000000", band_opacity(band.dark)),
+            LegendShape::Rect,
+            "",
+        );
+    }
+    entries
+}
+
+/// Bands are a breath of black, so that the grid and the frame show through.
+pub(super) fn band_opacity(dark: bool) -> f64 {
+    if dark { 0.12 } else { 0.05 }
+}
+
+/// A colour as it looks on white paper.
+fn paler(colour: &str, opacity: f64) -> String {
+    let channel = |i: usize| u8::from_str_radix(colour.get(i..i + 2).unwrap_or("00"), 16).unwrap_or(0);
+    let mixed = |i: usize| (f64::from(channel(i)) * opacity + 255.0 * (1.0 - opacity)) as u8;
+    format!("#{:02x}{:02x}{:02x}", mixed(1), mixed(3), mixed(5))
 }

@@ -1,39 +1,45 @@
-//! Figures: a column of panels over one shared x axis, the same drawing as SVG and as PNG.
+//! Figures: panels over one shared axis, drawn as SVG; the PNG is that SVG, rasterised.
 //!
-//! A [`Figure`] is plain data: fill it and call [`Figure::to_svg`] or [`Figure::to_png`]. Limits are either
-//! given or taken from the data and rounded outward to a tick; [`Figure::x_limits`] and [`Figure::y_limits`]
-//! tell what will be drawn. Lines are cut at the limits and where a value is not finite, and thinned without
-//! losing a peak. Colours (Okabe and Ito 2008) are told apart by colour-blind readers, and dashes in grey
-//! print. The font is built in, so that no machine needs one.
+//! A [`Figure`] is plain data: fill it and call [`Figure::to_svg`] or [`Figure::to_png`]. The SVG is the one
+//! drawing: the PNG is made from its text, so the two cannot differ. Limits are given or taken from the data that
+//! are in view. A series breaks where a value is not finite, and is thinned without losing a peak. Colours (Okabe
+//! and Ito 2008) are told apart by colour-blind readers, and dashes, widths and markers in grey print. The font of
+//! the PNG is built in, so that no machine needs one.
 //!
-//! What to plot is decided by studies, and files are written by `report`, NOT here. `lateral_error` lays out
-//! the one figure that several studies share.
+//! Terms: a *series* is a row of points with a [`Mark`] that says how they are drawn; a *band* is a shaded stretch
+//! of the shared axis; a *marker* is one place on it. A figure of *rows* has names in place of numbers on its
+//! shared axis, and lies on its side, so that long names can be read.
+//!
+//! The drawing itself is done by the crates `kuva` (SVG) and `resvg` (pixels). What to plot is decided by studies,
+//! and files are written by `document`, NOT here.
 
-mod axis;
 mod draw;
-mod font;
-mod ink;
-pub mod lateral_error;
-mod output;
-mod page;
+mod frame;
 mod polyline;
+mod raster;
+mod style;
+
+pub(crate) use polyline::thin;
+pub(crate) use style::{colour, dash, width};
 
 use std::fmt;
 
-/// A drawing of panels that share their x axis.
+/// A drawing of panels that share an axis.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// Drawn above everything; may be empty.
     pub title: String,
-    /// The shared x axis.
+    /// The shared axis.
     pub x: Axis,
-    /// Whether all panels have the same y limits.
+    /// Names of the places 1, 2, .. on the shared axis, if it has names. The figure then lies on its side.
+    pub rows: Vec<String>,
+    /// Whether all panels have the same limits for their values.
     pub same_y: bool,
-    /// From top to bottom.
+    /// From top to bottom; from left to right in a figure of rows.
     pub panels: Vec<Panel>,
-    /// Vertical lines through all panels.
+    /// Lines through all panels.
     pub markers: Vec<Marker>,
-    /// Shaded stretches of x behind all panels.
+    /// Shaded stretches behind all panels.
     pub bands: Vec<Band>,
 }
 
@@ -44,28 +50,112 @@ pub struct Axis {
     pub label: String,
     /// Lower and upper end; `None` takes them from the data.
     pub limits: Option<(f64, f64)>,
+    /// Whether only whole numbers mean anything on it.
+    pub whole: bool,
 }
 
-/// One plot of the column.
+impl Axis {
+    /// An axis with limits from the data.
+    pub fn of(label: &str) -> Self {
+        Self {
+            label: label.into(),
+            ..Self::default()
+        }
+    }
+}
+
+/// One plot of a figure.
 #[derive(Debug, Clone, Default)]
 pub struct Panel {
-    /// Drawn above the panel at its left; may be empty.
+    /// Drawn above the panel; may be empty.
     pub title: String,
-    /// The panel's own y axis.
+    /// The panel's own axis, of the values.
     pub y: Axis,
     /// In drawing order: the last lies on top.
-    pub lines: Vec<Line>,
+    pub series: Vec<Series>,
 }
 
-/// One curve. Lines of the same label share one legend entry, so give them the same style.
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Mark {
+    /// Joined by straight lines; the line breaks where a value is not finite.
+    #[default]
+    Line,
+    /// Each by itself.
+    Dots,
+    /// Each by itself, with the interval that belongs to it.
+    Whiskers(Vec<[f64; 2]>),
+    /// Each with a stem to zero.
+    Stems,
+    /// A shaded area from the points up to these values.
+    Interval(Vec<f64>),
+}
+
+/// Points of one meaning. Series of the same label share one legend entry, so give them the same style.
 #[derive(Debug, Clone, Default)]
-pub struct Line {
+pub struct Series {
     /// Name in the legend; empty for none.
     pub label: String,
-    /// Colour and dash, from 0; from [`STYLES`] on they repeat.
+    /// Colour, dash and marker, from 0; after seven they repeat. Style 0 is the widest line, for what the
+    /// others are compared with: a line that coincides with it lies visibly upon it.
     pub style: usize,
-    /// The curve; it breaks where a value is not finite.
+    /// How the points are drawn.
+    pub mark: Mark,
+    /// Place on the shared axis, and value.
     pub points: Vec<(f64, f64)>,
+}
+
+impl Series {
+    /// A line.
+    pub fn line(label: &str, style: usize, points: Vec<(f64, f64)>) -> Self {
+        Self::with_mark(label, style, Mark::Line, points)
+    }
+
+    /// Dots.
+    pub fn dots(label: &str, style: usize, points: Vec<(f64, f64)>) -> Self {
+        Self::with_mark(label, style, Mark::Dots, points)
+    }
+
+    /// An area between the values of `[low, high]`.
+    pub fn interval(label: &str, style: usize, x: &[f64], ends: &[[f64; 2]]) -> Self {
+        let lows = x.iter().zip(ends).map(|(x, [low, _])| (*x, *low)).collect();
+        let highs = ends.iter().map(|[_, high]| *high).collect();
+        Self::with_mark(label, style, Mark::Interval(highs), lows)
+    }
+
+    /// Points of any mark.
+    pub fn with_mark(label: &str, style: usize, mark: Mark, points: Vec<(f64, f64)>) -> Self {
+        Self {
+            label: label.into(),
+            style,
+            mark,
+            points,
+        }
+    }
+
+    /// Every value that is drawn between two places.
+    fn values_within(&self, (left, right): (f64, f64)) -> impl Iterator<Item = f64> {
+        let inside = move |x: f64| (left..=right).contains(&x);
+        let own = self.points.iter().filter(move |p| inside(p.0)).map(|p| p.1);
+        let (uppers, whiskers): (&[f64], &[[f64; 2]]) = match &self.mark {
+            Mark::Interval(upper) => (upper, &[]),
+            Mark::Whiskers(ends) => (&[], ends),
+            Mark::Line | Mark::Dots | Mark::Stems => (&[], &[]),
+        };
+        let at = move |i: usize| inside(self.points.get(i).map_or(f64::NAN, |p| p.0));
+        let upper = uppers
+            .iter()
+            .enumerate()
+            .filter(move |(i, _)| at(*i))
+            .map(|(_, v)| *v);
+        let ends = whiskers
+            .iter()
+            .enumerate()
+            .filter(move |(i, _)| at(*i))
+            .flat_map(|(_, v)| *v);
+        let zero = (self.mark == Mark::Stems).then_some(0.0);
+        own.chain(upper).chain(ends).chain(zero)
+    }
 }
 
 /// An instant or a place.
@@ -77,7 +167,7 @@ pub struct Marker {
     pub x: f64,
 }
 
-/// A stretch of x.
+/// A stretch of the shared axis.
 #[derive(Debug, Clone, Default)]
 pub struct Band {
     /// Name in the legend; bands of one name share an entry.
@@ -89,9 +179,6 @@ pub struct Band {
     /// The darker of the two shades.
     pub dark: bool,
 }
-
-/// Number of line styles that can be told apart.
-pub const STYLES: usize = ink::STYLES.len();
 
 /// Why a figure could not be drawn.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -105,49 +192,60 @@ impl fmt::Display for PlotError {
 
 impl std::error::Error for PlotError {}
 
+/// Room left between a series and the frame, as a share of the extent of the values.
+const ROOM: f64 = 0.05;
+
 impl Figure {
     /// The figure as an SVG document.
     ///
     /// # Errors
     /// A given limit is not finite, or does not lie below its upper one.
     pub fn to_svg(&self) -> Result<String, PlotError> {
-        output::svg(self)
+        self.check_limits()?;
+        Ok(draw::svg(self))
     }
 
-    /// The figure as a PNG, 1800 pixels wide.
+    /// The figure as a PNG, twice as many pixels wide as the SVG has points.
     ///
     /// # Errors
     /// As [`Figure::to_svg`].
     pub fn to_png(&self) -> Result<Vec<u8>, PlotError> {
-        output::png(self)
+        raster::png(&self.to_svg()?).map_err(|e| PlotError(format!("figure '{}': {e}", self.title)))
     }
 
-    /// Ends of the x axis: as given, else of the data; (0, 1) if there is none.
+    /// Ends of the shared axis: as given, else of the data; (0, 1) if there is none.
     pub fn x_limits(&self) -> (f64, f64) {
-        let points = self.panels.iter().flat_map(|p| &p.lines).flat_map(|l| &l.points);
-        let extent = || match axis::extent(points.filter(|p| p.1.is_finite()).map(|p| p.0)) {
-            Some((low, high)) if low < high => (low, high),
-            Some((only, _)) => (only - 0.5, only + 0.5),
+        if !self.rows.is_empty() {
+            return (0.5, self.rows.len() as f64 + 0.5);
+        }
+        let points = self.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.points);
+        let of_data = || match extent(points.filter(|p| p.1.is_finite()).map(|p| p.0)) {
+            Some((low, high)) if low < high && self.has_lines() => (low, high),
+            // A dot or a stem stands free of the frame.
+            Some((low, high)) => (low - 0.5, high + 0.5),
             None => (0.0, 1.0),
         };
-        self.x.limits.unwrap_or_else(extent)
+        self.x.limits.unwrap_or_else(of_data)
     }
 
-    /// Ends of each panel's y axis: as given, else of the data within the x limits (of all panels if
-    /// [`Figure::same_y`]), rounded outward to a tick.
+    fn has_lines(&self) -> bool {
+        let mut series = self.panels.iter().flat_map(|p| &p.series);
+        series.all(|s| matches!(s.mark, Mark::Line | Mark::Interval(_)))
+    }
+
+    /// Ends of each panel's values: as given, else of the data in view (of all panels if [`Figure::same_y`]), with
+    /// a little room.
     pub fn y_limits(&self) -> Vec<(f64, f64)> {
-        let (left, right) = self.x_limits();
-        let visible = |panel: &Panel| {
-            let points = panel.lines.iter().flat_map(|l| &l.points);
-            axis::extent(points.filter(|p| (left..=right).contains(&p.0)).map(|p| p.1))
-        };
+        let x = self.x_limits();
+        let visible = |panel: &Panel| extent(panel.series.iter().flat_map(|s| s.values_within(x)));
         let extents: Vec<_> = self.panels.iter().map(visible).collect();
-        let of_all = axis::extent(extents.iter().flatten().flat_map(|&(low, high)| [low, high]));
+        let of_all = extent(extents.iter().flatten().flat_map(|&(low, high)| [low, high]));
         let limits = |(panel, own): (&Panel, &Option<(f64, f64)>)| {
+            let data = if self.same_y { of_all } else { *own };
             panel
                 .y
                 .limits
-                .unwrap_or_else(|| axis::rounded_outward(if self.same_y { of_all } else { *own }))
+                .unwrap_or_else(|| with_room(data, self.has_lines() || !self.rows.is_empty()))
         };
         self.panels.iter().zip(&extents).map(limits).collect()
     }
@@ -167,5 +265,31 @@ impl Figure {
     }
 }
 
+/// Smallest and largest finite value.
+fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values
+        .filter(|v| v.is_finite())
+        .fold(None, |extent, v| match extent {
+            None => Some((v, v)),
+            Some((low, high)) => Some((low.min(v), high.max(v))),
+        })
+}
+
+/// Limits that hold `extent` with room; a single value gets half of itself on both sides, no value or zero (-1, 1). What
+/// starts from zero may stand on the frame if it `stands` there, as lines do; a dot would be cut.
+fn with_room(extent: Option<(f64, f64)>, stands: bool) -> (f64, f64) {
+    match extent {
+        None | Some((0.0, 0.0)) => (-1.0, 1.0),
+        Some((low, high)) if low == high => (low - 0.5 * low.abs(), high + 0.5 * high.abs()),
+        Some((low, high)) => {
+            let room = ROOM * (high - low);
+            let room_at = |end: f64| if stands && end == 0.0 { 0.0 } else { room };
+            (low - room_at(low), high + room_at(high))
+        }
+    }
+}
+
+#[cfg(test)]
+mod pixel_tests;
 #[cfg(test)]
 mod tests;

@@ -1,60 +1,65 @@
-//! What of a curve is drawn: cut at the limits, and thinned to what the eye can tell apart.
+//! What of a curve is drawn: what is in view, thinned to what the eye can tell apart.
 
 type Point = (f64, f64);
 
-/// The stretches of a curve within the limits, ends on the border included; cut where a value is not finite.
-pub(super) fn clip(points: &[Point], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<Point>> {
-    let mut pieces: Vec<Vec<Point>> = Vec::new();
-    let mut joined = false;
-    for pair in points.windows(2) {
-        let Some((from, to)) = clip_segment(pair[0], pair[1], x, y) else {
-            joined = false;
-            continue;
-        };
-        match pieces.last_mut() {
-            Some(piece) if joined => piece.push(to),
-            _ => pieces.push(vec![from, to]),
+/// The stretches of a curve that are to be drawn between two places: cut where a value is not finite, and with one
+/// point beyond each end, so that the line runs to the border.
+pub(super) fn in_view(points: &[Point], (left, right): (f64, f64)) -> Vec<&[Point]> {
+    let mut pieces = Vec::new();
+    for piece in points.split(|p| !(p.0.is_finite() && p.1.is_finite())) {
+        let inside = |p: &Point| (left..=right).contains(&p.0);
+        let crosses = |pair: &[Point]| pair[0].0.min(pair[1].0) <= right && pair[0].0.max(pair[1].0) >= left;
+        let first = piece
+            .windows(2)
+            .position(crosses)
+            .or_else(|| piece.iter().position(inside));
+        let last = piece.windows(2).rposition(crosses).map(|i| i + 1);
+        if let (Some(first), Some(last)) = (first, last.or_else(|| piece.iter().rposition(inside))) {
+            pieces.push(&piece[first..=last]);
         }
-        joined = to == pair[1];
     }
     pieces
 }
 
-/// The part of a segment within the limits (Liang and Barsky 1984).
-fn clip_segment(a: Point, b: Point, x: (f64, f64), y: (f64, f64)) -> Option<(Point, Point)> {
-    if ![a.0, a.1, b.0, b.1].iter().all(|v| v.is_finite()) {
-        return None;
+/// `[place, low, high]` of an area, cut where a value is not finite.
+pub(super) fn pieces(lows: &[Point], highs: &[f64]) -> Vec<Vec<[f64; 3]>> {
+    let rows: Vec<_> = lows
+        .iter()
+        .zip(highs)
+        .map(|((x, low), high)| [*x, *low, *high])
+        .collect();
+    let finite = |row: &[f64; 3]| row.iter().all(|v| v.is_finite());
+    let pieces = rows.split(|row| !finite(row)).filter(|piece| piece.len() > 1);
+    pieces.map(<[_]>::to_vec).collect()
+}
+
+/// An area of at most `most` rows: of each stretch the whole height, so that it never looks narrower than it is.
+pub(super) fn thin_area(area: Vec<[f64; 3]>, most: usize) -> Vec<[f64; 3]> {
+    if area.len() <= most {
+        return area;
     }
-    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
-    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
-    for (step, room) in [
-        (-dx, a.0 - x.0),
-        (dx, x.1 - a.0),
-        (-dy, a.1 - y.0),
-        (dy, y.1 - a.1),
-    ] {
-        if step == 0.0 {
-            if room < 0.0 {
-                return None;
-            }
-        } else if step < 0.0 {
-            enter = enter.max(room / step);
-        } else {
-            leave = leave.min(room / step);
-        }
-    }
-    let at = |t: f64| (a.0 + t * dx, a.1 + t * dy);
-    (enter <= leave).then(|| {
-        (
-            if enter > 0.0 { at(enter) } else { a },
-            if leave < 1.0 { at(leave) } else { b },
-        )
-    })
+    let last = area.last().copied();
+    let widest = |stretch: &[[f64; 3]]| {
+        let low = stretch.iter().map(|row| row[1]).fold(f64::INFINITY, f64::min);
+        let high = stretch.iter().map(|row| row[2]).fold(f64::NEG_INFINITY, f64::max);
+        [stretch[0][0], low, high]
+    };
+    area.chunks(area.len().div_ceil(most - 1))
+        .map(widest)
+        .chain(last)
+        .collect()
+}
+
+/// Length of a path.
+pub(super) fn length(path: &[Point]) -> f64 {
+    path.windows(2)
+        .map(|p| f64::hypot(p[1].0 - p[0].0, p[1].1 - p[0].1))
+        .sum()
 }
 
 /// At most `most` (4 or more) of the points: both ends, and the lowest and highest of every stretch between, so
 /// that no peak is lost.
-pub(super) fn thin(points: &[Point], most: usize) -> Vec<Point> {
+pub(crate) fn thin(points: &[Point], most: usize) -> Vec<Point> {
     if points.len() <= most {
         return points.to_vec();
     }
@@ -78,7 +83,7 @@ pub(super) fn thin(points: &[Point], most: usize) -> Vec<Point> {
 }
 
 /// The points without those that lie within `tolerance` of the curve through the rest (Ramer 1972; Douglas and
-/// Peucker 1973). Long straight pieces also draw smoother than many short ones on whole units.
+/// Peucker 1973). It keeps the SVG small.
 pub(super) fn simplify(points: &[Point], tolerance: f64) -> Vec<Point> {
     let mut kept: Vec<Point> = points.first().copied().into_iter().collect();
     let mut stretches = vec![(0, points.len().saturating_sub(1))];
@@ -111,41 +116,40 @@ fn distance(p: Point, a: Point, b: Point) -> f64 {
 mod tests {
     use super::*;
 
-    const UNIT: (f64, f64) = (0.0, 1.0);
-
     #[test]
-    fn a_curve_is_cut_at_the_border() {
-        let pieces = clip(&[(0.0, 0.5), (0.5, 1.5), (1.0, 0.5), (2.0, 0.5)], UNIT, UNIT);
+    fn a_curve_runs_to_the_border_and_no_further() {
+        let points = [(0.0, 5.0), (1.0, 6.0), (2.0, 7.0), (3.0, 8.0), (4.0, 9.0)];
+        assert_eq!(in_view(&points, (1.5, 2.5)), [&points[1..4]]);
         assert_eq!(
-            pieces,
-            [
-                vec![(0.0, 0.5), (0.25, 1.0)],
-                vec![(0.75, 1.0), (1.0, 0.5), (1.0, 0.5)]
-            ]
+            in_view(&points, (1.2, 1.8)),
+            [&points[1..3]],
+            "no point lies within"
         );
+        assert!(in_view(&points, (5.0, 6.0)).is_empty());
+        assert_eq!(in_view(&points[..1], (0.0, 1.0)), [&points[..1]]);
     }
 
     #[test]
     fn a_curve_breaks_where_it_is_not_a_number() {
-        let pieces = clip(
-            &[(0.0, 0.1), (0.1, 0.2), (0.2, f64::NAN), (0.3, 0.4), (0.4, 0.5)],
-            UNIT,
-            UNIT,
-        );
-        assert_eq!(
-            pieces,
-            [vec![(0.0, 0.1), (0.1, 0.2)], vec![(0.3, 0.4), (0.4, 0.5)]]
-        );
+        let points = [(0.0, 0.1), (0.1, 0.2), (0.2, f64::NAN), (0.3, 0.4), (0.4, 0.5)];
+        assert_eq!(in_view(&points, (0.0, 1.0)), [&points[..2], &points[3..]]);
+        let highs = [1.0, f64::INFINITY, 1.0, 1.0, 1.0];
+        assert_eq!(pieces(&points, &highs), [vec![[0.3, 0.4, 1.0], [0.4, 0.5, 1.0]]]);
     }
 
     #[test]
-    fn a_segment_that_crosses_the_whole_view_is_kept_and_one_beside_it_dropped() {
-        assert_eq!(
-            clip(&[(-1.0, 0.5), (3.0, 0.5)], UNIT, UNIT),
-            [vec![(0.0, 0.5), (1.0, 0.5)]]
-        );
-        assert!(clip(&[(-1.0, 0.5), (0.5, 2.5)], UNIT, UNIT).is_empty());
-        assert!(clip(&[(0.0, 2.0), (1.0, 2.0)], UNIT, UNIT).is_empty());
+    fn a_thinned_area_holds_the_whole_one() {
+        let area: Vec<_> = (0..1000)
+            .map(|i| f64::from(i))
+            .map(|x| [x, -x.sin(), 2.0 + x.cos()])
+            .collect();
+        let thinned = thin_area(area.clone(), 60);
+        assert!(thinned.len() <= 60 && thinned[0][0] == 0.0 && thinned[thinned.len() - 1] == area[999]);
+        for [x, low, high] in &area[..999] {
+            let held = thinned.iter().rev().find(|row| row[0] <= *x).unwrap();
+            assert!(held[1] <= *low && held[2] >= *high);
+        }
+        assert_eq!(thin_area(area[..60].to_vec(), 60), &area[..60]);
     }
 
     #[test]

@@ -6,15 +6,16 @@ use std::path::Path;
 use super::files::{write_figure, write_report};
 use super::{OutputError, curves, notes};
 use crate::document::{
-    Block, Cell, Report, Section, Table, definitions_table, metrics_table, write_json, write_trace_csv,
+    Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, metrics_table,
+    write_json, write_trace,
 };
-use crate::plot::lateral_error::{DriverPanel, figure};
-use crate::plot::{Figure, Marker};
+use crate::plot::{Axis, Figure, Marker, Panel, Series};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::RunRecord;
-use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, Results};
+use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
 use haptic_sim::models::road::PAPER_COURSE;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+use haptic_sim::simulation::Run;
 
 /// Metrics of the short table; the report's second table has all of them.
 const IN_SHORT: [&str; 7] = [
@@ -27,11 +28,12 @@ const IN_SHORT: [&str; 7] = [
     "peak_driver_torque_nm",
 ];
 
-/// Writes figures 8 and 9 (SVG, PNG), the time series (CSV), the results (JSON) and a report (HTML).
+/// Writes figures 8 and 9 (SVG, PNG), the results (JSON) and a report (HTML), and the time series of the 30 runs if
+/// they are asked for.
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), OutputError> {
+pub fn write(evaluation: &Evaluation, series: SeriesFormat, directory: &Path) -> Result<(), OutputError> {
     let figures = [
         ("figure8", nominal_figure(evaluation)),
         ("figure9", failure_figure(evaluation)),
@@ -42,18 +44,34 @@ pub fn write(evaluation: &Evaluation, directory: &Path) -> Result<(), OutputErro
     }
     for (scenario, run) in &evaluation.runs {
         let name = format!(
-            "t_p_{}_{}_failure_{}.csv",
+            "t_p_{}_{}_failure_{}",
             scenario.driver().t_p,
             scenario.condition(),
             scenario.failure().kind
         );
-        write_trace_csv(&directory.join("runs").join(name), &run.trace)?;
+        write_trace(&directory.join("runs"), &name, &run.trace, series)?;
     }
-    write_json(&directory.join("results.json"), &evaluation.results)?;
-    write_report(
-        directory,
-        &report(&evaluation.results, figures.map(|(_, figure)| figure)),
-    )
+    write_json(&directory.join("results.json"), &stamped(evaluation))?;
+    write_report(directory, &report(evaluation, figures.map(|(_, figure)| figure)))
+}
+
+/// The results as JSON holds them, with the scenario that the runs vary.
+pub fn stamped(evaluation: &Evaluation) -> Stamped<'_, EvaluationResults> {
+    provenance(evaluation).stamp(&evaluation.results)
+}
+
+/// One of the runs stands for all: they differ in t_p, condition and kind of failure alone.
+fn provenance(evaluation: &Evaluation) -> Provenance {
+    let mut runs = evaluation.runs.iter();
+    let one = runs.find(|(s, _)| s.condition() == Condition::Mid && s.failure().kind == FailureKind::Torque);
+    Provenance::of(one.map(|(scenario, _)| scenario.to_toml()))
+}
+
+/// The main metrics of each run.
+pub fn table(results: &EvaluationResults) -> Table {
+    table_of(results, "The main metrics of each run.", |d| {
+        IN_SHORT.contains(&d.name)
+    })
 }
 
 fn nominal_figure(evaluation: &Evaluation) -> Figure {
@@ -116,29 +134,49 @@ fn failure_marker(evaluation: &Evaluation) -> Option<Marker> {
 /// What a panel's title ends with, and which runs it shows.
 type Shown<'a> = (&'a str, &'a dyn Fn(&Scenario) -> bool);
 
-/// For each driver one panel for each of `kinds`.
+/// For each driver one panel for each of `kinds`: lateral error along the road, a line for each condition, the same
+/// axes for all.
 fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
-    let mut drivers = Vec::new();
+    let mut panels = Vec::new();
     for (number, t_p) in DRIVERS_T_P.iter().enumerate() {
         for (ending, shown) in kinds {
             let runs = evaluation
                 .runs
                 .iter()
                 .filter(|(s, _)| s.driver().t_p == *t_p && shown(s));
+            // A condition has the same style in all figures.
             let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
-            drivers.push(DriverPanel {
+            let path = |run: &Run| {
+                run.trace
+                    .samples
+                    .iter()
+                    .map(|s| (s.s_m, s.lateral_error_m))
+                    .collect()
+            };
+            panels.push(Panel {
                 title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
-                runs: runs
-                    .map(|(s, run)| (label(s.condition()).into(), style(s.condition()), &run.trace))
+                y: Axis::of("Lateral error (m)"),
+                series: runs
+                    .map(|(s, run)| Series::line(label(s.condition()), style(s.condition()), path(run)))
                     .collect(),
             });
         }
     }
     let [from, to] = evaluation.results.window_m;
     let course = evaluation.runs.first().map(|(scenario, _)| scenario.course());
-    let bands = course.map(curves::bands).unwrap_or_default();
-    let bands = bands.into_iter().filter(|band| band.from < to && band.to > from);
-    figure(title, &drivers, (from, to), Vec::new(), bands.collect())
+    let bands = course.map(curves::bands).unwrap_or_default().into_iter();
+    Figure {
+        title: title.into(),
+        x: Axis {
+            label: "Distance along the road (m)".into(),
+            limits: Some((from, to)),
+            ..Axis::default()
+        },
+        same_y: true,
+        panels,
+        bands: bands.filter(|band| band.from < to && band.to > from).collect(),
+        ..Figure::default()
+    }
 }
 
 fn label(condition: Condition) -> &'static str {
@@ -151,7 +189,8 @@ fn label(condition: Condition) -> &'static str {
     }
 }
 
-fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Report {
+fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) -> Report {
+    let results = &evaluation.results;
     let course = if results.course == PAPER_COURSE {
         "The course is this project's own: the paper prints no numbers for its own. "
     } else {
@@ -194,17 +233,13 @@ fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Repor
         sections.push(claims_section(results));
     }
     sections.push(Section {
-        heading: "Results".into(),
-        blocks: vec![Block::Table(table(
-            results,
-            "The main metrics of each run.",
-            |d| IN_SHORT.contains(&d.name),
-        ))],
+        heading: "EvaluationResults".into(),
+        blocks: vec![Block::Table(table(results))],
     });
     sections.push(Section {
         heading: "All metrics".into(),
         blocks: vec![
-            Block::Table(table(results, "", |_| true)),
+            Block::Table(table_of(results, "", |_| true)),
             Block::Table(definitions_table()),
         ],
     });
@@ -219,27 +254,33 @@ fn report(results: &Results, [nominal, failure, handover]: [Figure; 3]) -> Repor
             notes(&results.notes),
         ),
         sections,
+        provenance: Some(provenance(evaluation)),
     }
 }
 
-fn claims_section(results: &Results) -> Section {
+fn claims_section(results: &EvaluationResults) -> Section {
+    Section {
+        heading: "What it must show".into(),
+        blocks: vec![Block::Table(claims_table(results))],
+    }
+}
+
+/// What the evaluation must show, and whether it does.
+pub fn claims_table(results: &EvaluationResults) -> Table {
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
-        [claim.claim.as_str(), holds, &claim.evidence]
+        [holds, claim.claim.as_str(), &claim.evidence]
             .map(|text| Cell::Text(text.into()))
             .to_vec()
     });
-    Section {
-        heading: "What it must show".into(),
-        blocks: vec![Block::Table(Table {
-            caption: "The independent implementation's numbers, and the paper's claims as orderings.".into(),
-            columns: ["Claim", "", "Evidence"].map(String::from).to_vec(),
-            rows: rows.collect(),
-        })],
+    Table {
+        caption: "The independent implementation's numbers, and the paper's claims as orderings.".into(),
+        columns: ["Verdict", "Claim", "Evidence"].map(String::from).to_vec(),
+        rows: rows.collect(),
     }
 }
 
-fn table(results: &Results, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
+fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
     let keys = |r: &RunRecord| {
         let ended = if r.diverged {
             format!("diverged at {:.0} m", r.end_m)

@@ -5,17 +5,20 @@ use std::path::Path;
 
 use super::OutputError;
 use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Report, Section, Table, write_file, write_json};
-use crate::plot::{Axis, Figure, Line, Panel};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
-use haptic_batch::experiment::{Drive, Experiment, Finding};
+use haptic_batch::experiment::{Drive, Experiment, Finding, Repeated, Repetitions};
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
 /// # Errors
 /// What could not be written or drawn.
 pub fn write(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
-    let mut figures = vec![("trajectory_errors", trajectory_errors(experiment))];
+    let mut figures = vec![
+        ("trajectory_errors", trajectory_errors(experiment)),
+        ("k_hg", estimates(experiment)),
+    ];
     if let Some(drive) = typical(experiment) {
         figures.push(("paths", paths(drive)));
         figures.push(("torque", torque(drive)));
@@ -23,7 +26,7 @@ pub fn write(experiment: &Experiment, directory: &Path) -> Result<(), OutputErro
     for (name, figure) in &figures {
         write_figure(directory, name, figure)?;
     }
-    write_json(&directory.join("results.json"), experiment)?;
+    write_json(&directory.join("results.json"), &stamped(experiment))?;
     write_report(
         directory,
         &report(experiment, figures.into_iter().map(|f| f.1).collect()),
@@ -43,6 +46,11 @@ pub fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), Outpu
     Ok(())
 }
 
+/// The results as JSON holds them. Every drive follows from the published drivers, the probe and the seed.
+pub fn stamped(experiment: &Experiment) -> Stamped<'_, Experiment> {
+    Provenance::of(None).stamp(experiment)
+}
+
 /// The guided drive whose fit is the middle one, as the paper shows "a typical participant".
 fn typical(experiment: &Experiment) -> Option<&Drive> {
     let mut guided: Vec<&Drive> = experiment.drives.iter().filter(|d| d.guided).collect();
@@ -51,100 +59,120 @@ fn typical(experiment: &Experiment) -> Option<&Drive> {
     guided.get(guided.len() / 2).copied()
 }
 
-fn axis(label: &str) -> Axis {
-    Axis {
-        label: label.into(),
-        limits: None,
-    }
-}
-
-fn panel(title: &str, label: &str, lines: Vec<Line>) -> Panel {
-    Panel {
-        title: title.into(),
-        y: axis(label),
-        lines,
-    }
-}
-
 fn paths(drive: &Drive) -> Figure {
-    let line = |label: &str, style, points: &[(f64, f64)]| Line {
-        label: label.into(),
-        style,
-        points: points.to_vec(),
-    };
-    let lines = vec![
-        line("measured", 0, &drive.path),
-        line("identified driver", 1, &drive.noise_model.path),
-        line("identified driver, published method", 3, &drive.paper.path),
-    ];
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: axis("Distance along the road (m)"),
-        panels: vec![panel("", "Lateral error (m)", lines)],
+        x: Axis::of("Distance along the road (m)"),
+        panels: vec![Panel {
+            title: String::new(),
+            y: Axis::of("Lateral error (m)"),
+            series: vec![
+                Series::line("measured", 0, drive.path.clone()),
+                Series::line("identified driver", 1, drive.noise_model.path.clone()),
+                Series::line("identified driver, published method", 3, drive.paper.path.clone()),
+            ],
+        }],
         ..Figure::default()
     }
 }
 
 fn torque(drive: &Drive) -> Figure {
     let t = &drive.noise_model.identification.traces;
-    let line = |label: &str, style, y: &[f64]| Line {
-        label: label.into(),
-        style,
-        points: t.time_s.iter().copied().zip(y.iter().copied()).collect(),
+    let line = |label: &str, style, y: &[f64]| {
+        Series::line(
+            label,
+            style,
+            t.time_s.iter().copied().zip(y.iter().copied()).collect(),
+        )
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: axis("Time (s)"),
-        panels: vec![panel(
-            "",
-            "Driver torque (N.m)",
-            vec![
+        x: Axis::of("Time (s)"),
+        panels: vec![Panel {
+            title: String::new(),
+            y: Axis::of("Driver torque (N.m)"),
+            series: vec![
                 line("measured", 0, &t.measured_nm),
-                line("simulated", 1, &t.simulated_nm),
+                line("simulated", 3, &t.simulated_nm),
             ],
-        )],
+        }],
         ..Figure::default()
     }
 }
 
+/// Beside each other, so that dots of one participant do not hide one another.
+const ASIDE: f64 = 0.15;
+
 fn trajectory_errors(experiment: &Experiment) -> Figure {
-    let line = |label: &str, style, guided: bool, of: fn(&Drive) -> &Finding| Line {
-        label: label.into(),
-        style,
-        points: experiment
-            .drives
-            .iter()
-            .filter(|d| d.guided == guided)
-            .filter_map(|d| Some((f64::from(d.participant), of(d).trajectory_error_m?)))
-            .collect(),
+    let dots = |label: &str, style, aside, guided: bool, of: fn(&Drive) -> &Finding| {
+        let drives = experiment.drives.iter().filter(|d| d.guided == guided);
+        let points =
+            drives.filter_map(|d| Some((f64::from(d.participant) + aside, of(d).trajectory_error_m?)));
+        Series::dots(label, style, points.collect())
     };
-    let ends = experiment.drives.iter().map(|d| f64::from(d.participant));
-    let (first, last) = (
-        ends.clone().fold(f64::INFINITY, f64::min),
-        ends.fold(0.0, f64::max),
-    );
+    let numbers = || experiment.drives.iter().map(|d| f64::from(d.participant));
+    let ends = [
+        numbers().fold(f64::INFINITY, f64::min) - 0.5,
+        numbers().fold(0.0, f64::max) + 0.5,
+    ];
     let [low, mean, high] = experiment.published_trajectory_error_m;
-    let level = |label: &str, style, value| Line {
-        label: label.into(),
-        style,
-        points: vec![(first, value), (last, value)],
-    };
     let panels = [("Guided", true), ("Manual", false)].map(|(title, guided)| {
-        let mut lines = vec![
-            line("noise model", 0, guided, |d| &d.noise_model),
-            line("published method", 3, guided, |d| &d.paper),
-        ];
+        let mut series = Vec::new();
         if guided {
-            lines.push(level("the paper's mean", 1, mean));
-            lines.push(level("the paper's range", 2, low));
-            lines.push(level("the paper's range", 2, high));
+            series.push(Series::interval("the paper's range", 5, &ends, &[[low, high]; 2]));
+            series.push(Series::line(
+                "the paper's mean",
+                5,
+                ends.map(|x| (x, mean)).to_vec(),
+            ));
         }
-        panel(title, "Trajectory error (m)", lines)
+        series.push(dots("noise model", 0, -ASIDE, guided, |d| &d.noise_model));
+        series.push(dots("published method", 3, ASIDE, guided, |d| &d.paper));
+        Panel {
+            title: title.into(),
+            y: Axis::of("Trajectory error (m)"),
+            series,
+        }
     });
     Figure {
-        x: axis("Participant"),
+        x: Axis {
+            label: "Participant".into(),
+            limits: Some((ends[0], ends[1])),
+            whole: true,
+        },
         panels: panels.to_vec(),
         same_y: true,
+        ..Figure::default()
+    }
+}
+
+/// K_hg of every guided drive: the truth, and both estimates with their 95 % intervals.
+fn estimates(experiment: &Experiment) -> Figure {
+    let guided = || experiment.drives.iter().filter(|d| d.guided);
+    let truth = guided().filter_map(|d| Some((f64::from(d.participant) - ASIDE, d.truth.k_hg?)));
+    let found = guided().filter_map(|d| {
+        let k_hg = &d.noise_model.identification.parameters.k_hg;
+        Some(((f64::from(d.participant), k_hg.estimate?), k_hg.interval_95?))
+    });
+    let (points, ends) = found.unzip();
+    let published = guided().filter_map(|d| {
+        let k_hg = &d.paper.identification.parameters.k_hg;
+        Some((f64::from(d.participant) + ASIDE, k_hg.optimum?))
+    });
+    Figure {
+        x: Axis {
+            whole: true,
+            ..Axis::of("Participant")
+        },
+        panels: vec![Panel {
+            title: String::new(),
+            y: Axis::of("K_hg"),
+            series: vec![
+                Series::dots("truth", 0, truth.collect()),
+                Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),
+                Series::dots("published method", 3, published.collect()),
+            ],
+        }],
         ..Figure::default()
     }
 }
@@ -152,6 +180,8 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
 fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
     let captions = [
         "Mean distance between the path of the drive and that of the identified driver without remnant.",
+        "K_hg of the guided drives. A driver without an estimate by the noise model is one whose data do not \
+         identify it.",
         "A typical participant: the path of the drive, and of the drivers identified from it.",
         "The same participant: driver torque, measured and simulated by the default method.",
     ];
@@ -183,10 +213,12 @@ fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
                 blocks,
             },
         ],
+        provenance: Some(Provenance::of(None)),
     }
 }
 
-fn truth_table(experiment: &Experiment, guided: bool) -> Table {
+/// Truth beside estimates, of the guided or the manual drives.
+pub fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     let sum = |d: &Drive| d.truth.k_d + haptic_analysis::identify::Muscle::default().k_nms;
     type Column = (&'static str, fn(&Parameters) -> &Parameter, usize);
     let columns: [Column; 5] = [
@@ -259,7 +291,8 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     }
 }
 
-fn trajectory_table(experiment: &Experiment) -> Table {
+/// How far the identified drivers drive from those that they were identified from.
+pub fn trajectory_table(experiment: &Experiment) -> Table {
     let [low, mean, high] = experiment.published_trajectory_error_m;
     let rows = experiment.drives.iter().map(|d| {
         let number = |value| Cell::Number { value, decimals: 3 };
@@ -278,5 +311,45 @@ fn trajectory_table(experiment: &Experiment) -> Table {
             .map(String::from)
             .to_vec(),
         rows: rows.collect(),
+    }
+}
+
+/// Estimates of repeated drives against the truth.
+pub fn repetitions_table(result: &Repetitions) -> Table {
+    let row = |line: &Repeated| {
+        let number = |value, decimals| Cell::Number { value, decimals };
+        vec![
+            Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
+            Cell::Text(line.parameter.into()),
+            Cell::number(line.drives as f64, 0),
+            number(Some(line.identified), 3),
+            number(Some(line.coverage), 3),
+            number(line.bias, 4),
+            number(line.rms, 4),
+            number(line.largest, 4),
+            number(line.standard_error, 4),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: [
+            "Participant",
+            "Parameter",
+            "Drives",
+            "Identified",
+            "Coverage of 95 %",
+            "Bias",
+            "RMS error",
+            "Largest error",
+            "Mean standard error",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: result
+            .participants
+            .iter()
+            .chain(&result.pooled)
+            .map(row)
+            .collect(),
     }
 }

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use super::OutputError;
 use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Report, Section, Table, write_json};
-use crate::plot::{Axis, Figure, Line, Panel};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{History, Identification, autocorrelation};
-use haptic_batch::identify::IdentifiedDrive;
+use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
 
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
@@ -27,28 +27,30 @@ pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputErro
     for (name, figure) in &figures {
         write_figure(directory, name, figure)?;
     }
-    write_json(&directory.join("results.json"), &drive.results)?;
+    write_json(&directory.join("results.json"), &stamped(drive))?;
     write_report(directory, &report(drive, figures.map(|f| f.1)))
 }
 
-fn axis(label: &str) -> Axis {
-    Axis {
-        label: label.into(),
-        limits: None,
-    }
+/// The results as JSON holds them.
+pub fn stamped(drive: &IdentifiedDrive) -> Stamped<'_, IdentificationResults> {
+    Provenance::of(None).stamp(&drive.results)
 }
 
-fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Line {
-    Line {
-        label: label.into(),
-        style,
-        points: x.iter().copied().zip(y.iter().copied()).collect(),
+fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
+    Series::line(label, style, x.iter().copied().zip(y.iter().copied()).collect())
+}
+
+fn panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
+    Panel {
+        title: title.into(),
+        y: Axis::of(y),
+        series,
     }
 }
 
 fn over(x: &str, panels: Vec<Panel>) -> Figure {
     Figure {
-        x: axis(x),
+        x: Axis::of(x),
         panels,
         ..Figure::default()
     }
@@ -56,33 +58,18 @@ fn over(x: &str, panels: Vec<Panel>) -> Figure {
 
 fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
-    let lines = vec![
+    let series = vec![
         line("measured", 0, &t.time_s, &t.measured_nm),
-        line("simulated", 1, &t.time_s, &t.simulated_nm),
+        line("simulated", 3, &t.time_s, &t.simulated_nm),
     ];
-    over(
-        "Time (s)",
-        vec![Panel {
-            title: String::new(),
-            y: axis("Driver torque (N.m)"),
-            lines,
-        }],
-    )
+    over("Time (s)", vec![panel("", "Driver torque (N.m)", series)])
 }
 
 fn residuals(found: &Identification) -> Figure {
     let t = &found.traces;
-    let unexplained: Vec<f64> = t
-        .measured_nm
-        .iter()
-        .zip(&t.simulated_nm)
-        .map(|(y, m)| y - m)
-        .collect();
-    let panel = |title: &str, y: &[f64]| Panel {
-        title: title.into(),
-        y: axis("(N.m)"),
-        lines: vec![line("", 0, &t.time_s, y)],
-    };
+    let both = t.measured_nm.iter().zip(&t.simulated_nm);
+    let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
+    let panel = |title: &str, y: &[f64]| panel(title, "(N.m)", vec![line("", 1, &t.time_s, y)]);
     over(
         "Time (s)",
         vec![
@@ -95,43 +82,25 @@ fn residuals(found: &Identification) -> Figure {
 fn correlogram(found: &Identification) -> Figure {
     let r = autocorrelation(&found.traces.residual_nm, LAGS);
     let bound = 1.96 / (found.rows as f64).sqrt();
-    let lags: Vec<f64> = (1..=r.len()).map(|k| k as f64).collect();
-    let level = |label: &str, v: f64| line(label, 2, &[1.0, r.len() as f64], &[v, v]);
-    let lines = vec![
-        line("", 0, &lags, &r),
-        level("95 % if white", bound),
-        level("95 % if white", -bound),
+    let last = r.len() as f64;
+    let stems = (1..=r.len()).map(|k| k as f64).zip(r).collect();
+    let series = vec![
+        Series::interval("95 % if white", 5, &[0.5, last + 0.5], &[[-bound, bound]; 2]),
+        Series::with_mark("", 0, Mark::Stems, stems),
     ];
-    over(
-        "Lag (samples)",
-        vec![Panel {
-            title: String::new(),
-            y: axis("Autocorrelation"),
-            lines,
-        }],
-    )
+    over("Lag (samples)", vec![panel("", "Autocorrelation", series)])
 }
 
 fn over_time(drive: &IdentifiedDrive) -> Figure {
     let t = &drive.tracking;
     let panel = |title: &str, unit: &str, h: &History| {
-        let band = |sign: f64| -> Vec<f64> {
-            h.estimate
-                .iter()
-                .zip(&h.standard_deviation)
-                .map(|(e, s)| e + sign * 2.0 * s)
-                .collect()
-        };
-        let lines = vec![
-            line("two standard deviations", 2, &t.time_s, &band(-1.0)),
-            line("two standard deviations", 2, &t.time_s, &band(1.0)),
-            line("estimate", 0, &t.time_s, &h.estimate),
+        let both = h.estimate.iter().zip(&h.standard_deviation);
+        let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
+        let series = vec![
+            Series::interval("two standard deviations", 5, &t.time_s, &ends),
+            line("estimate", 1, &t.time_s, &h.estimate),
         ];
-        Panel {
-            title: title.into(),
-            y: axis(unit),
-            lines,
-        }
+        panel(title, unit, series)
     };
     over(
         "Time (s)",
@@ -192,25 +161,10 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
             )],
         },
     ];
-    if let Some(again) = &drive.results.drives_again {
-        let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.4}"));
-        let pairs = [
-            (
-                "peak lateral error (m)",
-                number(again.metrics.peak_lateral_error_m),
-            ),
-            (
-                "mean absolute lateral error (m)",
-                number(again.metrics.mean_abs_lateral_error_m),
-            ),
-            (
-                "left the road",
-                if again.diverged { "yes".into() } else { "no".into() },
-            ),
-        ];
+    if let Some(again) = drives_again(drive) {
         sections.push(Section {
             heading: "The identified driver on the course".into(),
-            blocks: vec![Block::Table(Table::of_pairs(["", ""], pairs))],
+            blocks: vec![Block::Table(again)],
         });
     }
     Report {
@@ -220,14 +174,38 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
             found.method, found.rows, found.fit_percent
         ),
         sections,
+        provenance: Some(Provenance::of(None)),
     }
+}
+
+/// How the identified driver drives a course, if asked.
+pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
+    let again = drive.results.drives_again.as_ref()?;
+    let left_road = if again.diverged { "yes" } else { "no" };
+    let row = |name: &str, cell| vec![Cell::Text(name.into()), cell];
+    Some(Table {
+        caption: "The identified driver on the course.".into(),
+        columns: vec![String::new(); 2],
+        rows: vec![
+            row(
+                "peak lateral error (m)",
+                number(again.metrics.peak_lateral_error_m),
+            ),
+            row(
+                "mean absolute lateral error (m)",
+                number(again.metrics.mean_abs_lateral_error_m),
+            ),
+            row("left the road", Cell::Text(left_road.into())),
+        ],
+    })
 }
 
 fn number(value: Option<f64>) -> Cell {
     Cell::Number { value, decimals: 4 }
 }
 
-fn parameters(found: &Identification) -> Table {
+/// Every parameter with its interval and verdict.
+pub fn parameters(found: &Identification) -> Table {
     let rows = found.parameters.list().into_iter().map(|(name, unit, p)| {
         let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
         let verdict = match (p.fixed, p.identified, p.on_bound) {
@@ -264,7 +242,8 @@ fn parameters(found: &Identification) -> Table {
     }
 }
 
-fn combinations(found: &Identification) -> Table {
+/// What the data determine where they do not determine each parameter.
+pub fn combinations(found: &Identification) -> Table {
     let row = |c: &haptic_analysis::identify::Combination| {
         vec![
             Cell::Text(c.name.clone()),
@@ -281,7 +260,8 @@ fn combinations(found: &Identification) -> Table {
     }
 }
 
-fn correlation(found: &Identification) -> Table {
+/// Correlation of the errors.
+pub fn correlation(found: &Identification) -> Table {
     let names = &found.correlation.names;
     let row = |(name, values): (&&str, &Vec<Option<f64>>)| {
         let mut cells = vec![Cell::Text((*name).into())];
@@ -297,7 +277,8 @@ fn correlation(found: &Identification) -> Table {
     }
 }
 
-fn facts(found: &Identification) -> Vec<(String, String)> {
+/// What else is known of the fit, name and value.
+pub fn facts(found: &Identification) -> Vec<(String, String)> {
     let mut facts = vec![(
         "Fit of the torque".to_owned(),
         format!("{:.2} %", found.fit_percent),
@@ -340,7 +321,8 @@ fn facts(found: &Identification) -> Vec<(String, String)> {
     facts
 }
 
-fn input_tests(found: &Identification) -> Table {
+/// Whether the residuals are free of the inputs.
+pub fn input_tests(found: &Identification) -> Table {
     let row = |test: &haptic_analysis::identify::InputCorrelation| {
         let verdict = if test.independent {
             "independent"

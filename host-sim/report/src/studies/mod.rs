@@ -1,15 +1,21 @@
-//! What each study of `haptic-batch` leaves: its figures, its results, and the report that shows them.
+//! What each study leaves: its figures, its results, and the report that shows them. Each module makes its tables
+//! once, for the report and for the terminal.
 
+pub mod bus;
 mod curves;
 pub mod evaluation;
 pub mod experiment;
+pub mod faults;
 mod files;
+pub mod handover;
 pub mod identify;
 pub mod reliance;
 pub mod run;
 
 use crate::document::WriteError;
 use crate::plot::PlotError;
+
+pub use crate::document::SeriesFormat;
 
 /// Notes as the end of a report's summary.
 fn notes(notes: &[String]) -> String {

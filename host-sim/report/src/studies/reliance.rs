@@ -4,9 +4,11 @@ use std::path::Path;
 
 use super::OutputError;
 use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Report, Section, Table, write_json};
-use crate::plot::{Axis, Figure, Line, Panel};
-use haptic_batch::reliance::{Example, NEAR, REMNANT, Reading, Results, SETTLING_S};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Panel, Series};
+use haptic_batch::reliance::{
+    Accuracy, Example, NEAR, ParticipantResult, REMNANT, Reading, RelianceResults, SETTLING_S,
+};
 
 /// Most examples in the figure.
 const EXAMPLES: usize = 4;
@@ -19,31 +21,24 @@ pub(super) fn panel(
     truth: &[(f64, f64)],
     x: impl Fn(f64) -> f64,
 ) -> Panel {
-    let line = |label: &str, style, value: &dyn Fn([f64; 2]) -> f64| Line {
-        label: label.into(),
-        style,
-        // A line breaks where a value is not finite: no estimate, no line.
-        points: readings
-            .iter()
-            .map(|r| (x(r.time_s), r.estimate.map_or(f64::NAN, value)))
-            .collect(),
-    };
-    let bound = "estimate \u{b1} 2 deviations";
+    // A line breaks where a value is not finite: no estimate, no line.
+    let estimates = || readings.iter().map(|r| r.estimate.unwrap_or([f64::NAN; 2]));
+    let places: Vec<f64> = readings.iter().map(|r| x(r.time_s)).collect();
+    let ends: Vec<[f64; 2]> = estimates()
+        .map(|[k_hg, deviation]| [k_hg - 2.0 * deviation, k_hg + 2.0 * deviation])
+        .collect();
+    let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
     Panel {
         title,
         y: Axis {
             label: "K_hg".into(),
             limits: Some((-0.5, 1.5)),
+            ..Axis::default()
         },
-        lines: vec![
-            line(bound, 3, &|[k_hg, deviation]| k_hg - 2.0 * deviation),
-            line(bound, 3, &|[k_hg, deviation]| k_hg + 2.0 * deviation),
-            line("estimate", 1, &|[k_hg, _]| k_hg),
-            Line {
-                label: "truth".into(),
-                style: 0,
-                points: truth.to_vec(),
-            },
+        series: vec![
+            Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
+            Series::line("truth", 0, truth.to_vec()),
+            Series::line("estimate", 1, estimate.collect()),
         ],
     }
 }
@@ -52,59 +47,99 @@ pub(super) fn panel(
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
+pub fn write(results: &RelianceResults, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(results);
     write_figure(directory, "reliance", &figure)?;
-    write_json(&directory.join("results.json"), results)?;
+    write_json(&directory.join("results.json"), &stamped(results))?;
     write_report(directory, &report(results, figure))
 }
 
-/// Changing drives, spread over the participants.
-fn figure(results: &Results) -> Figure {
-    let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
-    Figure {
-        title: String::new(),
-        x: Axis {
-            label: "Time (s)".into(),
-            limits: None,
-        },
-        same_y: true,
-        panels: results
-            .examples
-            .iter()
-            .step_by(stride)
-            .map(example_panel)
-            .collect(),
-        markers: Vec::new(),
-        bands: Vec::new(),
+/// The results as JSON holds them. Every drive follows from the published drivers, the probe and the seeds.
+pub fn stamped(results: &RelianceResults) -> Stamped<'_, RelianceResults> {
+    Provenance::of(None).stamp(results)
+}
+
+/// The errors of all participants together, by time.
+pub fn pooled_table(results: &RelianceResults) -> Table {
+    let row = |a: &Accuracy| {
+        vec![
+            Cell::number(a.after_s, 0),
+            Cell::number(a.count as f64, 0),
+            Cell::number(a.bias, 4),
+            Cell::number(a.rms, 4),
+            Cell::number(a.deviation, 4),
+            Cell::number(a.coverage, 3),
+        ]
+    };
+    Table {
+        caption: "All participants pooled".into(),
+        columns: [
+            "Time (s)",
+            "Estimates",
+            "Bias",
+            "RMS error",
+            "Deviation reported",
+            "Coverage of 95 %",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: results.pooled.iter().map(row).collect(),
     }
 }
 
-fn report(results: &Results, figure: Figure) -> Report {
-    let number = |value: f64, decimals: usize| Cell::Text(format!("{value:.decimals$}"));
-    let pooled = results.pooled.iter().map(|a| {
-        vec![
-            number(a.after_s, 0),
-            number(a.bias, 3),
-            number(a.rms, 3),
-            number(a.deviation, 3),
-            number(a.coverage, 3),
-        ]
-    });
-    let each = results.participants.iter().map(|p| {
-        let bias = p.accuracy.iter().map(|a| number(a.bias, 3));
-        let rms = p.accuracy.iter().map(|a| number(a.rms, 3));
-        let head = [Cell::Text(p.participant.to_string()), number(p.truth, 3)];
-        head.into_iter().chain(bias).chain(rms).collect()
-    });
+/// The errors of each participant, by time.
+pub fn participants_table(results: &RelianceResults) -> Table {
     let times = |what: &'static str| {
         results
             .pooled
             .iter()
             .map(move |a| format!("{what} after {} s", a.after_s))
     };
-    let columns = ["Participant", "True K_hg"].map(String::from);
-    let settling = &results.settling;
+    let row = |p: &ParticipantResult| {
+        let bias = p.accuracy.iter().map(|a| Cell::number(a.bias, 3));
+        let rms = p.accuracy.iter().map(|a| Cell::number(a.rms, 3));
+        let number = Cell::number(f64::from(p.participant), 0);
+        let head = [number, Cell::number(p.truth, 3), Cell::number(p.estimate, 3)];
+        head.into_iter().chain(bias).chain(rms).collect()
+    };
+    let head = ["Participant", "True K_hg", "Estimate"]
+        .map(String::from)
+        .into_iter();
+    Table {
+        caption: "Each participant".into(),
+        columns: head.chain(times("Bias")).chain(times("RMS")).collect(),
+        rows: results.participants.iter().map(row).collect(),
+    }
+}
+
+/// How many estimates are near after a change, and what limited or ended the drives.
+pub fn settling(results: &RelianceResults) -> String {
+    let (settling, [limited, steps]) = (&results.settling, results.limited_steps);
+    format!(
+        "Of {} changes {:.1} % of the estimates are within {NEAR} of the new truth after {SETTLING_S} s; of those by \
+         more than 0.3, {:.1} %. RMS error then: {:.3}. A limit held back {limited} of {steps} steps; {} drives \
+         diverged.",
+        settling.count,
+        100.0 * settling.near,
+        100.0 * settling.near_after_large,
+        settling.rms,
+        results.diverged,
+    )
+}
+
+/// Changing drives, spread over the participants.
+fn figure(results: &RelianceResults) -> Figure {
+    let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
+    let examples = results.examples.iter().step_by(stride);
+    Figure {
+        x: Axis::of("Time (s)"),
+        same_y: true,
+        panels: examples.map(example_panel).collect(),
+        ..Figure::default()
+    }
+}
+
+fn report(results: &RelianceResults, figure: Figure) -> Report {
     Report {
         title: "The driver's reliance, read live".into(),
         summary: format!(
@@ -121,44 +156,18 @@ fn report(results: &Results, figure: Figure) -> Report {
                         caption: "What the ECU says of K_hg while the driver takes over another's gains."
                             .into(),
                     },
-                    Block::Text(format!(
-                        "Of {} changes {:.1} % of the estimates are within {NEAR} of the new truth after \
-                         {SETTLING_S} s; of those by more than 0.3, {:.1} %. RMS error then: {:.3}.",
-                        settling.count,
-                        100.0 * settling.near,
-                        100.0 * settling.near_after_large,
-                        settling.rms
-                    )),
+                    Block::Text(settling(results)),
                 ],
             },
             Section {
                 heading: "A steady driver".into(),
                 blocks: vec![
-                    Block::Table(Table {
-                        caption: "All participants pooled".into(),
-                        columns: [
-                            "Time (s)",
-                            "Bias",
-                            "RMS error",
-                            "Deviation reported",
-                            "Coverage of 95 %",
-                        ]
-                        .map(String::from)
-                        .to_vec(),
-                        rows: pooled.collect(),
-                    }),
-                    Block::Table(Table {
-                        caption: "Each participant".into(),
-                        columns: columns
-                            .into_iter()
-                            .chain(times("Bias"))
-                            .chain(times("RMS"))
-                            .collect(),
-                        rows: each.collect(),
-                    }),
+                    Block::Table(pooled_table(results)),
+                    Block::Table(participants_table(results)),
                 ],
             },
         ],
+        provenance: Some(Provenance::of(None)),
     }
 }
 

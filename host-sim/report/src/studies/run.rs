@@ -6,35 +6,32 @@ use super::files::{write_figure, write_report};
 use super::reliance::panel as reliance_panel;
 use super::{OutputError, curves, notes};
 use crate::document::{
-    Block, Report, Section, Table, definitions_table, write_file, write_json, write_trace_csv,
+    Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, write_file,
+    write_json, write_trace,
 };
-use crate::plot::{Axis, Figure, Line, Marker, Panel};
-use haptic_analysis::metrics::DEFINITIONS;
-use haptic_batch::run::SingleRun;
-use haptic_log::Event;
+use crate::plot::{Axis, Figure, Marker, Panel, Series};
+use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_batch::run::{SingleResults, SingleRun};
 use haptic_log::trace::Sample;
+use haptic_log::{Event, candump};
 use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
 use haptic_sim::simulation::Ending;
 
-/// Writes a figure (SVG, PNG), the time series (CSV), the results (JSON), a report (HTML), and the bus if it was
-/// recorded (as `candump -L` does).
+/// Writes a figure (SVG, PNG), the results (JSON), a report (HTML), the time series if they are asked for, and the bus
+/// if it was recorded (as `candump -L` does).
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
+pub fn write(single: &SingleRun, series: SeriesFormat, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(single);
     write_figure(directory, "run", &figure)?;
-    write_trace_csv(&directory.join("run.csv"), &single.run.trace)?;
-    write_json(&directory.join("results.json"), &single.results)?;
+    write_trace(directory, "run", &single.run.trace, series)?;
+    write_json(&directory.join("results.json"), &stamped(single))?;
     write_report(directory, &report(single, figure))?;
     if !single.bus.is_empty() {
         write_file(&directory.join("bus.log"), |f| {
             for (ms, frame) in &single.bus {
-                write!(f, "({:.6}) can0 {:03X}#", f64::from(*ms) * 1e-3, frame.id())?;
-                for byte in frame.data() {
-                    write!(f, "{byte:02X}")?;
-                }
-                writeln!(f)?;
+                candump::write(f, f64::from(*ms) * 1e-3, frame.id(), frame.data())?;
             }
             Ok(())
         })?;
@@ -42,39 +39,63 @@ pub fn write(single: &SingleRun, directory: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
+/// The results as JSON holds them, with the scenario.
+pub fn stamped(single: &SingleRun) -> Stamped<'_, SingleResults> {
+    provenance(single).stamp(&single.results)
+}
+
+fn provenance(single: &SingleRun) -> Provenance {
+    Provenance::of(Some(single.scenario.to_toml()))
+}
+
+/// Every metric of the run, and what the ECU read of K_hg.
+pub fn table(results: &SingleResults) -> Table {
+    let metric = |d: &Definition| {
+        let value = (d.value)(&results.record.metrics);
+        vec![
+            Cell::Text(d.label.into()),
+            Cell::Number { value, decimals: 4 },
+            Cell::Text(d.unit.into()),
+        ]
+    };
+    let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
+    if let Some([k_hg, deviation]) = results.k_hg {
+        let name = Cell::Text("K_hg, as the ECU reads it".into());
+        rows.push(vec![
+            name,
+            Cell::number(k_hg, 4),
+            Cell::Text(format!("+- {deviation:.4}")),
+        ]);
+    }
+    Table {
+        caption: String::new(),
+        columns: ["Metric", "Value", "Unit"].map(String::from).to_vec(),
+        rows,
+    }
+}
+
 fn figure(single: &SingleRun) -> Figure {
     let samples = &single.run.trace.samples;
-    let line = |label: &str, style, value: fn(&Sample) -> f64| Line {
-        label: label.into(),
-        style,
-        points: samples.iter().map(|s| (s.s_m, value(s))).collect(),
-    };
-    let panel = |label: &str, lines| Panel {
+    let panel = |label: &str, value: fn(&Sample) -> f64| Panel {
         title: String::new(),
-        y: Axis {
-            label: label.into(),
-            limits: None,
-        },
-        lines,
+        y: Axis::of(label),
+        series: vec![Series::line(
+            "",
+            1,
+            samples.iter().map(|s| (s.s_m, value(s))).collect(),
+        )],
     };
     let failed = single
         .scenario
         .failure()
         .at_s()
         .and_then(|t| samples.iter().find(|s| s.time_s >= t));
+    // Each torque for itself: the probe would hide the driver's.
     let mut panels = vec![
-        panel("Lateral error (m)", vec![line("", 0, |s| s.lateral_error_m)]),
-        panel(
-            "Wheel angle (deg)",
-            vec![line("", 0, |s| s.wheel_angle_rad.to_degrees())],
-        ),
-        panel(
-            "Torque (N.m)",
-            vec![
-                line("driver", 0, |s| s.driver_torque_nm),
-                line("guidance", 1, |s| s.guidance_torque_nm),
-            ],
-        ),
+        panel("Lateral error (m)", |s| s.lateral_error_m),
+        panel("Wheel angle (deg)", |s| s.wheel_angle_rad.to_degrees()),
+        panel("Driver torque (N.m)", |s| s.driver_torque_nm),
+        panel("Guidance torque (N.m)", |s| s.guidance_torque_nm),
     ];
     if single.scenario.guidance().probe {
         let place = |time_s: f64| {
@@ -93,12 +114,7 @@ fn figure(single: &SingleRun) -> Figure {
         ));
     }
     Figure {
-        title: String::new(),
-        x: Axis {
-            label: "Distance along the road (m)".into(),
-            limits: None,
-        },
-        same_y: false,
+        x: Axis::of("Distance along the road (m)"),
         panels,
         markers: failed
             .map(|s| Marker {
@@ -108,6 +124,7 @@ fn figure(single: &SingleRun) -> Figure {
             .into_iter()
             .collect(),
         bands: curves::bands(single.scenario.course()),
+        ..Figure::default()
     }
 }
 
@@ -127,12 +144,7 @@ fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
 }
 
 fn report(single: &SingleRun, figure: Figure) -> Report {
-    let (scenario, record) = (&single.scenario, &single.results.record);
-    let metrics = DEFINITIONS.iter().map(|d| {
-        let value = (d.value)(&record.metrics).map_or("-".into(), |value| format!("{value:.4}"));
-        let unit = if d.unit == "1" { "" } else { d.unit };
-        (d.label, format!("{value} {unit}"))
-    });
+    let scenario = &single.scenario;
     let [from, to] = single.results.window_m;
     Report {
         title: "A run under shared steering control".into(),
@@ -164,11 +176,12 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
             Section {
                 heading: "Metrics".into(),
                 blocks: vec![
-                    Block::Table(Table::of_pairs(["Metric", "Value"], metrics)),
+                    Block::Table(table(&single.results)),
                     Block::Table(definitions_table()),
                 ],
             },
         ],
+        provenance: Some(provenance(single)),
     }
 }
 

@@ -3,7 +3,7 @@
 //! are checked by the scenario itself.
 
 use haptic_core::params::Params;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, ScenarioBuilder,
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::input::{InputError, parse_toml};
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::{Course, PAPER_COURSE};
+use crate::models::road::{Course, PAPER_COURSE, Segment};
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario; only its course is checked.
@@ -27,15 +27,15 @@ pub(super) fn parse(
         }
         error
     })?;
-    let course = if file.course == PAPER_COURSE {
-        Course::paper()
-    } else {
-        course(&file.course)?
+    let course = match &file.course {
+        CourseField::Named(built_in) if built_in == PAPER_COURSE => Course::paper(),
+        CourseField::Named(path) => course(path)?,
+        CourseField::Whole(inline) => inline.checked(name)?,
     };
     let DriverFile {
-        a1,
-        a2,
-        a3,
+        a_1,
+        a_2,
+        a_3,
         t_p,
         t_n,
         t_f,
@@ -56,9 +56,9 @@ pub(super) fn parse(
         .speed_kmh(file.speed)
         .condition(file.condition)
         .driver(DriverParameters {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -72,10 +72,10 @@ pub(super) fn parse(
         .guidance(GuidanceParameters {
             controller: Params {
                 k_1: g.k_1,
-                a_1: g.a1,
-                a_2: g.a2,
-                a_3: g.a3,
-                a_4: g.a4,
+                a_1: g.a_1,
+                a_2: g.a_2,
+                a_3: g.a_3,
+                a_4: g.a_4,
                 rate_corner_hz: g.rate_corner_hz,
                 torque_limit_nm: g.torque_limit_nm,
                 wind_up_nm_per_s: g.wind_up_nm_per_s,
@@ -99,10 +99,138 @@ pub(super) fn parse(
         .seed(file.seed))
 }
 
-#[derive(Deserialize)]
+/// A scenario as the text of a file that needs no other file: the course stands in it. Read again it is the same
+/// scenario, bit for bit.
+pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
+    let super::Values {
+        course,
+        speed_kmh,
+        manual: _,
+        driver: d,
+        gains,
+        vehicle,
+        guidance,
+        sensors,
+        failure,
+        driver_change,
+        seed,
+    } = &scenario.values;
+    let built_in = *course == Course::paper();
+    let c = guidance.controller;
+    toml::to_string(&ScenarioFile {
+        course: if built_in {
+            CourseField::Named(PAPER_COURSE.into())
+        } else {
+            CourseField::Whole(InlineCourse::of(course))
+        },
+        speed: *speed_kmh,
+        condition: match scenario.condition() {
+            // The gains say the rest.
+            Condition::Custom => Condition::Mid,
+            named => named,
+        },
+        sensors: *sensors,
+        seed: *seed,
+        driver: DriverFile {
+            a_1: d.a_1,
+            a_2: d.a_2,
+            a_3: d.a_3,
+            t_p: d.t_p,
+            t_n: d.t_n,
+            t_f: d.t_f,
+            t_nms: d.t_nms,
+            k_nms: d.k_nms,
+            k_d: Some(gains.k_d),
+            k_hg: Some(gains.k_hg),
+            remnant_sd: d.remnant_sd_nm,
+            remnant_corner: d.remnant_corner_hz,
+        },
+        vehicle: *vehicle,
+        guidance: GuidanceFile {
+            k_1: c.k_1,
+            a_1: c.a_1,
+            a_2: c.a_2,
+            a_3: c.a_3,
+            a_4: c.a_4,
+            t_n: guidance.t_n,
+            t_f: guidance.t_f,
+            rate_corner_hz: c.rate_corner_hz,
+            torque_limit_nm: c.torque_limit_nm,
+            wind_up_nm_per_s: c.wind_up_nm_per_s,
+            reduction_nm_per_s: c.reduction_nm_per_s,
+            least_speed_m_per_s: c.least_speed_m_per_s,
+            probe: guidance.probe,
+            probe_amplitude_nm: c.probe_amplitude_nm,
+            probe_frequency_hz: c.probe_frequency_hz,
+        },
+        failure: *failure,
+        driver_change: *driver_change,
+    })
+}
+
+/// A course by its name, or the course itself.
+#[derive(Deserialize, Serialize)]
+#[serde(
+    untagged,
+    expecting = "the name of a course, or a [course] with name, lane_width and [[course.segment]]"
+)]
+enum CourseField {
+    Named(String),
+    Whole(InlineCourse),
+}
+
+/// A course as it stands in a scenario file.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct InlineCourse {
+    name: String,
+    lane_width: f64,
+    segment: Vec<InlineSegment>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct InlineSegment {
+    length: f64,
+    curvature_start: f64,
+    curvature_end: f64,
+}
+
+#[derive(Serialize)]
+struct CourseText<'a> {
+    lane_width: f64,
+    segment: &'a [InlineSegment],
+}
+
+impl InlineCourse {
+    fn of(course: &Course) -> Self {
+        let segment = |s: &Segment| InlineSegment {
+            length: s.length_m,
+            curvature_start: s.curvature_start_1pm,
+            curvature_end: s.curvature_end_1pm,
+        };
+        Self {
+            name: course.name().into(),
+            lane_width: course.lane_width_m(),
+            segment: course.segments().iter().map(segment).collect(),
+        }
+    }
+
+    /// The course, checked as one from a file of its own.
+    fn checked(&self, file: &str) -> Result<Course, InputError> {
+        let text = CourseText {
+            lane_width: self.lane_width,
+            segment: &self.segment,
+        };
+        let text = toml::to_string(&text).map_err(|e| InputError::new(file, e))?;
+        Course::from_toml(&self.name, &text).map_err(|e| InputError::new(file, format!("course: {e}")))
+    }
+}
+
+#[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct ScenarioFile {
-    course: String,
+    course: CourseField,
     speed: f64,
     condition: Condition,
     sensors: Sensors,
@@ -117,7 +245,7 @@ struct ScenarioFile {
 impl Default for ScenarioFile {
     fn default() -> Self {
         Self {
-            course: PAPER_COURSE.into(),
+            course: CourseField::Named(PAPER_COURSE.into()),
             speed: DEFAULT_SPEED_KMH,
             condition: Condition::Mid,
             sensors: Sensors::default(),
@@ -131,12 +259,15 @@ impl Default for ScenarioFile {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct DriverFile {
-    a1: f64,
-    a2: f64,
-    a3: f64,
+    #[serde(alias = "a1")]
+    a_1: f64,
+    #[serde(alias = "a2")]
+    a_2: f64,
+    #[serde(alias = "a3")]
+    a_3: f64,
     t_p: f64,
     t_n: f64,
     t_f: f64,
@@ -154,9 +285,9 @@ struct DriverFile {
 impl Default for DriverFile {
     fn default() -> Self {
         let DriverParameters {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -166,9 +297,9 @@ impl Default for DriverFile {
             remnant_corner_hz,
         } = DriverParameters::default();
         Self {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -182,19 +313,19 @@ impl Default for DriverFile {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct GuidanceFile {
     #[serde(rename = "K_1", alias = "k_1")]
     k_1: f64,
-    #[serde(alias = "a_1")]
-    a1: f64,
-    #[serde(alias = "a_2")]
-    a2: f64,
-    #[serde(alias = "a_3")]
-    a3: f64,
-    #[serde(alias = "a_4")]
-    a4: f64,
+    #[serde(alias = "a1")]
+    a_1: f64,
+    #[serde(alias = "a2")]
+    a_2: f64,
+    #[serde(alias = "a3")]
+    a_3: f64,
+    #[serde(alias = "a4")]
+    a_4: f64,
     t_n: f64,
     t_f: f64,
     rate_corner_hz: f64,
@@ -218,10 +349,10 @@ impl Default for GuidanceFile {
         } = GuidanceParameters::default();
         Self {
             k_1: c.k_1,
-            a1: c.a_1,
-            a2: c.a_2,
-            a3: c.a_3,
-            a4: c.a_4,
+            a_1: c.a_1,
+            a_2: c.a_2,
+            a_3: c.a_3,
+            a_4: c.a_4,
             t_n,
             t_f,
             rate_corner_hz: c.rate_corner_hz,

@@ -278,6 +278,12 @@ impl Scenario {
         builder.build().map_err(|e| InputError::new(name, e))
     }
 
+    /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit.
+    pub fn to_toml(&self) -> String {
+        // Only a map whose keys are no strings cannot be written, and there is none.
+        file::write(self).unwrap_or_default()
+    }
+
     /// Whether what is to happen in mid-drive happens before the run ends.
     ///
     /// # Errors
@@ -378,14 +384,14 @@ impl Scenario {
     }
 
     /// Speed, m/s.
-    pub fn speed_mps(&self) -> f64 {
+    pub fn speed_m_per_s(&self) -> f64 {
         self.values.speed_kmh / 3.6
     }
 
     /// Distance of the farthest point that anybody looks at, m: the run ends when it reaches the end of the
     /// course. With table 8 it is the driver's far point.
     pub fn look_ahead_m(&self) -> f64 {
-        self.speed_mps() * self.longest_look_ahead_s()
+        self.speed_m_per_s() * self.longest_look_ahead_s()
     }
 
     /// Arc length that the centre of gravity reaches in a run that does not diverge, m: the course's, less the
@@ -397,7 +403,7 @@ impl Scenario {
     /// How long a run lasts that does not diverge, s. In curves the points ahead lie a little further along
     /// the road than their distance, so a run may end some hundredths of a second earlier.
     pub fn duration_s(&self) -> f64 {
-        self.reach_m() / self.speed_mps()
+        self.reach_m() / self.speed_m_per_s()
     }
 
     fn longest_look_ahead_s(&self) -> f64 {

@@ -11,7 +11,7 @@ fn an_empty_file_is_tables_4_8_and_9() {
     let s = parse("").unwrap();
     assert_eq!(s, Scenario::default());
     let d = s.driver();
-    assert_eq!((d.a1, d.a2, d.a3), (0.1, 0.05, 3.7));
+    assert_eq!((d.a_1, d.a_2, d.a_3), (0.1, 0.05, 3.7));
     assert_eq!((d.t_n, d.t_f, d.t_nms, d.k_nms), (0.3, 1.0, 0.1, 1.0));
     let g = s.guidance();
     assert_eq!(
@@ -97,15 +97,15 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ),
         (
             "[guidance]\na3 = 1e3",
-            "guidance.a3 = 1000 1/rad is outside 0 to 100 1/rad",
+            "guidance.a_3 = 1000 1/rad is outside 0 to 100 1/rad",
         ),
         (
             "[guidance]\na4 = -1",
-            "guidance.a4 = -1 s/rad is outside 0 to 100 s/rad",
+            "guidance.a_4 = -1 s/rad is outside 0 to 100 s/rad",
         ),
         (
             "[guidance]\nK_1 = 4\na1 = 9",
-            "guidance: K_1*a1 = 36 N.m/m is outside 0 to 32 N.m/m",
+            "guidance: K_1*a_1 = 36 N.m/m is outside 0 to 32 N.m/m",
         ),
         (
             "[guidance]\nt_f = 0.05",
@@ -222,4 +222,38 @@ fn a_course_with_less_than_a_second_to_drive_is_refused() {
             .into())
     );
     assert_eq!(short(33.4), Ok(()));
+}
+
+/// What a result holds of its scenario is enough to run it again.
+#[test]
+fn a_scenario_written_and_read_again_is_the_same() {
+    let course = "lane_width = 3.1\n[[segment]]\nlength = 150.5\n\
+                  [[segment]]\nlength = 1000\ncurvature_start = 0.0\ncurvature_end = -0.00123456789012345\n";
+    let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed = 71.3\nseed = 7\n\
+                  [driver]\nt_p = 0.1234567890123\nK_d = 3.21\nremnant_sd = 0.1\n\
+                  [guidance]\na2 = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
+                  [driver_change]\ntime = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm = 1234.5\n";
+    for text in ["", "condition = 'manual'", others] {
+        let load = |name: &str| Course::from_toml(name, course);
+        let scenario = Scenario::from_toml("s.toml", text, load).unwrap();
+        let written = scenario.to_toml();
+        let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+        assert_eq!(
+            Scenario::from_toml("again.toml", &written, none).unwrap(),
+            scenario,
+            "{written}"
+        );
+    }
+}
+
+#[test]
+fn a_bad_course_within_a_scenario_is_refused_like_one_in_a_file() {
+    let text = "[course]\nname = 'mine'\nlane_width = 3\n\
+                [[course.segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.5\n";
+    let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+    let error = Scenario::from_toml("s.toml", text, none).unwrap_err().to_string();
+    assert!(
+        error.contains("s.toml") && error.contains("segment 1: curvature_end = 0.5"),
+        "{error}"
+    );
 }

@@ -19,42 +19,67 @@
 //! Jacobian; the gradient is exact. What is not here: reading logs, the search itself, and the verdict on where it
 //! ended ([`report`]).
 
+mod evidence;
 mod report;
+
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::log::DriveLog;
 use super::options::Options;
+use super::prepare::{Prepared, prepare};
 use super::result::{Identification, Start};
 use super::search::{Bounds, Optimum, Quadratic, minimise, step};
-use super::signals::Signals;
+use super::signals::{Muscle, Signals};
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
 pub const LONGEST_DELAY_S: f64 = 0.6;
 
 /// Places in the parameter vector; 0, 1, 2 are `gain_i`.
 const K_HG: usize = 3;
-const OFFSET: usize = 4;
 /// How many come first that the torque is linear in.
-const LINEAR: usize = 5;
-const T_P: usize = 5;
-const RHO: usize = 6;
-const THETA: usize = 7;
-const COUNT: usize = 8;
-/// Keys of the parameters that are the driver's, by place.
+const LINEAR: usize = 4;
+const T_P: usize = 4;
+const RHO: usize = 5;
+const THETA: usize = 6;
+/// What is always searched, unless it is given.
+const CORE: usize = 7;
+/// What is taken as known unless the caller asks for an estimate ([`Extra`]).
+const K_NMS: usize = 7;
+const T_NMS: usize = 8;
+const H_LATE: usize = 9;
+const D_LATE: usize = 10;
+const COUNT: usize = 11;
+/// Keys of the parameters that are the driver's and the sensors', by place. The constants of the stretches follow.
 const NAMES: [Option<&str>; COUNT] = [
     Some("gain_1"),
     Some("gain_2"),
     Some("gain_3"),
     Some("k_hg"),
-    None,
     Some("t_p"),
     None,
     None,
+    Some("k_nms"),
+    Some("t_nms"),
+    Some("t_h_late"),
+    Some("t_d_late"),
 ];
 
 /// Widths of the variation intervals (see [`super::result`]): table 4 times the default K_d + K_nms = 4.
-const VARIATION_WIDTHS: [f64; T_P + 1] = [4.0 * 0.5, 4.0 * 0.1, 4.0 * 2.0, 1.0, f64::NAN, LONGEST_DELAY_S];
+const VARIATION_WIDTHS: [f64; COUNT] = [
+    4.0 * 0.5,
+    4.0 * 0.1,
+    4.0 * 2.0,
+    1.0,
+    LONGEST_DELAY_S,
+    f64::NAN,
+    f64::NAN,
+    2.0,
+    0.2,
+    0.1,
+    0.1,
+];
 
 /// Defaults of table 4 for `gain_i` and K_hg.
 const START: [f64; 4] = [0.4, 0.04, 14.8, 0.5];
@@ -74,21 +99,48 @@ const SMALLEST_ERROR_NM: f64 = 1e-5;
 
 /// Identifies the driver of `log`.
 pub fn identify(log: &DriveLog, options: &Options) -> Identification {
-    let signals = Signals::new(log, options.muscle);
-    let problem = Problem::new(&signals, options);
+    identify_prepared(&prepare(log, options), options)
+}
+
+/// Identifies the driver of a log that was prepared.
+pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Identification {
+    let mut problem = Problem::new(prepared, options);
     let (optimum, starts) = problem.search();
-    problem.report(log, options, &optimum, starts)
+    problem.report(prepared, options, &optimum, starts)
 }
 
 struct Problem<'a> {
-    signals: &'a Signals,
-    bounds: [Bounds; COUNT],
-    first_row: usize,
+    log: &'a DriveLog,
+    muscle: Muscle,
+    signals: Signals,
+    bounds: Vec<Bounds>,
+    /// Rows that the loss is taken over.
+    stretches: Vec<Range<usize>>,
+    /// Whether anything beyond [`CORE`] is searched.
+    extended: bool,
+}
+
+/// One row of the loss: the prediction error and its negative derivatives.
+struct Row<const N: usize> {
+    stretch: usize,
+    error: f64,
+    slopes: [f64; N],
+    by_offset: f64,
 }
 
 impl<'a> Problem<'a> {
-    fn new(signals: &'a Signals, options: &Options) -> Self {
-        let mut bounds = [Bounds::FREE; COUNT];
+    fn new(prepared: &'a Prepared, options: &Options) -> Self {
+        let log = &prepared.log;
+        let muscle = options.muscle;
+        let signals = Signals::new(log, muscle);
+        let first_rows = ((LONGEST_DELAY_S + 5.0 * signals.t_nms_s) / signals.dt_s).ceil() as usize;
+        let stretches: Vec<Range<usize>> = prepared
+            .stretches
+            .iter()
+            .map(|s| s.start + first_rows..s.end)
+            .filter(|s| s.len() > first_rows)
+            .collect();
+        let mut bounds = vec![Bounds::FREE; COUNT + stretches.len()];
         // A driver who steers away from the target line is none.
         bounds[..3].fill(Bounds::new(0.0, f64::INFINITY));
         bounds[K_HG] = Bounds::new(0.0, 1.0);
@@ -108,11 +160,17 @@ impl<'a> Problem<'a> {
         }
         pin(&mut bounds[K_HG], options.k_hg.or(options.manual.then_some(0.0)));
         pin(&mut bounds[T_P], options.t_p_s);
-        let first_row = ((LONGEST_DELAY_S + 5.0 * signals.t_nms_s) / signals.dt_s).ceil() as usize;
+        let known = [muscle.k_nms, muscle.t_nms_s, options.late_s[0], options.late_s[1]];
+        for (i, (&value, range)) in known.iter().zip(&options.estimate).enumerate() {
+            bounds[K_NMS + i] = range.map_or(Bounds::new(value, value), |[low, high]| Bounds::new(low, high));
+        }
         Self {
+            log,
+            muscle,
             signals,
             bounds,
-            first_row,
+            stretches,
+            extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
         }
     }
 
@@ -120,100 +178,170 @@ impl<'a> Problem<'a> {
         self.bounds[i].low < self.bounds[i].high
     }
 
-    /// Hands each row's disturbance `n` and its negative derivatives (the regressors) to `visit`.
+    fn row_count(&self) -> usize {
+        self.stretches.iter().map(|s| s.len()).sum()
+    }
+
+    /// Size of the parameter vector.
+    fn size(&self) -> usize {
+        self.bounds.len()
+    }
+
+    /// Hands each row's disturbance `n` and its negative derivatives (the regressors), in the order of the parameters,
+    /// to `visit`. Those of the disturbance are not of a row alone, and are left at zero.
     #[inline]
-    fn rows(&self, p: &[f64], mut visit: impl FnMut(f64, [f64; T_P + 1])) {
-        let s = self.signals;
+    fn rows<const N: usize>(&self, p: &[f64], mut visit: impl FnMut(usize, f64, [f64; N])) {
+        let s = &self.signals;
         let delay = s.delay(p[T_P]);
-        for k in self.first_row..s.len() {
-            let (m1, d1) = delay.read(&s.visual[0], k);
-            let (m2, d2) = delay.read(&s.visual[1], k);
-            let (m3, d3) = delay.read(&s.visual[2], k);
-            let h = -s.guidance[k];
-            let model = p[0] * m1 + p[1] * m2 + p[2] * m3 + p[K_HG] * h + p[OFFSET];
-            let slope = p[0] * d1 + p[1] * d2 + p[2] * d3;
-            visit(s.target[k] - model, [m1, m2, m3, h, 1.0, slope]);
+        let shifted = p[H_LATE] != 0.0 || p[D_LATE] != 0.0;
+        let decay = (-s.dt_s / s.t_nms_s).exp();
+        for (stretch, range) in self.stretches.iter().enumerate() {
+            let offset = p[COUNT + stretch];
+            let mut slow = None;
+            for k in range.clone() {
+                let (m1, d1) = delay.read(&s.visual[0], k);
+                let (m2, d2) = delay.read(&s.visual[1], k);
+                let (m3, d3) = delay.read(&s.visual[2], k);
+                let visual = p[0] * m1 + p[1] * m2 + p[2] * m3;
+                let (mut h, mut w) = (-s.guidance[k], -s.wheel.lagged[k]);
+                if shifted {
+                    h = -at(&s.guidance, k, (p[H_LATE] - p[D_LATE]) / s.dt_s);
+                    w = -at(&s.wheel.lagged, k, -p[D_LATE] / s.dt_s);
+                }
+                let arm = visual + p[K_HG] * h + p[K_NMS] * w;
+                let mut out = [0.0; N];
+                [out[0], out[1], out[2], out[K_HG]] = [m1, m2, m3, h];
+                if N > T_P {
+                    out[T_P] = p[0] * d1 + p[1] * d2 + p[2] * d3;
+                }
+                if N > D_LATE {
+                    let rate = |raw: f64, lagged: f64| (raw - lagged) / s.t_nms_s;
+                    let h_rate = p[K_HG] * rate(s.guidance_raw[k], s.guidance[k]);
+                    let w_rate = p[K_NMS] * rate(s.wheel.raw[k], s.wheel.lagged[k]);
+                    let lagged = slow.map_or(arm, |slow: f64| decay * slow + (1.0 - decay) * arm);
+                    slow = Some(lagged);
+                    out[K_NMS] = w;
+                    out[T_NMS] = -(arm - lagged) / s.t_nms_s;
+                    out[H_LATE] = -h_rate;
+                    out[D_LATE] = h_rate + w_rate;
+                }
+                visit(stretch, s.torque[k] - arm - offset, out);
+            }
         }
     }
 
+    /// Hands the prediction error of each row, with its negative derivatives, to `visit`.
+    #[inline]
+    fn errors<const N: usize>(&self, p: &[f64], mut visit: impl FnMut(&Row<N>)) {
+        let (rho, theta) = (p[RHO], p[THETA]);
+        // What the filters remember.
+        let mut last = [0.0; N];
+        let mut last_n = 0.0;
+        let mut row = Row {
+            stretch: usize::MAX,
+            error: 0.0,
+            slopes: [0.0; N],
+            by_offset: 0.0,
+        };
+        self.rows::<N>(p, |stretch, n, regressors| {
+            if row.stretch != stretch {
+                // The filters start as if the first row had gone on for ever: for the slow signals here that
+                // is nearer to the truth than silence, and the first innovation is not the whole disturbance.
+                row.stretch = stretch;
+                last_n = n;
+                let gain = (1.0 - rho) / (1.0 - theta);
+                for i in 0..N {
+                    last[i] = regressors[i];
+                    row.slopes[i] = gain * regressors[i];
+                }
+                row.error = gain * n;
+                row.by_offset = gain;
+            }
+            let error = row.error;
+            for i in 0..N {
+                row.slopes[i] = match i {
+                    RHO => theta * row.slopes[RHO] + last_n,
+                    THETA => theta * row.slopes[THETA] - error,
+                    _ => theta * row.slopes[i] + regressors[i] - rho * last[i],
+                };
+            }
+            last = regressors;
+            row.by_offset = theta * row.by_offset + 1.0 - rho;
+            row.error = theta * error + n - rho * last_n;
+            last_n = n;
+            visit(&row);
+        });
+    }
+
     /// Loss, gradient and Gauss-Newton matrix at `p`, after what is linear was solved for.
-    fn evaluate(&self, p: &mut [f64]) -> Quadratic {
-        let linear = self.pass::<false>(p);
+    fn evaluate(&mut self, p: &mut [f64]) -> Quadratic {
+        if p[T_NMS] != self.signals.t_nms_s {
+            self.muscle.t_nms_s = p[T_NMS];
+            self.signals = Signals::new(self.log, self.muscle);
+        }
+        let linear = self.sums::<LINEAR>(p);
         let solution = step(p, &self.bounds, &linear, 0.0);
         for (x, d) in p.iter_mut().zip(solution.iter()) {
             *x += d;
         }
-        self.pass::<true>(p)
-    }
-
-    /// One pass over the rows; without `ALL`, the derivatives by t_p, rho and theta are left at zero, and the
-    /// quadratic is exact.
-    fn pass<const ALL: bool>(&self, p: &[f64]) -> Quadratic {
-        if ALL {
+        if self.extended {
             self.sums::<COUNT>(p)
         } else {
-            self.sums::<LINEAR>(p)
+            self.sums::<CORE>(p)
         }
     }
 
+    /// One pass over the rows; derivatives by parameters beyond the first `N` are left at zero. By the first
+    /// [`LINEAR`] and the constants alone the quadratic is exact.
     fn sums<const N: usize>(&self, p: &[f64]) -> Quadratic {
-        let (rho, theta) = (p[RHO], p[THETA]);
-        // Row of the Jacobian of -e, in the order of the parameters, and what its filters remember.
-        let mut row = [0.0; N];
-        let mut last = [0.0; N];
-        let (mut e, mut last_n) = (0.0, 0.0);
         let mut loss = 0.0;
         let mut gradient = [0.0; N];
         let mut hessian = [[0.0; N]; N];
-        let regressed = N.min(T_P + 1);
-        let mut started = false;
-        self.rows(p, |n, regressors| {
-            if !started {
-                // The filters start as if the first row had gone on for ever: for the slow signals here that
-                // is nearer to the truth than silence, and the first innovation is not the whole disturbance.
-                (last_n, started) = (n, true);
-                let gain = (1.0 - rho) / (1.0 - theta);
-                for i in 0..regressed {
-                    last[i] = regressors[i];
-                    row[i] = gain * regressors[i];
-                }
-                e = gain * n;
-            }
-            if N == COUNT {
-                row[RHO] = theta * row[RHO] + last_n;
-                row[THETA] = theta * row[THETA] - e;
-            }
-            e = theta * e + n - rho * last_n;
-            last_n = n;
-            for i in 0..regressed {
-                row[i] = theta * row[i] + regressors[i] - rho * last[i];
-                last[i] = regressors[i];
-            }
+        let stretches = self.stretches.len();
+        // Of each stretch's constant: gradient, curvature, and mixed with the parameters.
+        let mut constants = vec![(0.0, 0.0, [0.0; N]); stretches];
+        self.errors::<N>(p, |row| {
+            let (e, slopes) = (row.error, &row.slopes);
             loss += e * e;
+            let (g, h, mixed) = &mut constants[row.stretch];
+            *g -= e * row.by_offset;
+            *h += row.by_offset * row.by_offset;
             for i in 0..N {
-                gradient[i] -= e * row[i];
+                gradient[i] -= e * slopes[i];
+                mixed[i] += row.by_offset * slopes[i];
                 for j in 0..=i {
-                    hessian[i][j] += row[i] * row[j];
+                    hessian[i][j] += slopes[i] * slopes[j];
                 }
             }
         });
-        Quadratic {
+        let mut quadratic = Quadratic {
             loss: 0.5 * loss,
-            scale: 0.5 * loss.max(SMALLEST_ERROR_NM.powi(2) * (self.signals.len() - self.first_row) as f64),
-            gradient: DVector::from_fn(COUNT, |i, _| if i < N { gradient[i] } else { 0.0 }),
-            hessian: DMatrix::from_fn(COUNT, COUNT, |i, j| {
-                if i.max(j) < N {
-                    hessian[i.max(j)][i.min(j)]
-                } else {
-                    0.0
-                }
-            }),
+            scale: 0.5 * loss.max(SMALLEST_ERROR_NM.powi(2) * self.row_count() as f64),
+            gradient: DVector::zeros(self.size()),
+            hessian: DMatrix::zeros(self.size(), self.size()),
+        };
+        for i in 0..N {
+            quadratic.gradient[i] = gradient[i];
+            for j in 0..N {
+                quadratic.hessian[(i, j)] = hessian[i.max(j)][i.min(j)];
+            }
         }
+        for (s, (g, h, mixed)) in constants.into_iter().enumerate() {
+            let o = COUNT + s;
+            quadratic.gradient[o] = g;
+            quadratic.hessian[(o, o)] = h;
+            for (i, &m) in mixed.iter().enumerate() {
+                quadratic.hessian[(o, i)] = m;
+                quadratic.hessian[(i, o)] = m;
+            }
+        }
+        quadratic
     }
 
     /// Solves for everything that is linear at each starting delay and corner, then follows the best delay of
     /// each corner to its end.
-    fn search(&self) -> (Optimum, Vec<Start>) {
+    fn search(&mut self) -> (Optimum, Vec<Start>) {
+        let bounds = self.bounds.clone();
         let mut ends = START_CORNERS_HZ.map(|corner_hz| {
             let start = START_DELAYS_S
                 .map(|t_p| self.start(t_p, corner_hz))
@@ -222,7 +350,7 @@ impl<'a> Problem<'a> {
                 .map_or_else(Vec::new, |(_, point)| point);
             (
                 start[T_P],
-                minimise(&start, &self.bounds, TOLERANCE, |p| self.evaluate(p)),
+                minimise(&start, &bounds, TOLERANCE, |p| self.evaluate(p)),
             )
         });
         ends.sort_by(|a, b| a.1.quadratic.loss.total_cmp(&b.1.quadratic.loss));
@@ -240,14 +368,25 @@ impl<'a> Problem<'a> {
 
     /// A start, and the loss there after the linear part is solved for.
     fn start(&self, t_p_s: f64, corner_hz: f64) -> (f64, Vec<f64>) {
-        let mut point = vec![START[0], START[1], START[2], START[3], 0.0, t_p_s, 0.0, 0.0];
+        let mut point = vec![0.0; self.size()];
+        point[..LINEAR].copy_from_slice(&START);
+        point[T_P] = t_p_s;
+        point[K_NMS] = self.muscle.k_nms;
+        point[T_NMS] = self.signals.t_nms_s;
         point[RHO] = (-std::f64::consts::TAU * corner_hz * self.signals.dt_s).exp();
         for (x, b) in point.iter_mut().zip(&self.bounds) {
             *x = x.clamp(b.low, b.high);
         }
-        let linear = self.pass::<false>(&point);
+        let linear = self.sums::<LINEAR>(&point);
         let solution = step(&point, &self.bounds, &linear, 0.0);
         let gain = -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));
         (linear.loss - gain, point)
     }
+}
+
+/// `u` at row `k + shift`, on the line between rows and level beyond the ends.
+fn at(u: &[f64], k: usize, shift: f64) -> f64 {
+    let place = (k as f64 + shift).clamp(0.0, (u.len() - 1) as f64);
+    let (whole, share) = (place as usize, place.fract());
+    u[whole] + share * (u[(whole + 1).min(u.len() - 1)] - u[whole])
 }

@@ -1,0 +1,218 @@
+//! The torques on the steering column against its motion: a check of the sensors that does not need the driver.
+//!
+//! `T_d + T_h = J_s phi'' + B_s phi' - T_a`, with T_a the vehicle's answer to the wheel angle: whatever the driver does,
+//! the recorded torques have to add up to what the recorded angle takes. With unknown column and vehicle,
+//! `T_d = S (sum m_i x_i[phi] - T_h)` is regressed on the angle's derivatives and lags and on T_h, all through the same
+//! low-pass. S other than 1 is a scale, S below 0 a sign, and what the derivatives of T_d and T_h explain beside it a
+//! delay: `T_d(t + d) = T_d + d T_d'`. Shifts are taken out and the regression repeated until none is left.
+//!
+//! What it cannot see: a scale that T_d and T_h share, a delay that all three share, and the camera. A column
+//! that does not answer so (friction, a servo that is not in T_h) leaves much unexplained; then nothing is said.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use super::log::DriveLog;
+
+/// Time constant of each stage of the low-pass, s.
+const STAGE_S: f64 = 0.06;
+/// Lags of the wheel angle that stand for the vehicle, s.
+const VEHICLE_LAGS_S: [f64; 2] = [0.1, 0.3];
+/// After so long the low-pass and the lags have forgotten where they began, s.
+const SETTLE_S: f64 = 1.5;
+/// Length of the blocks over which errors are taken as independent, s.
+const BLOCK_S: f64 = 1.5;
+/// Rounds of shifting.
+const ROUNDS: usize = 4;
+
+/// What the balance of torques says of the sensors.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Balance {
+    /// Share of the driver's torque that column and guidance explain, 0 to 1.
+    pub explained: f64,
+    /// Scale of T_d over that of T_h, and its standard error; none without T_h.
+    pub scale: Option<[f64; 2]>,
+    /// By how much T_d is late against the wheel angle, and its standard error, s.
+    pub driver_late_s: [f64; 2],
+    /// By how much T_h is late against the wheel angle, and its standard error, s; none without T_h.
+    pub guidance_late_s: Option<[f64; 2]>,
+    /// Torque per angle at slow motion, and its standard error, N.m/rad: positive, or a sign is wrong.
+    pub stiffness: [f64; 2],
+}
+
+/// A signal and its derivatives through the low-pass.
+struct Passed {
+    value: Vec<f64>,
+    rate: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+fn pass(u: &[f64], dt: f64, shift_s: f64) -> Passed {
+    let n = u.len();
+    let read = |k: usize| {
+        let place = (k as f64 + shift_s / dt).clamp(0.0, (n - 1) as f64);
+        let (whole, share) = (place as usize, place.fract());
+        u[whole] + share * (u[(whole + 1).min(n - 1)] - u[whole])
+    };
+    let share = 1.0 - (-dt / STAGE_S).exp();
+    let mut stage = [read(0); 4];
+    let mut out = Passed {
+        value: Vec::with_capacity(n),
+        rate: Vec::with_capacity(n),
+        acceleration: Vec::with_capacity(n),
+    };
+    for k in 0..n {
+        let mut input = read(k);
+        for s in &mut stage {
+            *s += share * (input - *s);
+            input = *s;
+        }
+        let [_, b, c, d] = stage;
+        // Of sampled filters: share times (c - d) is the last step of d over 1 - share.
+        let gain = share / (dt * (1.0 - share));
+        out.value.push(d);
+        out.rate.push(gain * (c - d));
+        out.acceleration.push(gain * gain * (b - 2.0 * c + d));
+    }
+    // Those are differences to the row before: half a row late, and a whole one.
+    for k in 1..n {
+        out.rate[k - 1] = 0.5 * (out.rate[k - 1] + out.rate[k]);
+        out.acceleration[k - 1] = out.acceleration[k];
+    }
+    out
+}
+
+fn lagged(u: &[f64], dt: f64, t: f64) -> Vec<f64> {
+    let share = 1.0 - (-dt / t).exp();
+    let mut y = u[0];
+    u.iter()
+        .map(|&x| {
+            y += share * (x - y);
+            y
+        })
+        .collect()
+}
+
+/// Weighs the torques of `log` over the `stretches`; none if there is too little of them.
+pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) -> Option<Balance> {
+    let dt = log.dt_s;
+    let settle = (SETTLE_S / dt) as usize;
+    let rows: Vec<usize> = stretches
+        .iter()
+        .flat_map(|s| s.start + settle..s.end.max(s.start + settle))
+        .collect();
+    let guided = !manual && rows.iter().any(|&k| log.guidance_torque_nm[k] != 0.0);
+    if rows.len() < 10 * settle.min(120) {
+        return None;
+    }
+    let phi = pass(&log.wheel_angle_rad, dt, 0.0);
+    let mut columns = vec![phi.acceleration.clone(), phi.rate.clone(), phi.value.clone()];
+    columns.extend(VEHICLE_LAGS_S.map(|t| lagged(&phi.value, dt, t)));
+    let stiff = 2..columns.len();
+    columns.push(vec![1.0; log.len()]);
+    let first_of_torques = columns.len();
+    let (mut driver_late, mut guidance_late) = (0.0_f64, 0.0_f64);
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let driver = pass(&log.driver_torque_nm, dt, driver_late);
+        columns.truncate(first_of_torques);
+        columns.push(driver.rate);
+        if guided {
+            let guidance = pass(&log.guidance_torque_nm, dt, guidance_late);
+            columns.push(guidance.value);
+            columns.push(guidance.rate);
+        }
+        let fit = regress(&driver.value, &columns, &rows, (BLOCK_S / dt) as usize)?;
+        let d = first_of_torques;
+        let step = -fit.weights[d];
+        driver_late += step.clamp(-0.03, 0.03);
+        let mut more = 0.0_f64;
+        let error = |i: usize| fit.errors[(i, i)].max(0.0).sqrt();
+        let mut scale = None;
+        let mut late = None;
+        if guided {
+            let s = -fit.weights[d + 1];
+            scale = Some([s, error(d + 1)]);
+            if s.abs() > 0.1 {
+                more = -fit.weights[d + 2] / s;
+                guidance_late += more.clamp(-0.03, 0.03);
+                late = Some([guidance_late, error(d + 2) / s.abs()]);
+            }
+        }
+        let stiffness: f64 = stiff.clone().map(|i| fit.weights[i]).sum();
+        let variance: f64 = stiff
+            .clone()
+            .flat_map(|i| stiff.clone().map(move |j| (i, j)))
+            .map(|ij| fit.errors[ij])
+            .sum();
+        found = Some(Balance {
+            explained: fit.explained,
+            scale,
+            driver_late_s: [driver_late, error(d)],
+            guidance_late_s: late,
+            stiffness: [stiffness, variance.max(0.0).sqrt()],
+        });
+        if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {
+            break;
+        }
+    }
+    found
+}
+
+struct Regression {
+    weights: DVector<f64>,
+    errors: DMatrix<f64>,
+    explained: f64,
+}
+
+/// Least squares over `rows`, with errors from the sums over blocks of neighbours.
+fn regress(y: &[f64], columns: &[Vec<f64>], rows: &[usize], block: usize) -> Option<Regression> {
+    let m = columns.len();
+    let scale: Vec<f64> = columns
+        .iter()
+        .map(|c| rows.iter().map(|&k| c[k] * c[k]).sum::<f64>().sqrt().max(1e-300))
+        .collect();
+    let mut gram: DMatrix<f64> = DMatrix::zeros(m, m);
+    let mut right: DVector<f64> = DVector::zeros(m);
+    let mut x = vec![0.0; m];
+    for &k in rows {
+        for i in 0..m {
+            x[i] = columns[i][k] / scale[i];
+            right[i] += x[i] * y[k];
+            for j in 0..=i {
+                gram[(i, j)] += x[i] * x[j];
+            }
+        }
+    }
+    for i in 0..m {
+        gram[(i, i)] += 1e-10;
+        for j in 0..i {
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    let inverse = gram.cholesky()?.inverse();
+    let scaled: DVector<f64> = &inverse * right;
+    let mean = rows.iter().map(|&k| y[k]).sum::<f64>() / rows.len() as f64;
+    let (mut left, mut spread) = (0.0, 0.0);
+    let mut meat: DMatrix<f64> = DMatrix::zeros(m, m);
+    for chunk in rows.chunks(block.max(1)) {
+        let mut sum: DVector<f64> = DVector::zeros(m);
+        for &k in chunk {
+            let e = y[k] - (0..m).map(|i| columns[i][k] / scale[i] * scaled[i]).sum::<f64>();
+            left += e * e;
+            spread += (y[k] - mean).powi(2);
+            for i in 0..m {
+                sum[i] += columns[i][k] / scale[i] * e;
+            }
+        }
+        meat += &sum * sum.transpose();
+    }
+    let errors: DMatrix<f64> = &inverse * meat * &inverse;
+    Some(Regression {
+        weights: DVector::from_fn(m, |i, _| scaled[i] / scale[i]),
+        errors: DMatrix::from_fn(m, m, |i, j| errors[(i, j)] / (scale[i] * scale[j])),
+        explained: if spread > 0.0 { 1.0 - left / spread } else { 0.0 },
+    })
+}

@@ -1,0 +1,116 @@
+//! What else the record says of the model that was fitted: its likelihood over the delay, the scatter of its scores, and
+//! how much better it would be if what was taken as known were free.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, LONGEST_DELAY_S, Problem, T_NMS, T_P};
+use crate::identify::search::{Quadratic, covariance, step};
+
+/// Steps of the delay's profile over the whole range.
+const PROFILE_STEPS: usize = 40;
+/// Length of the blocks over which scores are taken as independent, s.
+const BLOCK_S: f64 = 2.0;
+
+/// What freeing one assumption would do, to first order.
+#[derive(Debug, Clone)]
+pub(super) struct Alternative {
+    /// Place of what was assumed.
+    pub place: usize,
+    /// How far from the assumed value the record draws it.
+    pub step: f64,
+    /// That in its standard errors.
+    pub z: f64,
+    /// What it would move the other parameters by.
+    pub moved: DVector<f64>,
+}
+
+impl Problem<'_> {
+    /// Minus twice the log likelihood over t_p above the optimum, with what is linear solved for at each.
+    pub(super) fn profile(&self, p: &[f64], loss: f64, variance: f64) -> Vec<[f64; 2]> {
+        if !self.is_free(T_P) {
+            return Vec::new();
+        }
+        let mut delays: Vec<f64> = (0..=PROFILE_STEPS)
+            .map(|i| LONGEST_DELAY_S * i as f64 / PROFILE_STEPS as f64)
+            .collect();
+        delays.push(p[T_P]);
+        delays.sort_by(f64::total_cmp);
+        delays
+            .into_iter()
+            .map(|t_p| {
+                let mut point = p.to_vec();
+                point[T_P] = t_p;
+                let linear = self.sums::<LINEAR>(&point);
+                let d = step(&point, &self.bounds, &linear, 0.0);
+                let gain = -linear.gradient.dot(&d) - 0.5 * d.dot(&(&linear.hessian * &d));
+                [t_p, 2.0 * (linear.loss - gain - loss) / variance]
+            })
+            .collect()
+    }
+
+    /// Covariance of the estimate from the scatter of the scores over blocks of neighbouring rows, which holds
+    /// where the prediction errors are not quite white or even; by `free` parameters.
+    pub(super) fn scattered(&self, p: &[f64], hessian: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
+        let size = self.size();
+        let block = (BLOCK_S / self.signals.dt_s) as usize;
+        let bread = covariance(hessian, free);
+        let mut meat = DMatrix::zeros(size, size);
+        let mut sum = DVector::zeros(size);
+        let mut count = 0;
+        let mut stretch = 0;
+        let mut close = |sum: &mut DVector<f64>, count: &mut usize| {
+            if *count > 0 {
+                meat += &*sum * sum.transpose();
+            }
+            sum.fill(0.0);
+            *count = 0;
+        };
+        self.errors::<CORE>(p, |row| {
+            if count == block || row.stretch != stretch {
+                close(&mut sum, &mut count);
+                stretch = row.stretch;
+            }
+            for i in 0..CORE {
+                sum[i] += row.error * row.slopes[i];
+            }
+            sum[COUNT + row.stretch] += row.error * row.by_offset;
+            count += 1;
+        });
+        close(&mut sum, &mut count);
+        &bread * meat * &bread
+    }
+
+    /// What freeing each assumption would do: a score test of each, with the `free` parameters following.
+    pub(super) fn alternatives(&self, p: &[f64], free: &[usize], variance: f64) -> Vec<Alternative> {
+        let full = self.sums::<COUNT>(p);
+        [K_NMS, T_NMS, H_LATE, D_LATE]
+            .into_iter()
+            .filter(|&x| !self.is_free(x) && !(x == H_LATE && p[K_HG] == 0.0))
+            .filter_map(|place| freed(&full, free, place, variance))
+            .collect()
+    }
+}
+
+fn freed(full: &Quadratic, free: &[usize], place: usize, variance: f64) -> Option<Alternative> {
+    let inverse = covariance(&full.hessian, free);
+    let mixed = DVector::from_fn(full.hessian.nrows(), |i, _| {
+        if free.contains(&i) {
+            full.hessian[(i, place)]
+        } else {
+            0.0
+        }
+    });
+    let follow = &inverse * &mixed;
+    let curvature = full.hessian[(place, place)] - mixed.dot(&follow);
+    if !(curvature > 1e-9 * full.hessian[(place, place)]) || !follow.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let score = full.gradient[place] - follow.dot(&full.gradient);
+    let step = -score / curvature;
+    Some(Alternative {
+        place,
+        step,
+        z: step * (curvature / variance).sqrt(),
+        moved: -follow * step,
+    })
+}

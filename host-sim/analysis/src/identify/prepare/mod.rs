@@ -1,0 +1,134 @@
+//! From a log as recorded to signals that an estimator can be given: what is wrong is found, repaired or left out, and
+//! listed.
+//!
+//! Single samples first ([`faults`]): what is no number, stuck or a spike is bridged, in the lane signals by the
+//! smoother of [`super::lane`]. Then stretches ([`stretches`]) in which the record is no driving: hands off, standstill,
+//! lane changes, pauses of a signal longer than [`LONGEST_BRIDGE_S`], and what the caller leaves out. What remains is
+//! a set of stretches, each with an unknown of its own for what the integral of e_y was before it.
+
+mod faults;
+mod stretches;
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+pub use faults::ColumnFaults;
+pub use stretches::{LeftOut, Reason};
+
+use super::lane::{LaneNoise, smooth};
+use super::log::{COLUMNS, DriveLog};
+use super::options::Options;
+
+/// A signal that pauses for longer is not bridged, s: the delay's own size.
+const LONGEST_BRIDGE_S: f64 = 0.3;
+
+/// Changes of e_y, e_theta, wheel angle, T_h and T_d below which a sample is never out of line: m, rad, rad, N.m, N.m.
+const LEAST: [f64; 5] = [5e-3, 5e-4, 1e-2, 0.06, 0.06];
+
+/// Error of a bridged lane signal, in torque by the driver's usual gains, above which the rows are left out, N.m.
+const LARGEST_BRIDGED_NM: f64 = 0.05;
+/// The driver's usual (K_d + K_nms)*a_1 and (K_d + K_nms)*a_3, to weigh errors of e_y and e_theta.
+const USUAL_GAINS: [f64; 2] = [0.4, 14.8];
+
+/// What was found in a log and what was done about it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Preflight {
+    /// By column: e_y_m, e_theta_rad, wheel_angle_rad, guidance_torque_nm, driver_torque_nm.
+    pub columns: Vec<(&'static str, ColumnFaults)>,
+    /// Camera noise of e_y, m, and of e_theta, rad.
+    pub lane_noise: [LaneNoise; 2],
+    /// Stretches that were left out.
+    pub left_out: Vec<LeftOut>,
+    /// Seconds of the record, and seconds used.
+    pub recorded_s: f64,
+    /// Seconds that the estimate rests on.
+    pub used_s: f64,
+}
+
+/// A log that is ready.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    pub log: DriveLog,
+    /// Rows that are driving, in order.
+    pub stretches: Vec<Range<usize>>,
+    pub preflight: Preflight,
+}
+
+/// Examines, repairs and cuts `log`.
+pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
+    let dt = log.dt_s;
+    let columns = [
+        &log.e_y_m,
+        &log.e_theta_rad,
+        &log.wheel_angle_rad,
+        &log.guidance_torque_nm,
+        &log.driver_torque_nm,
+    ];
+    let examined = [0, 1, 2, 3, 4].map(|c| faults::examine(columns[c], LEAST[c], c < 2));
+    let lane = [0, 1].map(|c| {
+        if !options.lane_noise {
+            return None;
+        }
+        let floor = 0.1 * examined[c].faults.step;
+        let integrals = 2 - c;
+        Some(smooth(
+            &examined[c].signal,
+            &examined[2].signal,
+            dt,
+            integrals,
+            &examined[c].weight,
+            floor,
+        ))
+    });
+    let mut bad: Vec<Vec<bool>> = examined.iter().map(|e| e.bad.clone()).collect();
+    for (c, s) in lane.iter().enumerate() {
+        if let Some(s) = s {
+            for (b, e) in bad[c].iter_mut().zip(&s.error_sd) {
+                *b &= e * USUAL_GAINS[c] > LARGEST_BRIDGED_NM;
+            }
+            for (b, &burst) in bad[c].iter_mut().zip(&s.bursts) {
+                *b |= burst;
+            }
+        }
+    }
+    let mut lane_noise = [LaneNoise::default(); 2];
+    let [e_y, e_theta, phi, t_h, t_d] = examined;
+    let named = [&e_y, &e_theta, &phi, &t_h, &t_d];
+    let mut preflight = Preflight {
+        columns: COLUMNS[1..]
+            .iter()
+            .copied()
+            .zip(named.map(|e| e.faults))
+            .collect(),
+        recorded_s: log.len() as f64 * dt,
+        ..Preflight::default()
+    };
+    let [y, theta] = lane;
+    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed
+    {
+        Some(s) => {
+            *noise = s.noise;
+            s.signal
+        }
+        None => raw,
+    };
+    let clean = DriveLog {
+        start_s: log.start_s,
+        dt_s: dt,
+        e_y_m: take(y, e_y.signal, &mut lane_noise[0]),
+        e_theta_rad: take(theta, e_theta.signal, &mut lane_noise[1]),
+        wheel_angle_rad: phi.signal,
+        guidance_torque_nm: t_h.signal,
+        driver_torque_nm: t_d.signal,
+    };
+    preflight.lane_noise = lane_noise;
+    let (stretches, left_out) = stretches::stretches(log, &clean, &bad, lane_noise, options);
+    preflight.left_out = left_out;
+    preflight.used_s = stretches.iter().map(|s| s.len() as f64 * dt).sum();
+    Prepared {
+        log: clean,
+        stretches,
+        preflight,
+    }
+}

@@ -1,0 +1,227 @@
+//! Which stretches of a record are driving: what is not is found and left out, with the reason.
+
+use std::fmt;
+use std::ops::Range;
+
+use serde::Serialize;
+
+use super::LONGEST_BRIDGE_S;
+use crate::identify::lane::LaneNoise;
+use crate::identify::log::DriveLog;
+use crate::identify::options::Options;
+
+/// Why a stretch was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The caller said so.
+    Asked,
+    /// A signal paused for longer than is bridged.
+    Pause,
+    /// The driver's torque is zero although there is something to steer.
+    HandsOff,
+    /// Nothing moves.
+    Standstill,
+    /// The target line moved by a lane.
+    LaneChange,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Asked => "outside of the stretches asked for",
+            Self::Pause => "a signal is missing or stuck",
+            Self::HandsOff => "hands off",
+            Self::Standstill => "standstill",
+            Self::LaneChange => "lane change",
+        })
+    }
+}
+
+/// A stretch that was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// First instant, s.
+    pub from_s: f64,
+    /// Last instant, s.
+    pub to_s: f64,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// A torque that stays within a band of this width, N.m, for [`HANDS_OFF_S`], and that near zero, is of nobody's hands, ...
+const HANDS_OFF_NM: f64 = 0.032;
+const HANDS_OFF_OFFSET_NM: f64 = 0.1;
+const HANDS_OFF_S: f64 = 2.0;
+/// ... if the far point and the guidance would have asked this of any driver meanwhile, N.m.
+const ASKED_NM: f64 = 0.05;
+/// Nothing moves for so long: the car stands.
+const STANDSTILL_S: f64 = 3.0;
+/// Rounding of the wheel angle, rad, that is no movement.
+const WHEEL_ROUNDING_RAD: f64 = 0.002;
+/// Lane errors move by more than their noise times this where a car moves.
+const NOISE_RANGE: f64 = 10.0;
+/// A jump of e_y by this, m, in [`JUMP_ROWS`] rows is a change of the target line.
+const LANE_JUMP_M: f64 = 1.5;
+const JUMP_ROWS: usize = 3;
+/// Left out around a lane change, s: the driver is on the way before, and settles after.
+const LANE_CHANGE_S: [f64; 2] = [6.0, 8.0];
+/// Shortest stretch of driving that is worth its own unknown, s.
+const SHORTEST_S: f64 = 3.0;
+
+pub(super) fn stretches(
+    raw: &DriveLog,
+    log: &DriveLog,
+    bad: &[Vec<bool>],
+    noise: [LaneNoise; 2],
+    options: &Options,
+) -> (Vec<Range<usize>>, Vec<LeftOut>) {
+    let n = log.len();
+    let mut reason: Vec<Option<Reason>> = vec![None; n];
+    let mut mark = |range: Range<usize>, why: Reason| {
+        for r in &mut reason[range.start.min(n)..range.end.min(n)] {
+            r.get_or_insert(why);
+        }
+    };
+    if !options.stretches.is_empty() {
+        let asked = |k: usize| {
+            let t = log.time_s(k);
+            options
+                .stretches
+                .iter()
+                .any(|&(from, to)| (from..=to).contains(&t))
+        };
+        for k in (0..n).filter(|&k| !asked(k)) {
+            mark(k..k + 1, Reason::Asked);
+        }
+    }
+    let rows = |s: f64| (s / log.dt_s).round() as usize;
+    for column in bad {
+        for run in true_runs(column) {
+            if run.len() > rows(LONGEST_BRIDGE_S) {
+                mark(run, Reason::Pause);
+            }
+        }
+    }
+    if options.leave_out {
+        for run in standstill(raw, noise, rows(STANDSTILL_S)) {
+            mark(run, Reason::Standstill);
+        }
+        for run in hands_off(log, rows(HANDS_OFF_S)) {
+            mark(run, Reason::HandsOff);
+        }
+        let jumps = (JUMP_ROWS..n).filter(|&k| (raw.e_y_m[k] - raw.e_y_m[k - JUMP_ROWS]).abs() > LANE_JUMP_M);
+        // A sample that is out of line jumps back at once; a target line does not.
+        let stays = |k: usize| (log.e_y_m[k] - log.e_y_m[k - JUMP_ROWS]).abs() > 0.5 * LANE_JUMP_M;
+        for k in jumps.filter(|&k| stays(k)) {
+            mark(
+                k.saturating_sub(rows(LANE_CHANGE_S[0]))..k + rows(LANE_CHANGE_S[1]),
+                Reason::LaneChange,
+            );
+        }
+    }
+    let free: Vec<bool> = reason.iter().map(Option::is_none).collect();
+    let mut left_out: Vec<LeftOut> = Vec::new();
+    for (k, why) in reason.iter().enumerate() {
+        let Some(why) = *why else { continue };
+        let t = log.time_s(k);
+        match left_out.last_mut() {
+            Some(last) if last.reason == why && t - last.to_s < 1.5 * log.dt_s => last.to_s = t,
+            _ => left_out.push(LeftOut {
+                from_s: t,
+                to_s: t,
+                reason: why,
+            }),
+        }
+    }
+    let stretches = true_runs(&free)
+        .into_iter()
+        .filter(|r| r.len() >= rows(SHORTEST_S))
+        .collect();
+    (stretches, left_out)
+}
+
+/// Runs of `true`.
+fn true_runs(flags: &[bool]) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    let mut from = None;
+    for (k, &flag) in flags.iter().chain(std::iter::once(&false)).enumerate() {
+        match (flag, from) {
+            (true, None) => from = Some(k),
+            (false, Some(start)) => {
+                out.push(start..k);
+                from = None;
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+/// Longest runs in which `signal` stays within `width`, of at least `rows` rows, from the left.
+fn quiet(signal: &[f64], width: f64, rows: usize) -> Vec<bool> {
+    let mut out = vec![false; signal.len()];
+    let mut from = 0;
+    while from < signal.len() {
+        let (mut low, mut high) = (signal[from], signal[from]);
+        let mut to = from + 1;
+        while to < signal.len() {
+            let (l, h) = (low.min(signal[to]), high.max(signal[to]));
+            if h - l > width {
+                break;
+            }
+            (low, high, to) = (l, h, to + 1);
+        }
+        if to - from >= rows {
+            out[from..to].fill(true);
+            from = to;
+        } else {
+            from += ((to - from) / 4).max(1);
+        }
+    }
+    out
+}
+
+/// The car stands: wheel angle, lane errors and guidance do not move for [`STANDSTILL_S`], and not because the road is
+/// straight and all are zero.
+fn standstill(log: &DriveLog, noise: [LaneNoise; 2], rows: usize) -> Vec<Range<usize>> {
+    let width = |c: usize| (NOISE_RANGE * noise[c].noise_sd).max(1e-9);
+    let phi = quiet(&log.wheel_angle_rad, WHEEL_ROUNDING_RAD, rows);
+    let guidance = quiet(&log.guidance_torque_nm, 1e-3, rows);
+    let e_y = quiet(&log.e_y_m, width(0), rows);
+    let e_theta = quiet(&log.e_theta_rad, width(1), rows);
+    let still: Vec<bool> = (0..log.len())
+        .map(|k| phi[k] && guidance[k] && e_y[k] && e_theta[k])
+        .collect();
+    true_runs(&still)
+        .into_iter()
+        .filter(|r| r.len() >= rows)
+        .filter(|r| {
+            let k = r.start + r.len() / 2;
+            log.wheel_angle_rad[k].abs() > WHEEL_ROUNDING_RAD || log.e_y_m[k].abs() > width(0)
+        })
+        .collect()
+}
+
+fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
+    let mut still = quiet(&log.driver_torque_nm, HANDS_OFF_NM, rows);
+    for (still, torque) in still.iter_mut().zip(&log.driver_torque_nm) {
+        *still &= torque.abs() <= HANDS_OFF_OFFSET_NM;
+    }
+    true_runs(&still)
+        .into_iter()
+        .filter(|r| r.len() >= rows)
+        .filter(|r| {
+            let asked: f64 = r
+                .clone()
+                .map(|k| {
+                    let visual = super::USUAL_GAINS[1] * log.e_theta_rad[k]
+                        + super::USUAL_GAINS[0] * log.e_y_m[k]
+                        - log.wheel_angle_rad[k];
+                    visual * visual
+                })
+                .sum::<f64>();
+            (asked / r.len() as f64).sqrt() > ASKED_NM
+        })
+        .collect()
+}

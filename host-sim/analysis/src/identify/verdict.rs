@@ -1,0 +1,158 @@
+//! Is the model refuted, by what, and what would cure it.
+//!
+//! A standard error holds only if the model does. So whatever was computed beside the estimate is held against the model's
+//! assumptions, and one that is refuted takes the verdict "identified" from all that was estimated. Differences
+//! that are certain but too small to move anything that matters refute nothing: no record is long enough for a model
+//! of a driver to be exactly true.
+
+use serde::Serialize;
+
+use super::balance::Balance;
+use super::result::{InputCorrelation, Whiteness};
+
+/// An assumption that the record refutes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refutation {
+    /// The assumption.
+    pub assumption: &'static str,
+    /// What in the record says so.
+    pub evidence: String,
+    /// The likeliest cause.
+    pub cause: String,
+    /// What would cure it.
+    pub cure: String,
+}
+
+/// Standard errors beyond which a difference is certain, with all the tests that are made of one record.
+pub(crate) const CERTAIN: f64 = 5.0;
+/// Explained share of T_d above which the column's balance of torques is seen to hold.
+const BALANCE_SEEN: f64 = 0.8;
+/// Differences of scale and of delay, s, that are too small to matter.
+const SMALL_SCALE: f64 = 0.1;
+const SMALL_DELAY_S: f64 = 0.0045;
+/// Largest autocorrelation of residuals that leaves the noise model standing: more is another noise.
+const WHITE_ENOUGH: f64 = 0.1;
+/// Largest cross-correlation with an input, in standard deviations, that leaves the driver model standing.
+const INDEPENDENT_ENOUGH: f64 = 7.0;
+
+/// What the balance of torques on the column refutes.
+pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
+    let mut out = Vec::new();
+    if b.explained < BALANCE_SEEN {
+        return out;
+    }
+    let sure = |value: f64, error: f64| value.abs() > CERTAIN * error;
+    let evidence = |what: String| {
+        format!(
+            "column and guidance explain {:.1} % of driver_torque_nm, but {what}",
+            100.0 * b.explained
+        )
+    };
+    let negative = b.stiffness[0] < 0.0 && sure(b.stiffness[0], b.stiffness[1]);
+    let mut sign = |cause: &str, cure: &str, what: String| {
+        out.push(Refutation {
+            assumption: "all torques and angles are positive to the left",
+            evidence: evidence(what),
+            cause: cause.to_owned(),
+            cure: cure.to_owned(),
+        });
+    };
+    match b.scale {
+        Some([s, e]) if s < 0.0 && sure(s, e) && s < -SMALL_SCALE => {
+            if negative {
+                sign(
+                    "the sign of driver_torque_nm is swapped",
+                    "--map driver_torque_nm=driver_torque_nm*-1",
+                    format!("with a scale of {s:.3} and a negative stiffness"),
+                );
+            } else {
+                sign(
+                    "the sign of guidance_torque_nm is swapped",
+                    "--map guidance_torque_nm=guidance_torque_nm*-1",
+                    format!("with a scale of {s:.3} to guidance_torque_nm"),
+                );
+            }
+        }
+        _ if negative => sign(
+            "the sign of wheel_angle_rad is swapped, or, in a drive without guidance, that of driver_torque_nm",
+            "--map wheel_angle_rad=wheel_angle_rad*-1 (or driver_torque_nm=driver_torque_nm*-1)",
+            format!("with a stiffness of {:.2} N.m/rad", b.stiffness[0]),
+        ),
+        Some([s, e]) if sure(1.0 - s, e) && s.abs() < SMALL_SCALE => out.push(Refutation {
+            assumption: "driver_torque_nm is the driver's torque alone",
+            evidence: evidence(format!("guidance_torque_nm has no part in it: scale {s:.3} for 1")),
+            cause: "driver_torque_nm is the sum T_d + T_h (a sensor below the actuator)".to_owned(),
+            cure: "subtract guidance_torque_nm from driver_torque_nm before".to_owned(),
+        }),
+        Some([s, e]) if sure(s - 1.0, e) && (s - 1.0).abs() > SMALL_SCALE => out.push(Refutation {
+            assumption: "driver_torque_nm and guidance_torque_nm have one scale",
+            evidence: evidence(format!("at {s:.3} +- {e:.3} times its scale")),
+            cause: format!(
+                "driver_torque_nm is recorded at {s:.3} times its value (or guidance_torque_nm at {:.3} times)",
+                1.0 / s
+            ),
+            cure: format!("--map driver_torque_nm=driver_torque_nm*{:.3}", 1.0 / s),
+        }),
+        _ => {}
+    }
+    let mut late = |name: &str, option: &str, [value, error]: [f64; 2]| {
+        if sure(value, error) && value.abs() > SMALL_DELAY_S {
+            let (size, word) = (1e3 * value.abs(), if value > 0.0 { "late" } else { "early" });
+            out.push(Refutation {
+                assumption: "all columns were sampled at the same instant",
+                evidence: evidence(format!(
+                    "{name} {:.1} +- {:.1} ms {word} against wheel_angle_rad",
+                    size,
+                    1e3 * error
+                )),
+                cause: format!("{name} is {size:.0} ms {word}"),
+                cure: format!("--fix {option}={value:.4}"),
+            });
+        }
+    };
+    late("driver_torque_nm", "t_d_late", b.driver_late_s);
+    if let Some(h) = b.guidance_late_s {
+        late("guidance_torque_nm", "t_h_late", h);
+    }
+    out
+}
+
+/// What the residuals refute.
+pub(crate) fn of_residuals(white: &Whiteness, inputs: &[InputCorrelation]) -> Vec<Refutation> {
+    let mut out = Vec::new();
+    if white.p_value < 1e-6 && white.largest_autocorrelation.abs() > WHITE_ENOUGH {
+        out.push(Refutation {
+            assumption: "the disturbance is a low-passed remnant and white sensor noise",
+            evidence: format!(
+                "the prediction errors are not white: autocorrelation {:.3}",
+                white.largest_autocorrelation
+            ),
+            cause: "a part of the drive is no driving, a sensor filters, or the driver is another one"
+                .to_owned(),
+            cure: "look at the residuals over time; leave out stretches with --from and --to".to_owned(),
+        });
+    }
+    for test in inputs.iter().filter(|i| i.largest_z.abs() > INDEPENDENT_ENOUGH) {
+        out.push(Refutation {
+            assumption: "the driver reacts to the inputs as equations (7) and (8) say",
+            evidence: format!(
+                "the prediction errors hold more of {}: {:.1} standard deviations",
+                test.input, test.largest_z
+            ),
+            cause: format!(
+                "{} is late, filtered or at another scale, or the driver is another one",
+                test.input
+            ),
+            cure: "--estimate t_nms, k_nms, t_h_late or t_d_late".to_owned(),
+        });
+    }
+    out
+}
+
+/// What no record of these columns can show.
+pub(crate) const ASSUMED: [&str; 4] = [
+    "e_y_m and e_theta_rad are not late: a late camera adds to t_p",
+    "e_y_m and e_theta_rad are at scale: another scale divides gain_1, gain_2 or gain_3",
+    "driver_torque_nm, guidance_torque_nm and the column have one scale: a scale that all share is not seen",
+    "e_y_m and e_theta_rad are those at the driver's own points (0.3 s and 1.0 s ahead)",
+];

@@ -1,0 +1,403 @@
+//! What must hold in every cycle of every run, judged from the frames alone.
+//!
+//! The checker hears what the ECU hears and reads the guidance frame that it sends, both with `bytes`; its
+//! arithmetic is f64, its limits are written down here a second time, and it shares no code with the core. It
+//! trusts the ECU in one thing only: which frames it accepted, since a bound on the driver's torque is a bound
+//! on the torque that the ECU has read.
+//!
+//! | rule | bound |
+//! |---|---|
+//! | frame | identifier, length, CRC, counter one ahead, codes that exist, spare bits zero, classes those of the faults |
+//! | limit | abs(T) <= 5 N.m |
+//! | wind-up | abs(T) grows by at most 4 N.m/s (2 ms at most count for one cycle) |
+//! | reduction | abs(T) falls by at most 8 N.m/s, but for an ECU fault and a driver who overrides |
+//! | window | abs(T) grows by at most 1.2 N.m within any 250 ms |
+//! | override | the bound that shrinks from 0.8 N.m of opposing driver torque |
+//! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
+//! | engaging | into Active only from 500 ms of Standby and by a request that rose |
+//! | inputs | no input older than 30 ms in Active |
+//! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s |
+//! | fade | never grows, falls by 4 N.m/s |
+//! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked |
+
+use std::collections::VecDeque;
+
+use haptic_core::bus::Frame;
+
+use super::bytes::{self, Status};
+
+const LIMIT_NM: f64 = 5.0;
+const WIND_UP_NM_PER_S: f64 = 4.0;
+const REDUCTION_NM_PER_S: f64 = 8.0;
+const WINDOW_NM: f64 = 1.2;
+const WINDOW_US: u64 = 250_000;
+const OVERRIDE_FROM_NM: f64 = 0.8;
+const OVERRIDE_SLOPE: f64 = 3.0;
+const TIMEOUT_US: u32 = 30_000;
+const READY_US: u32 = 500_000;
+const FADE_NM_PER_S: f64 = 4.0;
+const HANDOVER_S: f64 = 2.0;
+/// Most time that one cycle may use of a rate.
+const MOST_S: f64 = 0.002;
+/// One LSB of the torque on the bus: a torque is rounded, the bounds are not.
+const LSB_NM: f64 = 1.0 / 4096.0;
+/// Rounding of the rates in the core's fixed point.
+const TINY_NM: f64 = 1e-6;
+
+/// The output that is trusted when an input was implausible, us ago: the oldest remembered, with what lies between two
+/// that are; and the most that the probe may have taken away from it.
+const TRUSTED_US: std::ops::Range<u32> = 240_000..280_000;
+const PROBE_NM: f64 = 0.2;
+
+/// Bits of the faults of implausible inputs.
+const IMPLAUSIBLE_FAULTS: u64 = 1 << 2 | 1 << 4 | 1 << 6;
+/// Bit of the fault that the two copies of a redundant state differ.
+const MEMORY_FAULT: u64 = 1 << 10;
+
+pub(super) const STANDBY: u64 = 1;
+pub(super) const ACTIVE: u64 = 2;
+pub(super) const FADE: u64 = 3;
+pub(super) const HANDOVER: u64 = 4;
+pub(super) const FAULT: u64 = 5;
+pub(super) const LOCKED: u64 = 6;
+
+/// Bits of the faults of class B, of class C, and of class Locked.
+const CLASSES: [u64; 3] = [0x00FF, 0x1F00, 0x6000];
+
+/// The classes that a guidance frame must name with these faults.
+fn classes_of(faults: u64) -> u64 {
+    let present = CLASSES.map(|mask| u64::from(faults & mask != 0));
+    present[0] | present[1] << 1 | present[2] << 2
+}
+
+/// A rule that was broken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Violation {
+    /// Step of the run, ms.
+    pub step: u32,
+    /// Which rule, and by how much.
+    pub what: String,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    status: Status,
+    at_us: u32,
+}
+
+/// Start of a fade or a handover: its largest torque, and when.
+#[derive(Debug, Clone, Copy)]
+struct Ramp {
+    from_nm: f64,
+    at_us: u32,
+}
+
+/// Judges one ECU.
+#[derive(Debug, Clone)]
+pub(super) struct InvariantChecker {
+    last: Option<Last>,
+    /// Whether the ECU may be Active from its first cycle on.
+    starts_active: bool,
+    /// When the latest sample in use was true, by the ECU's clock: lane, column, vehicle, demand.
+    true_at_us: [Option<u32>; 4],
+    driver_nm: f64,
+    request: Option<bool>,
+    /// A request that rose and has not yet been used.
+    rose: bool,
+    standby_since_us: u32,
+    ramp: Ramp,
+    /// Magnitudes of the last 250 ms by the world's clock, rising: the first is the least.
+    window: VecDeque<(u64, f64)>,
+    /// Magnitudes for as long as one may be trusted, by the ECU's clock.
+    outputs: VecDeque<(u32, f64)>,
+    pub(super) cycles: u64,
+    pub(super) violation: Option<Violation>,
+}
+
+impl InvariantChecker {
+    /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active.
+    pub(super) fn new(starts_active: bool, now_us: u32) -> Self {
+        Self {
+            last: None,
+            starts_active,
+            true_at_us: [None; 4],
+            driver_nm: 0.0,
+            request: None,
+            rose: false,
+            standby_since_us: now_us,
+            ramp: Ramp {
+                from_nm: 0.0,
+                at_us: now_us,
+            },
+            window: VecDeque::new(),
+            outputs: VecDeque::new(),
+            cycles: 0,
+            violation: None,
+        }
+    }
+
+    /// The ECU was reset: what it knew is gone, and its torque with it.
+    pub(super) fn reset(&mut self, now_us: u32) {
+        let (cycles, violation) = (self.cycles, self.violation.take());
+        *self = Self::new(false, now_us);
+        (self.cycles, self.violation) = (cycles, violation);
+    }
+
+    /// A frame that the ECU accepted.
+    pub(super) fn accepted(&mut self, frame: &Frame, now_us: u32) {
+        match frame.id() {
+            // Bit 55: the sender vouches for it.
+            bytes::LANE if bytes::unsigned(frame, 55, 1) != 0 => {
+                let age_us = bytes::unsigned(frame, 46, 9) as u32 * 100;
+                self.true_at_us[0] = Some(now_us.wrapping_sub(age_us));
+            }
+            bytes::COLUMN => {
+                self.true_at_us[1] = Some(now_us);
+                self.driver_nm = bytes::signed(frame, 12, 18) as f64 / 4096.0;
+            }
+            bytes::VEHICLE => self.true_at_us[2] = Some(now_us),
+            bytes::DEMAND => {
+                self.true_at_us[3] = Some(now_us);
+                let engage = bytes::unsigned(frame, 12, 1) != 0;
+                self.rose |= engage && self.request == Some(false);
+                self.rose &= engage;
+                self.request = Some(engage);
+            }
+            _ => {}
+        }
+    }
+
+    /// A cycle of the ECU: `step` and `world_us` in the world, `now_us` on the ECU's clock.
+    pub(super) fn cycle(&mut self, step: u32, world_us: u64, now_us: u32, frame: &Frame, others: &[Frame]) {
+        self.cycles += 1;
+        let status = Status::of(frame);
+        let verdict = self.judge(world_us, now_us, frame, &status, others);
+        if let (Err(what), None) = (verdict, &self.violation) {
+            self.violation = Some(Violation { step, what });
+        }
+        self.last = Some(Last {
+            status,
+            at_us: now_us,
+        });
+        self.outputs.push_back((now_us, status.torque_nm.abs()));
+        let is_old = |(at_us, _): &(u32, f64)| now_us.wrapping_sub(*at_us) > TRUSTED_US.end;
+        while self.outputs.front().is_some_and(is_old) {
+            self.outputs.pop_front();
+        }
+    }
+
+    /// The largest torque that a handover may start from, beside the last one.
+    fn trusted_nm(&self, status: &Status, now_us: u32) -> f64 {
+        let age_us = |at_us: u32| now_us.wrapping_sub(at_us);
+        let known = self
+            .outputs
+            .front()
+            .is_some_and(|(at, _)| age_us(*at) >= TRUSTED_US.end - 10_000);
+        if status.mode != HANDOVER || status.faults & IMPLAUSIBLE_FAULTS == 0 || !known {
+            return f64::INFINITY;
+        }
+        let outputs = self
+            .outputs
+            .iter()
+            .filter(|(at, _)| TRUSTED_US.contains(&age_us(*at)));
+        PROBE_NM + outputs.map(|(_, nm)| *nm).fold(0.0, f64::max)
+    }
+
+    fn judge(
+        &mut self,
+        world_us: u64,
+        now_us: u32,
+        frame: &Frame,
+        status: &Status,
+        others: &[Frame],
+    ) -> Result<(), String> {
+        let before = self.last.map(|last| last.status);
+        well_formed(frame, status, before.as_ref())?;
+        for other in others {
+            if other.id() == bytes::WARNING && !bytes::is_intact(other) {
+                return Err("warning frame: CRC does not fit".into());
+            }
+        }
+        let elapsed_us = self.last.map_or(0, |last| now_us.wrapping_sub(last.at_us));
+        let old_nm = before.map_or(0.0, |b| b.torque_nm);
+        self.magnitude(world_us, status.torque_nm)?;
+        self.rates(status, old_nm, f64::from(elapsed_us) * 1e-6, now_us)?;
+        let old_mode = before.map_or(if self.starts_active { ACTIVE } else { 0 }, |b| b.mode);
+        self.modes(status, old_mode, now_us)?;
+        self.ramps(status, old_mode, old_nm, now_us)?;
+        warned(status, before.is_some_and(|b| b.warning), others)
+    }
+
+    fn magnitude(&mut self, world_us: u64, torque_nm: f64) -> Result<(), String> {
+        let magnitude = torque_nm.abs();
+        if magnitude > LIMIT_NM {
+            return Err(format!("limit: T = {torque_nm} N.m"));
+        }
+        while self
+            .window
+            .front()
+            .is_some_and(|(at, _)| world_us - at > WINDOW_US)
+        {
+            self.window.pop_front();
+        }
+        while self.window.back().is_some_and(|(_, least)| *least >= magnitude) {
+            self.window.pop_back();
+        }
+        self.window.push_back((world_us, magnitude));
+        let grown = magnitude - self.window.front().map_or(0.0, |(_, least)| *least);
+        if grown > WINDOW_NM {
+            return Err(format!("window: abs(T) grew by {grown:.4} N.m within 250 ms"));
+        }
+        Ok(())
+    }
+
+    fn rates(&self, status: &Status, old_nm: f64, elapsed_s: f64, now_us: u32) -> Result<(), String> {
+        let elapsed_s = elapsed_s.min(MOST_S);
+        let (growth, fall) = (WIND_UP_NM_PER_S * elapsed_s, REDUCTION_NM_PER_S * elapsed_s);
+        // In the frame in which the old torque is positive.
+        let sign = if old_nm < 0.0 { -1.0 } else { 1.0 };
+        let (old, new) = (old_nm.abs(), sign * status.torque_nm);
+        if new > old + growth + TINY_NM || new < -growth - TINY_NM {
+            return Err(format!(
+                "wind-up: T from {old_nm} to {} N.m in {:.3} ms",
+                status.torque_nm,
+                elapsed_s * 1e3
+            ));
+        }
+        let column_is_known = self.true_at_us[1].is_some_and(|at| now_us.wrapping_sub(at) <= TIMEOUT_US);
+        let (low, high) = if column_is_known {
+            override_bounds(self.driver_nm)
+        } else {
+            (-LIMIT_NM, LIMIT_NM)
+        };
+        if !(low - TINY_NM..=high + TINY_NM).contains(&status.torque_nm) {
+            return Err(format!(
+                "override: T = {} N.m outside {low} to {high} N.m at T_d = {} N.m",
+                status.torque_nm, self.driver_nm
+            ));
+        }
+        let bound = if sign < 0.0 { -low } else { high };
+        let by_driver = new >= bound - LSB_NM - TINY_NM;
+        let by_fault = matches!(status.mode, FAULT | LOCKED);
+        // Across zero the old torque may fall all the way, and the new one grow from there.
+        let low = if old > fall { old - fall } else { -growth };
+        if new < low - TINY_NM && !by_driver && !by_fault {
+            return Err(format!(
+                "reduction: T from {old_nm} to {} N.m in {:.3} ms, mode {}",
+                status.torque_nm,
+                elapsed_s * 1e3,
+                status.mode
+            ));
+        }
+        Ok(())
+    }
+
+    fn modes(&mut self, status: &Status, old_mode: u64, now_us: u32) -> Result<(), String> {
+        let mode = status.mode;
+        if !matches!(mode, ACTIVE | FADE | HANDOVER) && status.torque_nm != 0.0 {
+            return Err(format!("mode {mode}: T = {} N.m", status.torque_nm));
+        }
+        if matches!(old_mode, FAULT | LOCKED) && mode != old_mode {
+            return Err(format!("mode {old_mode} was left for {mode}"));
+        }
+        if mode == ACTIVE && old_mode != ACTIVE {
+            let waited_us = now_us.wrapping_sub(self.standby_since_us);
+            if old_mode != STANDBY || !self.rose || waited_us < READY_US {
+                return Err(format!(
+                    "engaged from mode {old_mode} after {waited_us} us, risen request: {}",
+                    self.rose
+                ));
+            }
+            self.rose = false;
+        }
+        if mode == STANDBY && old_mode != STANDBY {
+            self.standby_since_us = now_us;
+        }
+        if mode == ACTIVE {
+            for (at, name) in self.true_at_us.iter().zip(["lane", "column", "speed", "request"]) {
+                let age_us = at.map_or(u32::MAX, |at| now_us.wrapping_sub(at));
+                if age_us > TIMEOUT_US {
+                    return Err(format!("Active with a {name} of {age_us} us"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn ramps(&mut self, status: &Status, old_mode: u64, old_nm: f64, now_us: u32) -> Result<(), String> {
+        if !matches!(status.mode, FADE | HANDOVER) {
+            return Ok(());
+        }
+        if status.mode != old_mode {
+            self.ramp = Ramp {
+                from_nm: old_nm.abs().min(self.trusted_nm(status, now_us)),
+                // The ramp has moved for one cycle already when it is first seen.
+                at_us: self.last.map_or(now_us, |last| last.at_us),
+            };
+        }
+        let (torque, old) = (status.torque_nm, old_nm);
+        if torque.abs() > old.abs() || torque * old < 0.0 {
+            return Err(format!("mode {}: T from {old} to {torque} N.m", status.mode));
+        }
+        let passed_s = f64::from(now_us.wrapping_sub(self.ramp.at_us)) * 1e-6;
+        let start = self.ramp.from_nm;
+        let line = if status.mode == HANDOVER {
+            start * (1.0 - passed_s / HANDOVER_S)
+        } else {
+            start - FADE_NM_PER_S * passed_s
+        };
+        let elapsed_s = f64::from(self.last.map_or(0, |last| now_us.wrapping_sub(last.at_us))) * 1e-6;
+        // A reduction that is rounded away from zero, and the way to the line at 8 N.m/s.
+        let falling = old.abs() - REDUCTION_NM_PER_S * elapsed_s.min(MOST_S);
+        if torque.abs() > line.max(0.0).max(falling) + LSB_NM + TINY_NM {
+            return Err(format!(
+                "mode {}: T = {torque} N.m above its line of {line:.4} N.m after {passed_s:.3} s",
+                status.mode
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Result<(), String> {
+    if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
+        return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
+    }
+    if status.limit > 7
+        || status.mode > LOCKED
+        || status.reset > 6
+        || status.spare != 0
+        || status.classes != classes_of(status.faults)
+    {
+        return Err(format!("frame: a code that does not exist in {status:?}"));
+    }
+    match before {
+        // An ECU that lost its memory counts anew.
+        Some(before)
+            if status.counter != (before.counter + 1) % 16
+                && (status.faults & !before.faults) & MEMORY_FAULT == 0 =>
+        {
+            Err(format!(
+                "frame: counter {} after {}",
+                status.counter, before.counter
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
+    if status.warning != matches!(status.mode, HANDOVER | FAULT | LOCKED) {
+        return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
+    }
+    if status.warning && !before && !others.iter().any(|frame| frame.id() == bytes::WARNING) {
+        return Err("no warning frame in the cycle of the reaction".into());
+    }
+    Ok(())
+}
+
+/// Least and largest torque that leave the driver in charge.
+fn override_bounds(driver_nm: f64) -> (f64, f64) {
+    let bound = |toward: f64| (LIMIT_NM + OVERRIDE_SLOPE * (toward + OVERRIDE_FROM_NM)).clamp(0.0, LIMIT_NM);
+    (-bound(-driver_nm), bound(driver_nm))
+}

@@ -1,0 +1,164 @@
+//! A figure as data for the chart library that makes it live in a browser (uPlot, MIT, in `assets/uplot`).
+//!
+//! The script stands in the page itself; the page's policy names its hash, so the browser runs this script and no
+//! other. The values are those of the figure, thinned without losing a peak and rounded to six digits.
+
+use std::sync::OnceLock;
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use crate::plot::{Figure, Mark, Series, colour, dash, thin, width};
+
+pub(super) const SCRIPT: &str = concat!(
+    include_str!("../../assets/uplot/uPlot.iife.min.js"),
+    "\n",
+    include_str!("chart.js")
+);
+pub(super) const STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
+
+/// Most points of one line.
+const MOST_POINTS: usize = 1000;
+
+/// The script's hash, as a content security policy writes it.
+pub(super) fn script_hash() -> &'static str {
+    static HASH: OnceLock<String> = OnceLock::new();
+    HASH.get_or_init(|| format!("sha256-{}", STANDARD.encode(Sha256::digest(SCRIPT))))
+}
+
+/// The figure's data as JSON that can stand in a page; none for a figure of rows, whose drawing says it all.
+pub(super) fn data(figure: &Figure) -> Option<String> {
+    if !figure.rows.is_empty() || figure.panels.is_empty() {
+        return None;
+    }
+    let x_limits = figure.x_limits();
+    let panels = figure
+        .panels
+        .iter()
+        .zip(figure.y_limits())
+        .map(|(panel, limits)| {
+            // The browser finds the limits of lines again when it zooms in; it knows nothing of stems and intervals.
+            let lines = panel.series.iter().all(|s| matches!(s.mark, Mark::Line));
+            let fixed = figure.same_y || panel.y.limits.is_some() || !lines;
+            let series = panel.series.iter().map(|series| self::series(series, x_limits));
+            json!({
+                "title": panel.title,
+                "label": panel.y.label,
+                "limits": fixed.then_some(limits),
+                "series": series.collect::<Vec<_>>(),
+            })
+        });
+    let data = json!({
+        "x": figure.x.label,
+        "whole": figure.x.whole,
+        "limits": x_limits,
+        "panels": panels.collect::<Vec<_>>(),
+        "markers": figure.markers.iter().map(|m| json!({ "label": m.label, "x": m.x })).collect::<Vec<_>>(),
+        "bands": figure.bands.iter()
+            .map(|b| json!({ "label": b.label, "from": b.from, "to": b.to, "dark": b.dark }))
+            .collect::<Vec<_>>(),
+    });
+    // Nothing that a browser could take for the end of the script.
+    Some(data.to_string().replace('<', "\\u003c"))
+}
+
+fn series(series: &Series, (left, right): (f64, f64)) -> Value {
+    let inside = |x: f64| (left..=right).contains(&x);
+    let mut value = json!({
+        "label": series.label,
+        "colour": colour(series.style),
+        "dash": dash(series.style),
+        "width": width(series.style),
+    });
+    let (mark, mut points) = match &series.mark {
+        Mark::Line => ("line", thinned(&series.points, inside)),
+        Mark::Dots => ("dots", series.points.clone()),
+        Mark::Stems => ("stems", series.points.clone()),
+        Mark::Whiskers(ends) => {
+            value["ends"] = ends.iter().map(|ends| json!(ends.map(rounded))).collect();
+            ("whiskers", series.points.clone())
+        }
+        Mark::Interval(upper) => {
+            let stride = series.points.len().div_ceil(MOST_POINTS).max(1);
+            value["high"] = upper.iter().step_by(stride).map(|v| json!(rounded(*v))).collect();
+            (
+                "interval",
+                series.points.iter().copied().step_by(stride).collect(),
+            )
+        }
+    };
+    points.iter_mut().for_each(|p| *p = (rounded(p.0), rounded(p.1)));
+    value["mark"] = mark.into();
+    value["x"] = points.iter().map(|p| p.0).collect();
+    // What is not finite becomes null, and the line breaks there.
+    value["y"] = points.iter().map(|p| json!(p.1)).collect();
+    value
+}
+
+/// A line in view, thinned; a break stays one.
+fn thinned(points: &[(f64, f64)], inside: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
+    let mut all = Vec::new();
+    for piece in points.split(|p| !p.1.is_finite()) {
+        let seen: Vec<_> = piece.iter().copied().filter(|p| inside(p.0)).collect();
+        let (Some(first), false) = (seen.first(), seen.is_empty()) else {
+            continue;
+        };
+        if !all.is_empty() {
+            all.push((first.0, f64::NAN));
+        }
+        all.extend(thin(&seen, MOST_POINTS));
+    }
+    all
+}
+
+fn rounded(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::{Axis, Panel};
+
+    #[test]
+    fn the_data_of_the_page_are_those_of_the_figure() {
+        let points = vec![(0.0, 0.123_456_789), (1.0, f64::NAN), (2.0, -4.0), (9.0, 5.0)];
+        let whiskers = Mark::Whiskers(vec![[0.5, 1.5]]);
+        let figure = Figure {
+            x: Axis {
+                label: "s".into(),
+                limits: Some((0.0, 3.0)),
+                ..Axis::default()
+            },
+            panels: vec![Panel {
+                series: vec![
+                    Series::line("a", 1, points),
+                    Series::with_mark("b", 0, whiskers, vec![(2.0, 1.0)]),
+                ],
+                ..Panel::default()
+            }],
+            ..Figure::default()
+        };
+        let data: Value = serde_json::from_str(&data(&figure).unwrap()).unwrap();
+        let [line, dots] = [0, 1].map(|i| &data["panels"][0]["series"][i]);
+        assert_eq!(line["x"], json!([0.0, 2.0, 2.0]), "9 is out of view");
+        assert_eq!(line["y"], json!([0.123457, null, -4.0]));
+        assert_eq!(
+            (&line["colour"], &line["mark"]),
+            (&json!("#0072b2"), &json!("line"))
+        );
+        assert_eq!((&dots["y"], &dots["ends"]), (&json!([1.0]), &json!([[0.5, 1.5]])));
+    }
+
+    #[test]
+    fn a_peak_survives_the_thinning() {
+        let mut points: Vec<_> = (0..50_000).map(|i| (f64::from(i), 0.0)).collect();
+        points[31_415].1 = 7.0;
+        let found = thinned(&points, |_| true);
+        assert!(found.len() <= MOST_POINTS && found.contains(&(31_415.0, 7.0)));
+    }
+}

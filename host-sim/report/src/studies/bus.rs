@@ -1,0 +1,132 @@
+//! What is shown of the bus's load: a table, a figure, and the files with both.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Panel, Series};
+use haptic_batch::bus_load::{BIT_RATE, MAX_LOAD, MessageLoad};
+
+/// The load of the bus, as JSON holds it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Load {
+    /// Bits per second.
+    pub bit_rate: f64,
+    /// Every message, most urgent first.
+    pub messages: Vec<MessageLoad>,
+    /// Of all messages, as a share.
+    pub load: f64,
+    /// Most that it may be.
+    pub max_load: f64,
+}
+
+impl Load {
+    /// Of these messages.
+    pub fn of(messages: Vec<MessageLoad>) -> Self {
+        Self {
+            bit_rate: BIT_RATE,
+            load: messages.iter().map(|row| row.load).sum(),
+            messages,
+            max_load: MAX_LOAD,
+        }
+    }
+
+    /// With its provenance.
+    pub fn stamped(&self) -> Stamped<'_, Self> {
+        Provenance::of(None).stamp(self)
+    }
+
+    /// The sentence that says what it may be.
+    pub fn judgement(&self) -> String {
+        format!(
+            "At most {:.2} % of {:.0} kbit/s.",
+            100.0 * self.max_load,
+            self.bit_rate / 1000.0
+        )
+    }
+
+    /// Message by message, and the sum.
+    pub fn table(&self) -> Table {
+        let share = |load: f64| Cell::number(100.0 * load, 2);
+        let rows = self.messages.iter().map(|row| {
+            vec![
+                Cell::Text(row.message.into()),
+                Cell::Text(format!("{:#05x}", row.id)),
+                Cell::number(row.period_ms, 1),
+                Cell::number(f64::from(row.bits), 0),
+                share(row.load),
+            ]
+        });
+        let nothing = || Cell::Text(String::new());
+        let sum = vec![
+            Cell::Text("all".into()),
+            nothing(),
+            nothing(),
+            nothing(),
+            share(self.load),
+        ];
+        Table {
+            caption: String::new(),
+            columns: ["Message", "Identifier", "Period (ms)", "Bits", "Load (%)"]
+                .map(String::from)
+                .to_vec(),
+            rows: rows.chain([sum]).collect(),
+        }
+    }
+
+    fn figure(&self) -> Figure {
+        let points = self.messages.iter().enumerate();
+        let points = points
+            .map(|(i, row)| (i as f64 + 1.0, 100.0 * row.load))
+            .collect();
+        let mut y = Axis::of("Worst-case share of the bus (%)");
+        y.limits = Some((
+            0.0,
+            100.0 * self.messages.iter().map(|m| m.load).fold(0.0, f64::max) * 1.08,
+        ));
+        Figure {
+            rows: self.messages.iter().map(|row| row.message.into()).collect(),
+            panels: vec![Panel {
+                title: String::new(),
+                y,
+                series: vec![Series::with_mark("", 1, crate::plot::Mark::Stems, points)],
+            }],
+            ..Figure::default()
+        }
+    }
+
+    /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
+    ///
+    /// # Errors
+    /// What could not be written or drawn.
+    pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
+        let figure = self.figure();
+        write_figure(directory, "bus", &figure)?;
+        write_json(&directory.join("results.json"), &self.stamped())?;
+        let caption = "Every message at its shortest period, with every stuff bit that can occur.".into();
+        let blocks = vec![
+            Block::Figure { figure, caption },
+            Block::Table(self.table()),
+            Block::Text(self.judgement()),
+        ];
+        write_report(
+            directory,
+            &Report {
+                title: "How full the bus is at worst".into(),
+                summary: format!(
+                    "All messages together: {:.2} %. {}",
+                    100.0 * self.load,
+                    self.judgement()
+                ),
+                sections: vec![Section {
+                    heading: "Message by message".into(),
+                    blocks,
+                }],
+                provenance: Some(Provenance::of(None)),
+            },
+        )
+    }
+}

@@ -1,0 +1,152 @@
+//! What is shown of a fault campaign: a table, a figure, and the files with both.
+
+use std::path::Path;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_campaign::campaign::{Campaign, CaseResult};
+use haptic_campaign::document;
+
+/// Writes the figure (SVG, PNG), the results (JSON), the table of faults (Markdown) and a report (HTML).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
+    let figure = figure(campaign);
+    write_figure(directory, "faults", &figure)?;
+    write_json(&directory.join("faults.json"), &stamped(campaign))?;
+    let faults = document::table_of_faults();
+    write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
+    let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
+                   they must keep. A fault without a mark on the left has no deadline."
+        .into();
+    let mut blocks = vec![Block::Figure { figure, caption }];
+    blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
+    blocks.push(Block::Table(table(campaign)));
+    write_report(
+        directory,
+        &Report {
+            title: "Every fault by name".into(),
+            summary: summary(campaign),
+            sections: vec![Section {
+                heading: "Fault by fault".into(),
+                blocks,
+            }],
+            provenance: Some(Provenance::of(None)),
+        },
+    )
+}
+
+/// The results as JSON holds them.
+pub fn stamped(campaign: &Campaign) -> Stamped<'_, Campaign> {
+    Provenance::of(None).stamp(campaign)
+}
+
+/// How much ran, and how much of it failed.
+pub fn summary(campaign: &Campaign) -> String {
+    format!(
+        "{} rows, {} runs, {} cycles checked, {} failed",
+        campaign.rows.len(),
+        campaign.runs,
+        campaign.cycles,
+        campaign.failures().count()
+    )
+}
+
+/// A run that failed, and how to run it again.
+pub fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
+    format!(
+        "{} seed {}, cycle {}: {}: {}",
+        f.row, f.seed, f.cycle, f.what, f.replay
+    )
+}
+
+/// Fault by fault.
+pub fn table(campaign: &Campaign) -> Table {
+    let count = |n: u64| Cell::number(n as f64, 0);
+    let row = |row: &CaseResult| {
+        let time = |ms: Option<u32>| Cell::Number {
+            value: ms.map(f64::from),
+            decimals: 0,
+        };
+        let verdict = match row.failures.len() {
+            0 => "pass".into(),
+            n => format!("FAIL in {n}"),
+        };
+        vec![
+            Cell::Text(row.name.into()),
+            Cell::Text(row.class.to_string()),
+            count(row.runs),
+            count(row.seen),
+            count(row.cycles),
+            time(row.deadline_ms.and(row.worst_reaction_ms)),
+            time(row.deadline_ms),
+            Cell::number(row.peak_torque_nm, 3),
+            Cell::number(row.torque_bound_nm, 1),
+            Cell::Text(verdict),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: [
+            "Fault",
+            "Class",
+            "Runs",
+            "Seen",
+            "Cycles",
+            "Reaction (ms)",
+            "Deadline (ms)",
+            "Peak torque (N.m)",
+            "Bound (N.m)",
+            "Verdict",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: campaign.rows.iter().map(row).collect(),
+    }
+}
+
+/// Reaction beside deadline, torque beside bound. Deadlines span 1 ms to seconds, so the reaction is a share of its
+/// own.
+fn figure(campaign: &Campaign) -> Figure {
+    let of = |value: &dyn Fn(&CaseResult) -> Option<f64>| -> Vec<(f64, f64)> {
+        let rows = campaign.rows.iter().enumerate();
+        rows.filter_map(|(i, row)| Some((i as f64 + 1.0, value(row)?)))
+            .collect()
+    };
+    let reaction = of(&|row| {
+        let deadline_ms = row.deadline_ms.filter(|ms| *ms > 0)?;
+        Some(100.0 * f64::from(row.worst_reaction_ms?) / f64::from(deadline_ms))
+    });
+    let names = 1.0..=campaign.rows.len() as f64;
+    let bound = vec![(names.start() - 0.5, 100.0), (names.end() + 0.5, 100.0)];
+    let panel = |title: &str, label: &str, series: Vec<Series>| Panel {
+        title: title.into(),
+        y: Axis::of(label),
+        series,
+    };
+    Figure {
+        rows: campaign.rows.iter().map(|row| row.name.into()).collect(),
+        panels: vec![
+            panel(
+                "Worst reaction",
+                "Share of the deadline (%)",
+                vec![
+                    Series::line("limit", 3, bound),
+                    Series::with_mark("worst seen", 1, Mark::Stems, reaction),
+                ],
+            ),
+            panel(
+                "Largest torque",
+                "Torque (N.m)",
+                vec![
+                    Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.peak_torque_nm))),
+                    Series::dots("limit", 3, of(&|row| Some(row.torque_bound_nm))),
+                ],
+            ),
+        ],
+        ..Figure::default()
+    }
+}
