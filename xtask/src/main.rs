@@ -3,9 +3,9 @@
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
 mod bench;
+mod bindings_agree;
 mod boards;
 mod by_hand;
-mod bindings_agree;
 mod c_library;
 mod callgrind;
 mod ci;

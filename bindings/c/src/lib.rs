@@ -15,7 +15,7 @@ use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 
 /// `HG_ECU_SIZE` and `HG_ECU_ALIGN` of the header.
-const ECU_SIZE: usize = 2048;
+const ECU_SIZE: usize = 2560;
 const ECU_ALIGN: usize = 8;
 /// `HG_PARAMETERS` of the header.
 const PARAMETER_COUNT: usize = 19;
