@@ -1,12 +1,12 @@
 //! The rows of the fault campaign that a target has to show as well, with one seed each; bits flip in its memory.
 //! More of them: `host-sim faults --target --seeds 20`.
 
-use haptic_campaign::table::{Class, Place, Row, rows};
+use haptic_campaign::table::{Class, FaultCase, Place, rows};
 use haptic_campaign::{World, target};
 
 #[test]
 fn the_image_survives_what_the_host_survives() {
-    let marked: Vec<&'static Row> = rows().filter(|row| row.place == Place::Both).collect();
+    let marked: Vec<&'static FaultCase> = rows().filter(|row| row.place == Place::Both).collect();
     let campaign = target::run(&World::new(), &marked, 1..2, || ()).unwrap();
     let failed: Vec<_> = campaign.failures().collect();
     assert!(failed.is_empty(), "{failed:#?}");

@@ -2,8 +2,8 @@
 //! refuse, and whether its standard errors are right.
 
 use haptic_analysis::identify::{Identification, Options, Parameter, identify_with_noise_model};
-use haptic_batch::experiment::{Plan, PublishedDriver, Recorder, experiment, participants, repeat};
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_batch::experiment::{Plan, Recorder, experiment, repeat};
+use haptic_sim::participants::{PublishedDriver, participants};
 use haptic_sim::scenario::{GuidanceParameters, Scenario, Sensors};
 use haptic_sim::simulation;
 use rayon::prelude::*;
@@ -16,17 +16,8 @@ fn identified_without_noise(driver: &PublishedDriver) -> Identification {
     };
     guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
-        .driver(DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
-            ..DriverParameters::default()
-        })
-        .gains(ArmGains {
-            k_d: driver.k_d,
-            k_hg: driver.k_hg.unwrap(),
-        })
+        .driver(driver.parameters())
+        .gains(driver.gains())
         .sensors(Sensors::Exact)
         .guidance(guidance);
     let mut recorder = Recorder::new(false);

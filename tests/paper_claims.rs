@@ -5,7 +5,7 @@
 //! with it, and how closely, is this test's own: peak and mean from the traces, and the tolerances.
 
 use haptic_batch::claims::TABLE;
-use haptic_batch::evaluate::{Results, evaluate};
+use haptic_batch::evaluate::{EvaluationResults, evaluate};
 use haptic_core::params::Params;
 use haptic_sim::guidance::{FloatLaw, NoGuidance};
 use haptic_sim::models::driver::DriverParameters;
@@ -52,7 +52,7 @@ fn misses(share: f64, floor_m: f64, found: impl Fn(f64, Condition, FailureKind) 
     misses
 }
 
-fn shipping(sensors: Sensors) -> Results {
+fn shipping(sensors: Sensors) -> EvaluationResults {
     let base = Scenario::builder().sensors(sensors).build().unwrap();
     let evaluation = evaluate(&base, None, || ()).unwrap();
     assert_eq!(evaluation.results.runs.len(), 30);
@@ -66,7 +66,7 @@ fn shipping(sensors: Sensors) -> Results {
     evaluation.results
 }
 
-fn from(results: &Results) -> impl Fn(f64, Condition, FailureKind) -> [f64; 2] {
+fn from(results: &EvaluationResults) -> impl Fn(f64, Condition, FailureKind) -> [f64; 2] {
     |t_p, condition, failure| {
         let metrics = results.record(t_p, condition, failure).unwrap().metrics;
         [metrics.peak_lateral_error_m, metrics.mean_abs_lateral_error_m].map(Option::unwrap)

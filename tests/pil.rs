@@ -41,7 +41,7 @@ struct World {
 }
 
 impl World {
-    const SPEED_MPS: f64 = 20.0;
+    const SPEED_M_PER_S: f64 = 20.0;
     const STIFFNESS_NM_PER_RAD: f64 = 5.18;
     /// Rate of the heading per wheel angle.
     const TURNING_1PS: f64 = 0.262;
@@ -53,7 +53,7 @@ impl World {
         let driver_torque = Torque::from_nm(weaving - 0.2 * self.offset_m - 4.0 * self.heading_rad);
         let wheel_rad = (driver_torque.nm() + self.motor.nm()) / Self::STIFFNESS_NM_PER_RAD;
         self.heading_rad += 1e-3 * Self::TURNING_1PS * wheel_rad;
-        self.offset_m += 1e-3 * Self::SPEED_MPS * self.heading_rad;
+        self.offset_m += 1e-3 * Self::SPEED_M_PER_S * self.heading_rad;
 
         let mut frames = Vec::new();
         let in_cycle = k % 8000;
@@ -78,7 +78,7 @@ impl World {
             frames.push(column.encode((k / 2) as u8));
         }
         if k.is_multiple_of(10) {
-            let speeds = [Speed::from_m_per_s(Self::SPEED_MPS); 2];
+            let speeds = [Speed::from_m_per_s(Self::SPEED_M_PER_S); 2];
             frames.push(Vehicle { speeds }.encode((k / 10) as u8));
             let demand = Demand {
                 engage: in_cycle > 2500,

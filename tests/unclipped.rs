@@ -1,8 +1,9 @@
 //! The envelope is for faults: no limit touches the torque in ordinary driving, with or without the probe.
 
 use haptic_batch::evaluate::DRIVERS_T_P;
-use haptic_batch::experiment::{REMNANT_GUIDED_NM, participants};
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_batch::experiment::REMNANT_GUIDED_NM;
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::participants::participants;
 use haptic_sim::scenario::{Condition, Scenario};
 use haptic_sim::simulation::observe;
 
@@ -22,17 +23,10 @@ fn everyone() -> Vec<(String, Scenario)> {
     let identified = participants().into_iter().map(|participant| {
         let driver = participant.guided;
         let scenario = Scenario::builder()
-            .gains(ArmGains {
-                k_d: driver.k_d,
-                k_hg: driver.k_hg.unwrap(),
-            })
+            .gains(driver.gains())
             .driver(DriverParameters {
-                a1: driver.a_1,
-                a2: driver.a_2,
-                a3: driver.a_3,
-                t_p: driver.t_p,
                 remnant_sd_nm: REMNANT_GUIDED_NM,
-                ..DriverParameters::default()
+                ..driver.parameters()
             });
         let name = format!("participant {}", participant.number);
         (name, scenario.build().unwrap())

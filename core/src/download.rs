@@ -2,21 +2,75 @@
 //!
 //! A set is one [`ParameterWrite`] for each field, in the order of [`PARAMETERS`], from the first to the last
 //! without another field between. That order tells a lost, repeated or swapped frame; so the counter, which is the
-//! field's number modulo 16, only picks the data ID of the CRC. Every frame must find the ECU in Standby.
-//! [`ParameterStatus`] says what became of it.
+//! field's number modulo 16, only picks the data ID of the CRC. [`ParameterStatus`] says what became of it.
+//!
+//! A set is taken in Standby only, or where the ECU is locked for want of one; while the vehicle stands, by both of its
+//! speeds; within two seconds of a [`ParameterUnlock`] that names the set in use, so that a recorded download is none;
+//! and not within ten seconds of a reset, which each set causes. None of this is a secret: it keeps a set from coming by
+//! accident, in traffic, or in a stream that wears out the flash, and no more (`docs/security.md`).
 //!
 //! Nothing here touches the running controller: a set takes effect when the ECU starts with it. Not here: the memory.
 //! Not in the torque path: checking a set is floating-point work.
 
 use crate::bus::Frame;
 use crate::bus::e2e::ReceiverState;
-use crate::bus::messages::{Message, ParameterStatus, ParameterWrite, WriteOutcome};
+use crate::bus::messages::{
+    Message, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, WriteOutcome,
+};
 use crate::config::Config;
+use crate::faults::{Fault, FaultSet};
 use crate::modes::Mode;
 use crate::params::{PARAMETERS, Params};
 use crate::stored::Stored;
 
 const VALUES: usize = PARAMETERS.len();
+/// No field has this index.
+const REFUSED: usize = usize::MAX;
+/// An unlock lasts for so long, ms.
+pub const UNLOCK_MS: u32 = 2000;
+
+/// What a set has to find when it comes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Conditions {
+    /// The ECU's mode; see [`mode_for_parameters`].
+    pub mode: Mode,
+    /// The vehicle stands ([`crate::ecu::Ecu::stands`]).
+    pub stands: bool,
+    /// The last start was a power-up, or is ten seconds ago.
+    pub settled: bool,
+    /// The number of the stored set in use; 0 without one.
+    pub in_use: u32,
+    /// Time since the start, ms, which may wrap.
+    pub now_ms: u32,
+}
+
+/// The mode that a download finds: an ECU that is locked for want of parameters alone takes some, as in Standby.
+#[must_use]
+pub fn mode_for_parameters(mode: Mode, faults: FaultSet) -> Mode {
+    let mut parameters = FaultSet::NONE;
+    parameters.insert(Fault::Parameters);
+    match mode {
+        Mode::Locked if faults.common(FaultSet::LOCKING) == parameters => Mode::Standby,
+        _ => mode,
+    }
+}
+
+/// The frame that has to come before those of a set.
+#[must_use]
+pub fn unlock(in_use: u32) -> Frame {
+    ParameterUnlock { sequence: in_use }.encode(0)
+}
+
+/// The value that is due at a turn, of the set in use.
+#[must_use]
+pub fn value(params: &Params, turn: u32) -> Option<ParameterValue> {
+    let index = turn.checked_rem(VALUES as u32)?;
+    let value = params.to_values().get(index as usize).copied()?;
+    Some(ParameterValue {
+        index: index as u8,
+        value: value as f32,
+    })
+}
 
 /// The frames that carry a set. Values are rounded to f32.
 #[must_use]
@@ -43,6 +97,8 @@ pub struct Download {
     values: [f64; VALUES],
     /// The field that must come next.
     next: usize,
+    /// When it was unlocked.
+    unlocked_ms: Option<u32>,
     outcome: WriteOutcome,
 }
 
@@ -51,39 +107,61 @@ impl Download {
     pub const NEW: Self = Self {
         values: [0.0; VALUES],
         next: 0,
+        unlocked_ms: None,
         outcome: WriteOutcome::None,
     };
 
-    /// Takes a frame; `mode` is the ECU's. Returns the set that it completes, every parameter within its range.
-    /// Other messages, and frames that are damaged on the way, are ignored.
-    pub fn receive(&mut self, frame: &Frame, mode: Mode) -> Option<Params> {
-        if frame.id() != ParameterWrite::ID {
-            return None;
+    /// Takes a frame. Returns the set that it completes, every parameter within its range. Other messages, and frames
+    /// that are damaged on the way, are ignored.
+    pub fn receive(&mut self, frame: &Frame, conditions: &Conditions) -> Option<Params> {
+        match frame.id() {
+            ParameterUnlock::ID => {
+                let unlock = ParameterUnlock::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
+                let is_right = unlock.sequence == conditions.in_use;
+                self.unlocked_ms = is_right.then_some(conditions.now_ms);
+                return None;
+            }
+            ParameterWrite::ID => {}
+            _ => return None,
         }
         // No history: the order of the fields says more than the counter.
         let write = ParameterWrite::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
         let index = usize::from(write.index);
         if index == 0 {
             self.next = 0;
+        } else if self.next == REFUSED {
+            // The rest of a set that was refused: the reason stays.
+            return None;
         }
         let slot = self.values.get_mut(index).filter(|_| index == self.next);
-        self.outcome = match (mode, slot) {
-            (Mode::Standby, Some(slot)) => {
+        let is_unlocked = self
+            .unlocked_ms
+            .is_some_and(|at| conditions.now_ms.wrapping_sub(at) <= UNLOCK_MS);
+        self.outcome = match slot {
+            _ if conditions.mode != Mode::Standby => WriteOutcome::NotInStandby,
+            _ if !conditions.stands => WriteOutcome::NotStanding,
+            _ if !conditions.settled => WriteOutcome::TooSoon,
+            _ if !is_unlocked => WriteOutcome::NotUnlocked,
+            Some(slot) => {
                 *slot = f64::from(write.value);
                 WriteOutcome::Receiving
             }
-            (Mode::Standby, None) => WriteOutcome::OutOfOrder,
-            _ => WriteOutcome::NotInStandby,
+            None => WriteOutcome::OutOfOrder,
         };
+        if self.outcome != WriteOutcome::Receiving {
+            // For one attempt.
+            self.unlocked_ms = None;
+        }
         self.next = match self.outcome {
             WriteOutcome::Receiving => index.saturating_add(1),
             // Only the first field begins a set.
-            _ => usize::MAX,
+            _ => REFUSED,
         };
         if self.next < VALUES || self.outcome != WriteOutcome::Receiving {
             return None;
         }
         let params = Params::from_values(&self.values);
+        self.unlocked_ms = None;
         let is_good = Config::new(&params).is_ok();
         self.outcome = if is_good {
             WriteOutcome::Taken

@@ -312,6 +312,12 @@ impl Ecu {
         frames
     }
 
+    /// Whether the vehicle stands, by both of its speeds; not when they are unknown.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        self.receivers.stands()
+    }
+
     /// The configuration in use, if its copies agree.
     #[must_use]
     pub fn config(&self) -> Option<Config> {

@@ -100,8 +100,14 @@ faults! {
     12 SelfTest: C, Known;
     /// Locked: no good copy of the parameters.
     13 Parameters: Locked, Known;
-    /// Locked: three resets within 10 s.
+    /// Locked: three resets within 10 s, or ten since power-up.
     14 ResetLoop: Locked, Known;
+    /// B: lane previews arrive, and for 30 ms each is too far from the last one used to be true.
+    15 LaneStep: B, Known;
+    /// B: speeds arrive, and for 30 ms each is too far from the last one used to be true.
+    16 SpeedStep: B, Known;
+    /// B: another node sends under an identifier of this ECU; for a second after the last such frame.
+    17 OwnIdentifier: B, Known;
 }
 
 // The word has 32 bits, and a fault's code is its place in the list.

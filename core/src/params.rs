@@ -197,12 +197,14 @@ impl Params {
     /// # Errors
     /// The first parameter that is not a number within its range.
     pub const fn check(&self) -> Result<(), ParamError> {
+        // By reference: a constant indexed by itself would be put on the stack whole.
+        const LIST: &[Parameter] = &PARAMETERS;
         let values = self.to_values();
         let mut i = 0;
-        while i < PARAMETERS.len() {
+        while i < LIST.len() {
             let Parameter {
                 name, unit, min, max, ..
-            } = PARAMETERS[i];
+            } = LIST[i];
             if let Err(error) = in_range(name, values[i], [min, max], unit) {
                 return Err(error);
             }

@@ -2,12 +2,13 @@
 //! core's layout.
 
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
-use haptic_core::bus::Frame;
-use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, MESSAGES, Message, ParameterStatus, ParameterWrite,
-    ResetCause, Telemetry, VERSION, Vehicle, Warning, WriteOutcome,
+    Column, Demand, FaultRecord, Guidance, LanePreview, MESSAGES, Message, ParameterStatus, ParameterUnlock,
+    ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle, Warning,
+    WriteOutcome,
 };
+use haptic_core::bus::{Frame, Reject};
 use haptic_core::envelope::LimitReason;
 use haptic_core::estimator::Reading;
 use haptic_core::faults::{Fault, FaultSet, Record};
@@ -156,7 +157,7 @@ fn guidance() {
     let dbc = dbc();
     for raw in -20_480..=20_480_i32 {
         let torque = f64::from(raw) / 4096.0;
-        let (code, bits) = (raw.rem_euclid(7), (raw & 0x7FFF) as u32);
+        let (code, bits) = (raw.rem_euclid(7), (raw & 0x3_FFFF) as u32);
         let sent = Guidance {
             torque: Torque::from_nm(torque),
             limit: LimitReason::from_code(i64::from(code)).unwrap(),
@@ -171,7 +172,7 @@ fn guidance() {
         assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
         assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code));
-        let classes = [("ClassB", 0x00FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
+        let classes = [("ClassB", 0x3_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
         for (name, mask) in classes {
             assert_eq!(
                 signal(&dbc, &frame, name),
@@ -280,7 +281,7 @@ fn parameters() {
         value: 1.0,
     };
     assert_eq!(ParameterWrite::unpack(beyond.pack()), None);
-    for code in 0..6 {
+    for code in 0..9 {
         let sent = ParameterStatus {
             stored: code % 2 == 0,
             damaged: code % 3 == 0,
@@ -296,6 +297,90 @@ fn parameters() {
             [flag(code % 2 == 0), flag(code % 3 == 0), code as f64, sequence]
         );
         assert_eq!(decode(sent), sent);
+    }
+}
+
+#[test]
+fn unlock_value_and_rejection() {
+    let dbc = dbc();
+    let sent = ParameterUnlock {
+        sequence: 0xFEDC_BA98,
+    };
+    assert_eq!(
+        signal(&dbc, &sent.encode(0), "Sequence"),
+        f64::from(0xFEDC_BA98_u32)
+    );
+    assert_eq!(decode(sent), sent);
+    for (index, value) in [(0, 0.25_f32), (18, 0.7)] {
+        let sent = ParameterValue { index, value };
+        let frame = sent.encode(index);
+        assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
+        assert_eq!(f32::from_bits(signal(&dbc, &frame, "Value") as u32), value);
+        assert_eq!(decode(sent), sent);
+    }
+    for (code, reason) in Reject::ALL.into_iter().enumerate() {
+        let sent = Rejection {
+            id: 0x7FF - code as u16,
+            reason,
+            count: 54_321,
+        };
+        let frame = sent.encode(0);
+        let signals = ["Message", "Reason", "Count"].map(|name| signal(&dbc, &frame, name));
+        assert_eq!(signals, [2047.0 - code as f64, code as f64, 54_321.0]);
+        assert_eq!(decode(sent), sent);
+    }
+}
+
+/// What a client needs to send a frame that is accepted: the data IDs as they are used, and the window of the counter.
+#[test]
+fn the_dbc_file_has_the_data_ids_of_every_message() {
+    let text = include_str!("../haptic.dbc");
+    let attribute = |name: &str, id: u16| {
+        let begin = format!("BA_ \"{name}\" BO_ {id} ");
+        let value = text.split_once(&begin).unwrap().1.split(';').next().unwrap();
+        value.trim_matches('"').to_owned()
+    };
+    for message in MESSAGES {
+        let ids = attribute("E2EDataIds", message.id);
+        let ids: Vec<u8> = ids
+            .split(' ')
+            .map(|hex| u8::from_str_radix(hex, 16).unwrap())
+            .collect();
+        let by_file = Protection::with_list(ids.try_into().unwrap());
+        for counter in 0..16 {
+            let mut data = [0, 0, 1, 2, 3, 4, 5, 6];
+            by_file.protect(&mut data, counter);
+            assert!(message.protection.is_intact(&data), "{} {counter}", message.name);
+        }
+        let constant: u8 = attribute("E2EConstant", message.id).parse().unwrap();
+        assert_eq!(Protection::new(constant), message.protection, "{}", message.name);
+        let max_delta = attribute("E2EMaxDelta", message.id);
+        assert_eq!(max_delta, message.max_delta.to_string(), "{}", message.name);
+    }
+}
+
+/// A tool that shows one signal shows what it is, and names instead of codes; and no two things have one name.
+#[test]
+fn the_dbc_file_explains_every_signal() {
+    let dbc = dbc();
+    let text = include_str!("../haptic.dbc");
+    for message in &dbc.messages {
+        let MessageId::Standard(id) = message.id else {
+            panic!("{} is extended", message.name)
+        };
+        assert!(text.contains(&format!("CM_ BO_ {id} \"")), "{}", message.name);
+        for signal in &message.signals {
+            let comment = format!("CM_ SG_ {id} {} \"", signal.name);
+            assert_eq!(text.matches(&comment).count(), 1, "{}", signal.name);
+            let values = format!("VAL_ {id} {} ", signal.name);
+            let is_flag = signal.size == 1;
+            assert!(!is_flag || text.matches(&values).count() == 1, "{}", signal.name);
+        }
+        assert!(
+            dbc.nodes.iter().all(|node| node.0 != message.name),
+            "{}",
+            message.name
+        );
     }
 }
 
@@ -385,7 +470,7 @@ fn named(signal: &str) -> Vec<(i64, String)> {
 
 /// Names that the code gives them.
 fn coded<T: core::fmt::Debug>(from_code: impl Fn(i64) -> Option<T>) -> Vec<(i64, String)> {
-    (0..16)
+    (0..64)
         .filter_map(|code| from_code(code).map(|value| (code, format!("{value:?}"))))
         .collect()
 }
@@ -402,6 +487,10 @@ fn the_dbc_file_names_every_code() {
         .zip(PARAMETERS.map(|parameter| parameter.name.to_owned()))
         .collect();
     assert_eq!(named("ParameterWrite_Index"), parameters);
+    assert_eq!(named("ParameterValue_Index"), parameters);
+    assert_eq!(named("Rejection_Reason"), coded(Reject::from_code));
+    let messages = MESSAGES.map(|message| (i64::from(message.id), message.name.to_owned()));
+    assert_eq!(named("Rejection_Message"), messages);
 }
 
 /// Names, identifiers, senders and periods: the DBC file, the table in docs/design.md and the list in the code.

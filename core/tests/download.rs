@@ -3,7 +3,8 @@
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Message, ParameterStatus, WriteOutcome};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::download::{Download, frames};
+use haptic_core::download::{Conditions, Download, UNLOCK_MS, frames, mode_for_parameters, unlock, value};
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
 use haptic_core::stored::Stored;
@@ -27,12 +28,32 @@ const SET: Params = Params {
     ..Params::PAPER
 };
 
-/// What a fresh receiver makes of frames.
-fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
+/// Where a set is taken.
+const READY: Conditions = Conditions {
+    mode: Mode::Standby,
+    stands: true,
+    settled: true,
+    in_use: 7,
+    now_ms: 0,
+};
+
+const fn in_mode(mode: Mode) -> Conditions {
+    Conditions { mode, ..READY }
+}
+
+/// A receiver that was unlocked.
+fn unlocked() -> Download {
     let mut download = Download::NEW;
+    assert_eq!(download.receive(&unlock(7), &READY), None);
+    download
+}
+
+/// What such a receiver makes of frames.
+fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
+    let mut download = unlocked();
     let taken = frames
         .iter()
-        .filter_map(|frame| download.receive(frame, mode))
+        .filter_map(|frame| download.receive(frame, &in_mode(mode)))
         .last();
     (taken, download.status(None, false).outcome)
 }
@@ -82,10 +103,10 @@ fn no_other_mode_takes_anything() {
             "{mode:?}"
         );
         // Nor does one frame of a set that comes in another mode.
-        let mut download = Download::NEW;
+        let mut download = unlocked();
         for (i, frame) in frames(&SET).iter().enumerate() {
             let now = if i == 9 { mode } else { Mode::Standby };
-            assert_eq!(download.receive(frame, now), None, "{mode:?}");
+            assert_eq!(download.receive(frame, &in_mode(now)), None, "{mode:?}");
         }
     }
 }
@@ -225,15 +246,22 @@ fn the_ends_of_every_range_are_taken() {
 
 #[test]
 fn a_refused_set_can_be_sent_again() {
-    let mut download = Download::NEW;
+    let mut download = unlocked();
     for frame in &frames(&SET)[1..] {
-        assert_eq!(download.receive(frame, Mode::Standby), None);
+        assert_eq!(download.receive(frame, &READY), None);
     }
-    let taken = frames(&SET)
-        .iter()
-        .filter_map(|frame| download.receive(frame, Mode::Standby))
-        .last();
-    assert_eq!(taken, Some(SET));
+    let again = |download: &mut Download| {
+        frames(&SET)
+            .iter()
+            .filter_map(|frame| download.receive(frame, &READY))
+            .last()
+    };
+    // An unlock is for one attempt.
+    assert_eq!(again(&mut download), None);
+    assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
+    download.receive(&unlock(7), &READY);
+    assert_eq!(again(&mut download), Some(SET));
+    assert_eq!(again(&mut download), None, "and for one set");
 }
 
 #[test]
@@ -252,7 +280,7 @@ fn the_status_names_the_set_in_use() {
     );
 }
 
-/// Three bits have room for eight outcomes; there are six.
+/// Four bits have room for sixteen outcomes; there are nine.
 #[test]
 fn a_status_with_an_outcome_that_is_none_is_refused() {
     let status = |code: u8| {
@@ -264,6 +292,104 @@ fn a_status_with_an_outcome_that_is_none_is_refused() {
         )
     };
     assert_eq!(status(5).map(|status| status.outcome), Ok(WriteOutcome::Taken));
-    assert_eq!(status(6), Err(Reject::Range));
-    assert_eq!(status(7), Err(Reject::Range));
+    assert_eq!(status(8).map(|status| status.outcome), Ok(WriteOutcome::TooSoon));
+    for code in 9..16 {
+        assert_eq!(status(code), Err(Reject::Range));
+    }
+}
+
+/// Each condition by itself, at the first frame and at one in the middle.
+#[test]
+fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
+    let moving = Conditions {
+        stands: false,
+        ..READY
+    };
+    let fresh = Conditions {
+        settled: false,
+        ..READY
+    };
+    let late = Conditions {
+        now_ms: UNLOCK_MS + 1,
+        ..READY
+    };
+    for (conditions, outcome) in [
+        (moving, WriteOutcome::NotStanding),
+        (fresh, WriteOutcome::TooSoon),
+        (late, WriteOutcome::NotUnlocked),
+    ] {
+        for at in [0, 9, 18] {
+            let mut download = unlocked();
+            let taken = frames(&SET).iter().enumerate().any(|(i, frame)| {
+                let now = if i == at { conditions } else { READY };
+                download.receive(frame, &now).is_some()
+            });
+            assert!(!taken, "{outcome:?} at {at}");
+            if at == 18 {
+                assert_eq!(download.status(None, false).outcome, outcome);
+            }
+        }
+    }
+    // At its very end the unlock still holds, across a wrap of the clock too.
+    let mut download = Download::NEW;
+    let begin = Conditions {
+        now_ms: u32::MAX - 5,
+        ..READY
+    };
+    download.receive(&unlock(7), &begin);
+    let end = Conditions {
+        now_ms: UNLOCK_MS - 6,
+        ..READY
+    };
+    let taken = frames(&SET)
+        .iter()
+        .any(|frame| download.receive(frame, &end).is_some());
+    assert!(taken);
+}
+
+/// A download that was recorded unlocks with the number of a set that is no longer in use.
+#[test]
+fn a_recorded_download_is_none() {
+    let recorded: Vec<Frame> = [unlock(7)].into_iter().chain(frames(&SET)).collect();
+    for in_use in [8, 6, 0] {
+        let mut download = Download::NEW;
+        let conditions = Conditions { in_use, ..READY };
+        let taken = recorded
+            .iter()
+            .any(|frame| download.receive(frame, &conditions).is_some());
+        assert!(!taken, "{in_use}");
+        assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
+    }
+}
+
+/// Repair: what is locked because both copies are gone takes a set, what is locked because it resets does not.
+#[test]
+fn an_ecu_that_is_locked_for_want_of_parameters_alone_takes_some() {
+    let [parameters, resets, lane] = [Fault::Parameters, Fault::ResetLoop, Fault::LaneTimeout].map(|fault| {
+        let mut faults = FaultSet::NONE;
+        faults.insert(fault);
+        faults
+    });
+    for (faults, mode) in [
+        (parameters, Mode::Standby),
+        (parameters.union(lane), Mode::Standby),
+        (resets, Mode::Locked),
+        (parameters.union(resets), Mode::Locked),
+    ] {
+        assert_eq!(mode_for_parameters(Mode::Locked, faults), mode, "{faults:?}");
+    }
+    assert_eq!(mode_for_parameters(Mode::Fault, parameters), Mode::Fault);
+    assert_eq!(mode_for_parameters(Mode::Active, FaultSet::NONE), Mode::Active);
+}
+
+#[test]
+fn the_values_in_use_go_round_in_their_order() {
+    let expected = [0.5, 1.5, 0.25, 20.0];
+    for (turn, expected) in (0..).zip(expected) {
+        for round in [0, 19, 190] {
+            let told = value(&SET, turn + round).unwrap();
+            assert_eq!((u32::from(told.index), told.value), (turn, expected));
+        }
+    }
+    assert_eq!(value(&SET, 18).map(|told| told.value), Some(0.75));
 }

@@ -255,12 +255,20 @@ fn a_jump_of_the_lane_or_the_speed_is_rejected_and_becomes_a_fault_when_it_stays
     rig.rejects.clear();
     let (ms, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
     assert!(ms <= 31 + 8, "{ms}");
-    assert!(step.command.faults.contains(Fault::LaneTimeout));
+    assert!(step.command.faults.contains(Fault::LaneStep));
+    assert!(
+        !step.command.faults.contains(Fault::LaneTimeout),
+        "frames do arrive"
+    );
     assert!(rig.rejects.len() >= 3 && rig.rejects.iter().all(|r| *r == Reject::Step));
     let mut rig = Rig::active_in_curve(1.0);
     rig.speeds = [rig::SPEED + 1.5; 2];
     let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
-    assert!(step.command.faults.contains(Fault::SpeedTimeout));
+    assert!(step.command.faults.contains(Fault::SpeedStep));
+    assert!(
+        !step.command.faults.contains(Fault::SpeedTimeout),
+        "frames do arrive"
+    );
 }
 
 #[test]

@@ -108,7 +108,7 @@ impl Events {
 
 /// Operates an ECU for so many cycles, restarting it some time after each latched fault. `start_us` is what the
 /// microsecond clock shows at first.
-fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; 16]) {
+fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; Fault::COUNT]) {
     let mut events = Events {
         rng: SmallRng::seed_from_u64(seed),
         ends_at: 0,
@@ -125,7 +125,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; 16]) {
     rig.clock_start_us = start_us;
     rig.ecu = InjectedEcu::new(Ecu::new(Some(&setup), Boot::default(), rig.now()));
     let mut watch = Watch::new(limit);
-    let mut faults = [0; 16];
+    let mut faults = [0; Fault::COUNT];
     let mut before = FaultSet::NONE;
     let mut dead = 0;
     for _ in 0..cycles {
@@ -167,13 +167,13 @@ fn randomised_operation_across_wraps_of_the_clock() {
         text.parse().expect("HAPTIC_CYCLES: a number of cycles")
     });
     // Three runs, each starting half a minute before a wrap, so that a short test crosses three.
-    let (mut steps, mut wraps, mut modes, mut limits, mut faults) = (0, 0, [0; 7], [0; 8], [0; 16]);
+    let (mut steps, mut wraps, mut modes, mut limits, mut faults) = (0, 0, [0; 7], [0; 8], [0; Fault::COUNT]);
     for seed in 0..3 {
         let (watch, wrapped, found) = operate(seed, cycles / 3, u32::MAX - 30_000_000);
         (steps, wraps) = (steps + watch.steps, wraps + wrapped);
         (0..7).for_each(|i| modes[i] += watch.by_mode[i]);
         (0..8).for_each(|i| limits[i] += watch.by_limit[i]);
-        (0..16).for_each(|i| faults[i] += found[i]);
+        (0..Fault::COUNT).for_each(|i| faults[i] += found[i]);
     }
     println!("{steps} cycles, {wraps} wraps; by mode {modes:?}, by limit {limits:?}, faults {faults:?}");
     assert_eq!(steps, cycles / 3 * 3);

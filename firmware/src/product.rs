@@ -15,13 +15,15 @@
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
-use haptic_core::bus::messages::{Column, Message, ParameterStatus, ResetCause};
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::{Column, Message, ParameterStatus, ParameterValue, Rejection, ResetCause};
 use haptic_core::config::Setup;
-use haptic_core::controller::Command;
-use haptic_core::download::Download;
+use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
+use haptic_core::params::Params;
+use haptic_core::rejections::Rejections;
 
 use crate::boards::{Board, ThisBoard};
 use crate::storage::{self, Found};
@@ -29,6 +31,11 @@ use crate::{analogue, image, reset, stack};
 
 /// Steps between two lines of the log: one second.
 const STEPS_PER_REPORT: u32 = 1000;
+/// Steps between two parameters in use, and two counts of rejections, on the bus; these half a turn apart, and neither in
+/// a step with a warning or a line of the fault history, which come on multiples of 50.
+const STEPS_PER_LINE: u32 = 100;
+const VALUE_AT: u32 = 25;
+const REJECTION_AT: u32 = 75;
 /// Steps after which earlier resets no longer count: 10 s.
 const STEPS_TO_SETTLE: u32 = 10_000;
 
@@ -37,11 +44,13 @@ const STEPS_TO_SETTLE: u32 = 10_000;
 struct Counts {
     steps: u32,
     received: u32,
-    rejected: u32,
+    rejected: Rejections,
     unsent: u32,
     /// Cycles of the frames received since the last step, and the most that they and a step took.
     receiving: u32,
     worst_cycles: u32,
+    /// The last count that the log told.
+    told: Option<Rejection>,
     /// Faults that the record of resets holds already.
     latched: FaultSet,
 }
@@ -49,15 +58,29 @@ struct Counts {
 /// What has to do with parameters.
 struct Service {
     download: Download,
-    /// The mode of the last step.
+    /// As the download sees it, of the last step.
     mode: Mode,
     found: Found,
+    /// The set in use; None while the controller is locked for want of one.
+    in_use: Option<Params>,
+    boot: Boot,
 }
 
 impl Service {
     fn status(&self) -> ParameterStatus {
         let is_damaged = self.found.damaged != [false, false];
         self.download.status(self.found.stored.as_ref(), is_damaged)
+    }
+
+    /// What a set finds that comes now.
+    fn conditions(&self, ecu: &Ecu, steps: u32) -> Conditions {
+        Conditions {
+            mode: self.mode,
+            stands: ecu.stands(),
+            settled: self.boot.reset == ResetCause::PowerOn || steps >= STEPS_TO_SETTLE,
+            in_use: self.found.stored.map_or(0, |stored| stored.sequence),
+            now_ms: steps,
+        }
     }
 }
 
@@ -75,12 +98,15 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     } else {
         Found::default()
     };
-    let setup = setup(&found).filter(|_| is_sound);
+    let params = params(&found).filter(|_| is_sound);
+    let setup = params.and_then(|params| Setup::new(&params).ok());
     let ecu = begin(ecu, setup.as_ref(), boot);
     let mut service = Service {
         download: Download::NEW,
         mode: Mode::Boot,
         found,
+        in_use: params,
+        boot,
     };
     let mut counts = Counts::default();
     defmt::info!(
@@ -109,12 +135,14 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
                 continue;
             }
             let start = ThisBoard::cycles();
-            if ecu.receive(&frame, ThisBoard::now()).is_err() {
-                counts.rejected = counts.rejected.wrapping_add(1);
-            }
+            let received = ecu.receive(&frame, ThisBoard::now());
             let cycles = ThisBoard::cycles().wrapping_sub(start);
             counts.receiving = counts.receiving.wrapping_add(cycles);
-            if let Some(params) = service.download.receive(&frame, service.mode) {
+            if let Err(reason) = received {
+                counts.rejected.count(frame.id(), reason);
+            }
+            let conditions = service.conditions(ecu, counts.steps);
+            if let Some(params) = service.download.receive(&frame, &conditions) {
                 ThisBoard::zero_torque();
                 reset::restart_with(&params);
             }
@@ -149,23 +177,12 @@ fn begin(ecu: &'static mut Option<Ecu>, setup: Option<&Setup>, boot: Boot) -> &'
 }
 
 /// What the controller starts with; None locks it.
-fn setup(found: &Found) -> Option<Setup> {
+fn params(found: &Found) -> Option<Params> {
     match found.stored {
-        Some(stored) => Setup::new(&stored.params).ok(),
+        Some(stored) => Some(stored.params),
         None if found.damaged == [true, true] => None,
         // A vehicle that was set up for less must not get the paper's 5 N.m because its flash was erased.
-        None => cfg!(feature = "bench").then_some(Setup::PAPER),
-    }
-}
-
-/// The mode as the download sees it: an ECU that is locked for want of parameters alone takes some.
-fn service_mode(command: &Command) -> Mode {
-    let mut parameters = FaultSet::NONE;
-    parameters.insert(Fault::Parameters);
-    let is_for_parameters = command.faults.common(FaultSet::LOCKING) == parameters;
-    match command.mode {
-        Mode::Locked if is_for_parameters => Mode::Standby,
-        mode => mode,
+        None => cfg!(feature = "bench").then_some(Params::PAPER),
     }
 }
 
@@ -178,8 +195,8 @@ fn control(board: &mut ThisBoard, ecu: &mut Ecu, counts: &mut Counts) -> Step {
     {
         // By the codec, as from the bus: what judges a sample there judges it here.
         let frame = column.encode(counts.steps as u8);
-        if ecu.receive(&frame, ThisBoard::now()).is_err() {
-            counts.rejected = counts.rejected.wrapping_add(1);
+        if let Err(reason) = ecu.receive(&frame, ThisBoard::now()) {
+            counts.rejected.count(frame.id(), reason);
         }
     }
     let start = ThisBoard::cycles();
@@ -211,13 +228,14 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
-    service.mode = service_mode(&step.command);
+    service.mode = mode_for_parameters(step.command.mode, step.command.faults);
     // The torque is on its way; what follows may take its time.
     let status = counts.steps.is_multiple_of(STEPS_PER_REPORT).then(|| {
         let turn = counts.steps / STEPS_PER_REPORT;
         service.status().encode(turn as u8)
     });
-    for frame in ecu.background_step().iter().chain(&status) {
+    let line = line(service, counts);
+    for frame in ecu.background_step().iter().chain(&status).chain(&line) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }
@@ -235,12 +253,36 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             "steps {=u32}, received {=u32}, rejected {=u32}, unsent {=u32}, worst step {=u32} cycles, stack {=u32} of {=u32}",
             counts.steps,
             counts.received,
-            counts.rejected,
+            counts.rejected.total(),
             counts.unsent,
             counts.worst_cycles,
             stack::used(),
             stack::budget()
         );
+    }
+}
+
+/// A parameter in use or a count of rejections, when it is its turn.
+fn line(service: &Service, counts: &mut Counts) -> Option<Frame> {
+    let turn = counts.steps / STEPS_PER_LINE;
+    match counts.steps % STEPS_PER_LINE {
+        VALUE_AT => {
+            let value: ParameterValue = download::value(service.in_use.as_ref()?, turn)?;
+            Some(value.encode(turn as u8))
+        }
+        REJECTION_AT => {
+            let line: Rejection = counts.rejected.line()?;
+            if counts.told.replace(line) != Some(line) {
+                defmt::warn!(
+                    "message {=u16:#05x} was not used {=u16} times, reason {=u8}",
+                    line.id,
+                    line.count,
+                    line.reason as u8
+                );
+            }
+            Some(line.encode(turn as u8))
+        }
+        _ => None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! The stack: its budget, the guard below it, and how much of it was ever used.
+//! The stack: its budget, the MPU guard below it, and how much of it was ever used.
 //!
 //! `stack.x` places the budget at the end of RAM and the guard below. The guard is a region of the memory
 //! protection unit that nothing may touch: a stack that outgrows its budget faults at once instead of

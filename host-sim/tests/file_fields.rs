@@ -10,7 +10,7 @@ use haptic_sim::scenario::Scenario;
 
 /// A row of a table.
 #[derive(Debug, Clone)]
-struct Row {
+struct DocumentedField {
     /// Table of the field in the file; empty at the top.
     table: String,
     field: String,
@@ -20,7 +20,7 @@ struct Row {
     default: Option<String>,
 }
 
-impl Row {
+impl DocumentedField {
     fn name(&self) -> String {
         match self.table.as_str() {
             "" => self.field.clone(),
@@ -36,7 +36,7 @@ impl Row {
 }
 
 /// The rows below a heading of the document.
-fn rows(heading: &str) -> Vec<Row> {
+fn rows(heading: &str) -> Vec<DocumentedField> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/files.md");
     let text = std::fs::read_to_string(path).unwrap();
     let start = text.find(&format!("\n## {heading}\n")).unwrap() + 4;
@@ -50,7 +50,7 @@ fn rows(heading: &str) -> Vec<Row> {
         assert!(!meaning.trim().is_empty(), "{line}");
         let name = bare(name);
         let (table, field) = name.split_once('.').unwrap_or(("", &name));
-        Row {
+        DocumentedField {
             table: table.into(),
             field: field.into(),
             unit: bare(unit),
@@ -66,7 +66,7 @@ fn rows(heading: &str) -> Vec<Row> {
 }
 
 /// A scenario in which one field has a value.
-fn scenario_text(row: &Row, value: &str) -> String {
+fn scenario_text(row: &DocumentedField, value: &str) -> String {
     let set = |field: &str| format!("{field} = {value}\n");
     match row.table.as_str() {
         "" => set(&row.field),
@@ -206,7 +206,7 @@ fn the_example_with_every_field_has_every_field() {
             found.insert(format!("{table}{field}"));
         }
     }
-    let document: BTreeSet<_> = rows("Scenario").iter().map(Row::name).collect();
+    let document: BTreeSet<_> = rows("Scenario").iter().map(DocumentedField::name).collect();
     assert_eq!(found, document);
 }
 

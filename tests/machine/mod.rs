@@ -2,6 +2,8 @@
 //!
 //! QEMU counts instructions, so the machine's time is that of its program and no load of this computer moves it.
 
+#![allow(dead_code, reason = "each test that has this module uses its own part of it")]
+
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

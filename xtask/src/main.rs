@@ -18,6 +18,7 @@ mod seal;
 mod size;
 mod speed;
 mod tool;
+mod wheel;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,7 +36,11 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Everything that CI checks, the tests last. Installs the tools it needs where it may.
-    Ci,
+    Ci {
+        /// Format, clippy, documentation, tests of the libraries and doctests alone, for daily work: no QEMU, no valgrind.
+        #[arg(long)]
+        quick: bool,
+    },
     /// Proves on the linked image that the controller has no panic path and no float.
     Gate,
     /// Instructions of a control step: on the host, against xtask/golden.json; in QEMU; or cycles, on a board.
@@ -80,6 +85,8 @@ enum Command {
         /// The ELF of steering-ecu, changed in place.
         elf: PathBuf,
     },
+    /// Builds the Python wheel into target/dist, and says what it weighs and links.
+    Wheel(wheel::Options),
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -102,7 +109,8 @@ enum Bench {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Ci => ci::run_all(),
+        Command::Ci { quick: true } => ci::run_quick(),
+        Command::Ci { quick: false } => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
         Command::Mutants { by_hand: true, .. } => by_hand::run(),
@@ -111,6 +119,7 @@ fn main() -> ExitCode {
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
+        Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed),
             ..

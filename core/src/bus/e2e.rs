@@ -86,6 +86,7 @@ impl Protection {
 /// Why a frame was not accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
+#[repr(u8)]
 pub enum Reject {
     /// Not eight bytes long.
     Length,
@@ -103,6 +104,31 @@ pub enum Reject {
     Step,
     /// The sample was true before the last one was.
     Older,
+    /// The identifier is this ECU's: another node sends in its name.
+    OwnIdentifier,
+}
+
+impl Reject {
+    /// Every reason, in the order of its codes on the bus.
+    pub const ALL: [Self; 9] = [
+        Self::Length,
+        Self::Crc,
+        Self::Repeated,
+        Self::Jump,
+        Self::NotTrusted,
+        Self::Range,
+        Self::Step,
+        Self::Older,
+        Self::OwnIdentifier,
+    ];
+
+    /// The reason of a code on the bus.
+    #[must_use]
+    pub fn from_code(code: i64) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|reason| i64::from(*reason as u8) == code)
+    }
 }
 
 words! {

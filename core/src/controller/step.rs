@@ -120,9 +120,17 @@ impl<I: Injection> Step<'_, I> {
         }
         v.age.request = self.age(request, v.age.request);
 
-        lost.insert_if(lane.value().is_none(), Fault::LaneTimeout);
+        // A frame that arrives and is refused is no time-out: the fault that says so came with the inputs.
+        let refused = |fault| self.inputs.faults.contains(fault);
+        lost.insert_if(
+            lane.value().is_none() && !refused(Fault::LaneStep),
+            Fault::LaneTimeout,
+        );
         lost.insert_if(column.value().is_none(), Fault::ColumnTimeout);
-        lost.insert_if(speeds.value().is_none(), Fault::SpeedTimeout);
+        lost.insert_if(
+            speeds.value().is_none() && !refused(Fault::SpeedStep),
+            Fault::SpeedTimeout,
+        );
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
         v.implausible = implausible.bits();
         lost
@@ -218,6 +226,8 @@ impl<I: Injection> Step<'_, I> {
             return HISTORY;
         }
         lost_for(Fault::LaneTimeout, v.age.lane)
+            .max(lost_for(Fault::LaneStep, v.age.lane))
+            .max(lost_for(Fault::SpeedStep, v.age.speeds))
             .max(lost_for(Fault::ColumnTimeout, v.age.column))
             .max(lost_for(Fault::SpeedTimeout, v.age.speeds))
             .max(lost_for(Fault::CommandTimeout, v.age.request))

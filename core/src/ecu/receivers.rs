@@ -5,7 +5,10 @@
 
 use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
-use crate::bus::messages::{Column as ColumnMessage, Demand, LanePreview, Message, TIMEOUT, Vehicle};
+use crate::bus::messages::{
+    Column as ColumnMessage, Demand, FaultRecord, Guidance, LanePreview, Message, ParameterStatus,
+    ParameterValue, Rejection, TIMEOUT, Telemetry, Vehicle, Warning,
+};
 use crate::bus::{Frame, Reject};
 use crate::controller::{Column, Input, Inputs, Request};
 use crate::faults::{Fault, FaultSet};
@@ -14,8 +17,12 @@ use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 use crate::redundant::{Redundant, Words, words};
 
+/// The column's frames come at this rate.
+const COLUMN_PERIOD_US: u32 = 2000;
 /// Spans beyond half a wrap of the clock are negative.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
+/// Slower is standing.
+const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
 
 /// The latest value of one input, with what judges the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,12 +31,20 @@ pub(super) struct Slot<T> {
     e2e: ReceiverState,
     /// [`LOST`], [`HELD`] or [`NEW`], as an [`Input`].
     state: u32,
-    /// 1 when the sender did not vouch for its last value.
-    invalid: u32,
+    /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason.
+    doubt: u32,
     /// When it was true.
     at: Instant,
     value: T,
 }
+
+/// Its sender did not vouch for it.
+const INVALID: u32 = 1;
+/// It was too far from the last one used.
+const STEP: u32 = 2;
+
+/// So many steps after a frame under an identifier of this ECU, that is still a fault: a second.
+const FOREIGN_STEPS: u32 = 1000;
 
 /// Nothing heard, or not for too long.
 const LOST: u32 = 0;
@@ -43,7 +58,7 @@ impl<T: Words> Words for Slot<T> {
         Self {
             e2e: self.e2e.map_words(change),
             state: change(self.state),
-            invalid: change(self.invalid),
+            doubt: change(self.doubt),
             at: self.at.map_words(change),
             value: self.value.map_words(change),
         }
@@ -52,7 +67,7 @@ impl<T: Words> Words for Slot<T> {
     fn is_inverse_of(&self, other: &Self) -> bool {
         self.e2e.is_inverse_of(&other.e2e)
             & self.state.is_inverse_of(&other.state)
-            & self.invalid.is_inverse_of(&other.invalid)
+            & self.doubt.is_inverse_of(&other.doubt)
             & self.at.is_inverse_of(&other.at)
             & self.value.is_inverse_of(&other.value)
     }
@@ -64,7 +79,7 @@ impl<T: Words> Slot<T> {
         Redundant::new(Self {
             e2e,
             state: LOST,
-            invalid: 0,
+            doubt: 0,
             at: now,
             value,
         })
@@ -131,6 +146,9 @@ pub(super) struct Receivers {
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
     pub(super) accepted: Accepted,
+    /// Steps for which a frame under an identifier of this ECU is still a fault. Not kept twice: a flip raises the fault
+    /// for a while, or ends it early.
+    foreign: u32,
 }
 
 impl Receivers {
@@ -157,6 +175,7 @@ impl Receivers {
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::default(),
+            foreign: 0,
         }
     }
 
@@ -168,7 +187,7 @@ impl Receivers {
         match frame.id() {
             LanePreview::ID => self.lane.change(|slot| {
                 let lane = LanePreview::decode(&mut slot.e2e, frame)?;
-                slot.invalid = u32::from(!lane.valid);
+                slot.doubt = u32::from(!lane.valid);
                 if !lane.valid {
                     return Ok(());
                 }
@@ -185,6 +204,7 @@ impl Receivers {
                         return Err(Reject::Older);
                     }
                     if !lane_step_is_possible(&last, &sample) {
+                        slot.doubt = STEP;
                         return Err(Reject::Step);
                     }
                 }
@@ -193,7 +213,11 @@ impl Receivers {
                 Ok(())
             }),
             ColumnMessage::ID => self.column.change(|slot| {
-                let c = ColumnMessage::decode(&mut slot.e2e, frame)?;
+                // The longer ago the last one, the more may have been lost: at once no more than three, so that few of
+                // the sixteen counters let an old frame pass.
+                let since = now.since(slot.at).us() / COLUMN_PERIOD_US;
+                let window = since.saturating_add(u32::from(ColumnMessage::MAX_DELTA)).min(14);
+                let c = ColumnMessage::decode_within(&mut slot.e2e, frame, window as u8)?;
                 let column = Column {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
@@ -211,8 +235,10 @@ impl Receivers {
                         .all(|(last, new)| speed_step_is_possible(*last, *new))
                 };
                 if slot.last().is_some_and(|last| !follows(last)) {
+                    slot.doubt = STEP;
                     return Err(Reject::Step);
                 }
+                slot.doubt = 0;
                 slot.put(speeds, now);
                 Ok(())
             }),
@@ -227,8 +253,25 @@ impl Receivers {
                 accepted.demand = frame.full_data();
                 Ok(())
             }),
+            // On a bus nobody hears itself.
+            Guidance::ID
+            | Warning::ID
+            | FaultRecord::ID
+            | Telemetry::ID
+            | ParameterStatus::ID
+            | ParameterValue::ID
+            | Rejection::ID => {
+                self.foreign = FOREIGN_STEPS;
+                Some(Err(Reject::OwnIdentifier))
+            }
             _ => Some(Ok(())),
         }
+    }
+
+    /// Whether the vehicle stands: both speeds are known and next to nothing.
+    pub(super) fn stands(&self) -> bool {
+        let speeds = self.speeds.get().and_then(Slot::last);
+        speeds.is_some_and(|speeds| speeds.iter().all(|speed| *speed <= STANDSTILL))
     }
 
     /// The last lane preview passes for one that came now.
@@ -238,14 +281,23 @@ impl Receivers {
 
     /// What a step sees, or `None` if a receiver is damaged.
     pub(super) fn take(&mut self, now: Instant) -> Option<Inputs> {
-        let (lane, invalid) = self.lane.change(|slot| (slot.take(now), slot.invalid != 0))?;
+        let (lane, lane_doubt) = self.lane.change(|slot| (slot.take(now), slot.doubt))?;
+        let (speeds, speeds_doubt) = self.speeds.change(|slot| (slot.take(now), slot.doubt))?;
         let mut faults = FaultSet::NONE;
-        // An invalid preview is the reason of a time-out, not a fault by itself: one may be a blink.
-        faults.insert_if(lane == Input::Lost && invalid, Fault::LaneInvalid);
+        // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
+        if lane == Input::Lost {
+            faults.insert_if(lane_doubt == INVALID, Fault::LaneInvalid);
+            faults.insert_if(lane_doubt == STEP, Fault::LaneStep);
+        }
+        faults.insert_if(speeds == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
+        if self.foreign > 0 {
+            self.foreign = self.foreign.saturating_sub(1);
+            faults.insert(Fault::OwnIdentifier);
+        }
         Some(Inputs {
             lane,
             column: self.column.change(|slot| slot.take(now))?,
-            speeds: self.speeds.change(|slot| slot.take(now))?,
+            speeds,
             request: self.request.change(|slot| slot.take(now).map(Request::from))?,
             faults,
         })

@@ -224,6 +224,8 @@ impl Watch {
     fn trusted(&self, heard: &Heard, t_us: u64, faults: FaultSet) -> f64 {
         let silences = [
             (Fault::LaneTimeout, heard.lane.map(|l| l.1)),
+            (Fault::LaneStep, heard.lane.map(|l| l.1)),
+            (Fault::SpeedStep, heard.speeds),
             (Fault::ColumnTimeout, heard.driver.map(|d| d.1)),
             (Fault::SpeedTimeout, heard.speeds),
             (Fault::CommandTimeout, heard.engage.map(|e| e.1)),

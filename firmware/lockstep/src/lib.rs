@@ -171,12 +171,17 @@ impl Start {
     /// # Errors
     /// The first parameter out of its range.
     pub fn ecu(self, params: &Params) -> Result<Ecu, ParamError> {
-        let setup = Setup::new(params)?;
-        Ok(match self.state {
-            StartState::Boot(boot) => Ecu::new(Some(&setup), boot, self.at),
+        Ok(self.ecu_with(&Setup::new(params)?))
+    }
+
+    /// The same with parameters that are checked already.
+    #[must_use]
+    pub fn ecu_with(self, setup: &Setup) -> Ecu {
+        match self.state {
+            StartState::Boot(boot) => Ecu::new(Some(setup), boot, self.at),
             StartState::WithoutParameters(boot) => Ecu::new(None, boot, self.at),
-            StartState::Engaged => Ecu::engaged(&setup, self.at),
-        })
+            StartState::Engaged => Ecu::engaged(setup, self.at),
+        }
     }
 }
 

@@ -14,7 +14,7 @@ pub const MAX_LOAD: f64 = 0.6;
 
 /// One message of the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Row {
+pub struct MessageLoad {
     /// Name in the DBC file.
     pub message: &'static str,
     /// CAN identifier.
@@ -35,11 +35,11 @@ pub fn worst_case_bits(data_bytes: u32) -> u32 {
 
 /// Every message of a vehicle's bus, most urgent first.
 #[must_use]
-pub fn table() -> Vec<Row> {
+pub fn table() -> Vec<MessageLoad> {
     let bits = worst_case_bits(8);
     MESSAGES
         .iter()
-        .map(|message| Row {
+        .map(|message| MessageLoad {
             message: message.name,
             id: message.id,
             period_ms: message.period_ms,

@@ -25,12 +25,12 @@ pub struct Evaluation {
     /// runs whose guidance input fails.
     pub runs: Vec<(Scenario, Run)>,
     /// What is handed on.
-    pub results: Results,
+    pub results: EvaluationResults,
 }
 
 /// The results of an evaluation, as JSON holds them.
 #[derive(Debug, Clone, Serialize)]
-pub struct Results {
+pub struct EvaluationResults {
     /// Name of the course.
     pub course: String,
     /// Its length, m.
@@ -52,7 +52,7 @@ pub struct Results {
     pub notes: Vec<String>,
 }
 
-impl Results {
+impl EvaluationResults {
     /// The record of a run, if there is one.
     pub fn record(&self, t_p: f64, condition: Condition, failure: FailureKind) -> Option<&RunRecord> {
         self.runs
@@ -100,7 +100,7 @@ pub fn evaluate(
         .map(|(scenario, run)| RunRecord::new(scenario, run, window, peak_without_failure(scenario)))
         .collect();
     let notes = failure_notes(base.failure().time_s, &records, window);
-    let mut results = Results {
+    let mut results = EvaluationResults {
         course: base.course().name().into(),
         course_length_m: base.course().length_m(),
         speed_kmh: base.speed_kmh(),

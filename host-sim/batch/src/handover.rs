@@ -8,7 +8,7 @@
 //! A row is *judged* for high and mid reliance, and where the manual driver is stable: the driver has to be able to
 //! take over. Stable means that the manual driver's error dies down on the last straight, 24 s long: its largest
 //! value in the second half is at most 0.9 times that of the whole. Low reliance is shown, not judged: this driver
-//! drives nearly as manually, works against the guidance until he notices, and has least to lose by its absence.
+//! drives nearly as manually, works against the guidance until the failure is noticed, and has least to lose by its absence.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -34,7 +34,7 @@ const LAST_STRAIGHT_M: f64 = 400.0;
 
 /// One speed, delay and reliance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Row {
+pub struct HandoverRow {
     /// Speed, km/h.
     pub speed_kmh: f64,
     /// Processing delay, s.
@@ -57,7 +57,7 @@ pub struct Row {
     pub loss_ratio: Option<f64>,
 }
 
-impl Row {
+impl HandoverRow {
     /// Whether the row has to keep the bound.
     pub fn is_judged(&self) -> bool {
         self.manual_stable && self.condition != Condition::Low
@@ -71,9 +71,9 @@ impl Row {
 
 /// What the study found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Results {
+pub struct HandoverResults {
     /// By speed, delay and reliance.
-    pub rows: Vec<Row>,
+    pub rows: Vec<HandoverRow>,
     /// Largest handover ratio of the judged rows.
     pub largest_judged_ratio: f64,
     /// Most that it may be.
@@ -84,25 +84,25 @@ pub struct Results {
 ///
 /// # Errors
 /// As [`haptic_sim::scenario::ScenarioBuilder::build`]; none of these scenarios meets one.
-pub fn study(progress: impl Fn() + Sync) -> Result<Results, String> {
+pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
         .flat_map(|kmh| DRIVERS_T_P.map(|t_p| (*kmh, t_p)))
         .collect();
-    let rows: Vec<Vec<Row>> = cases
+    let rows: Vec<Vec<HandoverRow>> = cases
         .into_par_iter()
         .map(|(kmh, t_p)| rows_of(kmh, t_p, &progress))
         .collect::<Result<_, String>>()?;
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let rows: Vec<HandoverRow> = rows.into_iter().flatten().collect();
     let judged = rows.iter().filter(|row| row.is_judged());
-    Ok(Results {
+    Ok(HandoverResults {
         largest_judged_ratio: judged.filter_map(|row| row.handover_ratio).fold(0.0, f64::max),
         most: MOST,
         rows,
     })
 }
 
-fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<Row>, String> {
+fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<HandoverRow>, String> {
     let course = stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?;
     let run = |condition: Condition, kind| {
         let scenario = Scenario::builder()
@@ -135,7 +135,7 @@ fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Ve
         let (handover_m, loss_m) = (peak(FailureKind::Input)?, peak(FailureKind::Torque)?);
         let larger_m = nominal_m.zip(manual_m).map(|(a, b)| a.max(b));
         let ratio = |failed: Option<f64>| failed.zip(larger_m).map(|(a, b)| a / b);
-        rows.push(Row {
+        rows.push(HandoverRow {
             speed_kmh,
             t_p,
             condition,

@@ -38,7 +38,7 @@ impl RunRecord {
         });
         let first_failed = |time_s| run.trace.samples.iter().find(|sample| sample.time_s >= time_s);
         let circumstances = Circumstances {
-            speed_m_s: scenario.speed_mps(),
+            speed_m_s: scenario.speed_m_per_s(),
             lane_width_m: scenario.course().lane_width_m(),
             window: Some(window),
             failure,

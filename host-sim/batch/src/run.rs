@@ -44,7 +44,7 @@ pub struct SingleResults {
     /// Seed of the remnant.
     pub seed: u64,
     /// The ECU's last estimate of K_hg and its standard deviation, if it identified any.
-    pub reliance: Option<[f64; 2]>,
+    pub k_hg: Option<[f64; 2]>,
     /// Stretch that was measured, m: the paper's curve on its course, else all of it.
     pub window_m: [f64; 2],
     /// The run's record.
@@ -94,7 +94,7 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
         sensors: scenario.sensors(),
         failure_time_s: scenario.failure().at_s(),
         seed: scenario.seed(),
-        reliance: readings.readings.iter().rev().find_map(|r| r.estimate),
+        k_hg: readings.readings.iter().rev().find_map(|r| r.estimate),
         window_m: [window.from_m, window.to_m],
         record,
         notes: failure_notes(scenario.failure().time_s, &[record], window),

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::table::{Class, Place, Row};
-use super::trial::{Outcome, World};
+use super::table::{Class, FaultCase, Place};
+use super::trial::{TrialOutcome, World};
 
 /// What a campaign showed.
 #[derive(Debug, Clone, Serialize)]
@@ -14,11 +14,11 @@ pub struct Campaign {
     /// ECU cycles in which every rule was checked.
     pub cycles: u64,
     /// Row by row.
-    pub rows: Vec<RowResult>,
+    pub rows: Vec<CaseResult>,
 }
 
 impl Campaign {
-    pub(super) fn of(rows: Vec<RowResult>) -> Self {
+    pub(super) fn of(rows: Vec<CaseResult>) -> Self {
         Self {
             runs: rows.iter().map(|row| row.runs).sum(),
             cycles: rows.iter().map(|row| row.cycles).sum(),
@@ -27,14 +27,14 @@ impl Campaign {
     }
 
     /// Every run that failed.
-    pub fn failures(&self) -> impl Iterator<Item = &Failure> {
+    pub fn failures(&self) -> impl Iterator<Item = &FailedTrial> {
         self.rows.iter().flat_map(|row| &row.failures)
     }
 }
 
 /// What a row's runs showed.
 #[derive(Debug, Clone, Serialize)]
-pub struct RowResult {
+pub struct CaseResult {
     /// The row.
     pub name: &'static str,
     /// Its class.
@@ -56,12 +56,12 @@ pub struct RowResult {
     /// Largest torque seen, N.m.
     pub peak_torque_nm: f64,
     /// What failed, by seed.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<FailedTrial>,
 }
 
 /// A run that failed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Failure {
+pub struct FailedTrial {
     /// Its row.
     pub row: &'static str,
     /// Its seed.
@@ -77,15 +77,15 @@ pub struct Failure {
 /// Runs each row with `seeds`; `done` is called after every run.
 pub fn run(
     world: &World,
-    rows: &[&'static Row],
+    rows: &[&'static FaultCase],
     seeds: std::ops::Range<u64>,
     done: impl Fn() + Sync,
 ) -> Campaign {
-    let trials: Vec<(&'static Row, u64)> = rows
+    let trials: Vec<(&'static FaultCase, u64)> = rows
         .iter()
         .flat_map(|row| seeds.clone().map(|seed| (*row, seed)))
         .collect();
-    let outcomes: Vec<Outcome> = trials
+    let outcomes: Vec<TrialOutcome> = trials
         .par_iter()
         .map(|(row, seed)| {
             let outcome = world.run(row, *seed);
@@ -94,7 +94,7 @@ pub fn run(
         })
         .collect();
     let per_row = (seeds.end - seeds.start).max(1) as usize;
-    let rows: Vec<RowResult> = rows
+    let rows: Vec<CaseResult> = rows
         .iter()
         .zip(outcomes.chunks(per_row))
         .map(|(row, outcomes)| result(row, outcomes, ""))
@@ -103,21 +103,21 @@ pub fn run(
 }
 
 /// What a row's runs showed; `again` is what its command needs beside row and seed.
-pub(super) fn result(row: &'static Row, outcomes: &[Outcome], again: &str) -> RowResult {
+pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: &str) -> CaseResult {
     let failures = outcomes.iter().filter_map(|outcome| {
-        let broken = outcome.failure.as_ref()?;
-        Some(Failure {
+        let violation = outcome.failure.as_ref()?;
+        Some(FailedTrial {
             row: row.name,
             seed: outcome.seed,
-            cycle: broken.step,
-            what: broken.what.clone(),
+            cycle: violation.step,
+            what: violation.what.clone(),
             replay: format!(
                 "host-sim faults --rows {} --seed {}{again}",
                 row.name, outcome.seed
             ),
         })
     });
-    RowResult {
+    CaseResult {
         name: row.name,
         class: row.class,
         place: row.place,

@@ -1,6 +1,6 @@
 //! The table of faults in words, as `host-sim faults --list` prints it and `docs/safety.md` holds it.
 
-use super::table::{Expect, GROUPS, Row};
+use super::table::{Expect, FaultCase, GROUPS};
 
 /// All rows as Markdown tables, one for each group.
 pub fn table_of_faults() -> String {
@@ -29,7 +29,7 @@ pub fn table_of_faults() -> String {
     text
 }
 
-fn reaction(row: &Row) -> String {
+fn reaction(row: &FaultCase) -> String {
     let within = |what: &str| format!("{what} within {} ms {}", row.deadline_ms, row.seen.since());
     match row.expect {
         Expect::GoesOn { rejects: true } => "goes on, rejects".into(),
@@ -39,10 +39,10 @@ fn reaction(row: &Row) -> String {
         Expect::OnlyRules => "whatever the rules of every cycle allow".into(),
         Expect::HandsOverOrStops => within("hands over, or zero and latched,"),
         Expect::Reaches { mode, .. } => within(match mode {
-            super::guard::ACTIVE => "engages from zero",
-            super::guard::FADE => "fades",
-            super::guard::HANDOVER => "hands over",
-            super::guard::FAULT => "zero and latched",
+            super::bytes::ACTIVE => "engages from zero",
+            super::bytes::FADE => "fades",
+            super::bytes::HANDOVER => "hands over",
+            super::bytes::FAULT => "zero and latched",
             _ => "locked",
         }),
         Expect::Restarts { .. } => within("starts anew into Standby, says the cause,"),

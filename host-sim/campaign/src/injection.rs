@@ -74,7 +74,7 @@ pub(super) enum Wire {
     /// Frames come under an identifier that nobody listens to.
     Renamed,
     /// Senders send so many frames, counted on, where they should send one.
-    Rushed(u8),
+    Burst(u8),
     /// Every frame waits up to so many ms; the order of a message's frames stays.
     Jittered(u32),
 }
@@ -138,7 +138,7 @@ pub(super) enum Hand {
 
 /// What becomes of the host's request.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Wish {
+pub(super) enum RequestFault {
     /// Ends.
     Ends,
     /// Is low in the first so many frames.
@@ -158,7 +158,7 @@ pub(super) enum Injection {
     Inside(Inside),
     Motor(Motor),
     Hand(Hand),
-    Wish(Wish),
+    Request(RequestFault),
 }
 
 /// How the ECU starts.

@@ -3,12 +3,21 @@
 //! A *row* is one fault of the table with its class, deadline and torque bound. A *trial* is one run of a row with
 //! one seed. Faults are injected between the world and the ECU, in a sensor's value, on the bus, in the clock, in
 //! memory, in the motor; whatever reaches the ECU goes through the shipping receive and step. In every cycle a
-//! guard that shares nothing with the core checks what must always hold.
+//! checker of invariants that shares nothing with the core checks what must always hold.
 //!
 //! ```text
-//! world -> senders -> bus -> Ecu -> motor -> world        guard: frames in and out, every cycle
+//! world -> senders -> bus -> Ecu -> motor -> world        checker: frames in and out, every cycle
 //!            ^         ^      ^       ^                   residual: since when the fault can be seen
 //!            +--- one injection ------+                   verdict: class, deadline, torque bound
+//! ```
+//!
+//! ```
+//! use haptic_campaign::{World, table};
+//!
+//! let frozen = table::rows().find(|row| row.name == "lateral-error-frozen").unwrap();
+//! let outcome = World::new().run(frozen, 3);
+//! let said: Vec<_> = outcome.reported.iter().map(|event| event.what.as_str()).collect();
+//! assert_eq!(said[..2], ["The ECU reports LaneImplausible", "The ECU goes to Handover"]);
 //! ```
 //!
 //! What is marked Q runs in QEMU as well, with the image in the place of the ECU (`target`).
@@ -18,20 +27,21 @@
 
 mod bytes;
 pub mod campaign;
-mod come_up;
 pub mod document;
 pub mod drivers;
-mod guard;
+mod ecu_harness;
 mod injection;
+mod invariants;
 mod residual;
-mod seat;
 mod senders;
+mod start_up;
 pub mod table;
 pub mod target;
 mod trial;
+mod trial_record;
 mod verdict;
 mod wire;
 
-pub use guard::Broken;
+pub use invariants::Violation;
 pub use residual::Seen;
-pub use trial::{Outcome, World};
+pub use trial::{TrialOutcome, World};

@@ -15,7 +15,7 @@ const SURELY_SEEN: f64 = 1.02;
 /// A movement that was predicted and did not come, m.
 pub(super) const LANE_MARGIN_M: f64 = 0.4;
 /// Momentum on the column that did not show in the wheel, N.m.s.
-pub(super) const COLUMN_MARGIN_NMS: f64 = 0.6;
+pub(super) const COLUMN_MARGIN_NM_S: f64 = 0.6;
 /// Further than the near-point error can go between two samples, m.
 pub(super) const LANE_STEP_M: f64 = 0.3;
 /// Further than the far-point yaw error can go between two samples, rad.
@@ -28,7 +28,7 @@ pub(super) const MOTOR_MARGIN_NM: f64 = 0.1;
 /// For this long a motor may echo an older command, steps.
 const MOTOR_ECHO: usize = 8;
 /// Slowest speed that is guided, m/s.
-const LEAST_SPEED_MPS: f64 = 5.0;
+const LEAST_SPEED_M_PER_S: f64 = 5.0;
 const MEMORY_S: f64 = 1.0;
 const TIMEOUT_S: f64 = 0.030;
 const HALF_STEP_S: f64 = 0.0005;
@@ -67,14 +67,14 @@ pub(super) struct Residual {
     stability_factor_s2_per_m2: f64,
     aligning_gain_nm_s2_per_m: f64,
     damping_nm_s: f64,
-    speeds_mps: [f64; 2],
+    speeds_m_per_s: [f64; 2],
     wheel_rad: f64,
     lane: Option<(f64, f64, f64)>,
     predicted_m: f64,
     moved_m: f64,
     now_s: f64,
     column_at_s: Option<f64>,
-    momentum_nms: f64,
+    momentum_nm_s: f64,
     commands_nm: [f64; MOTOR_ECHO],
     motor_nm: f64,
     /// Steps in a row in which the motor was surely away from what it was told.
@@ -83,7 +83,7 @@ pub(super) struct Residual {
 
 impl Residual {
     /// At rest, for a vehicle at a speed.
-    pub(super) fn new(vehicle: &VehicleParameters, v_mps: f64) -> Self {
+    pub(super) fn new(vehicle: &VehicleParameters, v_m_per_s: f64) -> Self {
         let VehicleParameters {
             m,
             l_f,
@@ -100,14 +100,14 @@ impl Residual {
             stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
             aligning_gain_nm_s2_per_m: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
             damping_nm_s: b_s,
-            speeds_mps: [v_mps; 2],
+            speeds_m_per_s: [v_m_per_s; 2],
             wheel_rad: 0.0,
             lane: None,
             predicted_m: 0.0,
             moved_m: 0.0,
             now_s: 0.0,
             column_at_s: None,
-            momentum_nms: 0.0,
+            momentum_nm_s: 0.0,
             commands_nm: [0.0; MOTOR_ECHO],
             motor_nm: 0.0,
             astray: 0,
@@ -115,8 +115,8 @@ impl Residual {
     }
 
     /// Rate of the direction of movement, rad/s.
-    fn turning_rad_s(&self) -> f64 {
-        let v = self.speeds_mps[0];
+    fn turning_rad_per_s(&self) -> f64 {
+        let v = self.speeds_m_per_s[0];
         v * self.curvature_gain_per_m * self.wheel_rad / (1.0 + self.stability_factor_s2_per_m2 * v * v)
     }
 
@@ -126,17 +126,17 @@ impl Residual {
     }
 
     /// Takes the speeds that arrive.
-    pub(super) fn speeds(&mut self, speeds_mps: [f64; 2]) {
-        self.speeds_mps = speeds_mps;
+    pub(super) fn speeds(&mut self, speeds_m_per_s: [f64; 2]) {
+        self.speeds_m_per_s = speeds_m_per_s;
     }
 
     /// Takes the column's values that arrive, and the guidance torque that was applied.
     pub(super) fn column(&mut self, time_s: f64, driver_nm: f64, wheel_rad: f64, applied_nm: f64) {
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
-            let aligning = self.aligning_gain_nm_s2_per_m * self.speeds_mps[0] * self.turning_rad_s();
+            let aligning = self.aligning_gain_nm_s2_per_m * self.speeds_m_per_s[0] * self.turning_rad_per_s();
             let damped = self.damping_nm_s * (wheel_rad - self.wheel_rad);
-            self.momentum_nms = self.momentum_nms * (-dt / MEMORY_S).exp()
+            self.momentum_nm_s = self.momentum_nm_s * (-dt / MEMORY_S).exp()
                 + (driver_nm + applied_nm - aligning) * dt
                 - damped;
         }
@@ -152,8 +152,8 @@ impl Residual {
             if (e_y_m - y).abs() > LANE_STEP_M || (e_theta_rad - theta).abs() > YAW_STEP_RAD {
                 return;
             }
-            let v = self.speeds_mps[0];
-            let rate = v * 0.5 * (theta + e_theta_rad) - v * FAR_TIME_S * self.turning_rad_s();
+            let v = self.speeds_m_per_s[0];
+            let rate = v * 0.5 * (theta + e_theta_rad) - v * FAR_TIME_S * self.turning_rad_per_s();
             let kept = (-dt / MEMORY_S).exp();
             self.predicted_m = self.predicted_m * kept + rate * dt;
             self.moved_m = self.moved_m * kept + e_y_m - y;
@@ -194,7 +194,7 @@ impl Residual {
 
     /// Share of the column's margin that is used.
     pub(super) fn column_used(&self) -> f64 {
-        self.momentum_nms.abs() / COLUMN_MARGIN_NMS
+        self.momentum_nm_s.abs() / COLUMN_MARGIN_NM_S
     }
 
     /// Share of a margin that is used; at 1 a fault can be seen.
@@ -206,7 +206,7 @@ impl Residual {
                 let away = |commanded: &f64| (self.motor_nm - commanded).abs();
                 self.commands_nm.iter().map(away).fold(f64::INFINITY, f64::min) / MOTOR_MARGIN_NM
             }
-            Seen::Speed => LEAST_SPEED_MPS / self.speeds_mps[0].min(self.speeds_mps[1]).max(1e-9),
+            Seen::Speed => LEAST_SPEED_M_PER_S / self.speeds_m_per_s[0].min(self.speeds_m_per_s[1]).max(1e-9),
         }
     }
 }

@@ -9,7 +9,7 @@ use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::injection::{Change, Injection, Signal, Wish};
+use super::injection::{Change, Injection, RequestFault, Signal};
 use super::wire::MESSAGES;
 use haptic_sim::guidance::Observation;
 use haptic_sim::models::sensors;
@@ -19,11 +19,11 @@ const HOST_PERIOD_MS: u32 = 10;
 
 /// What the senders believe in one step.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Readings {
+pub(super) struct SensorReadings {
     pub(super) lane: Option<(f64, f64)>,
     pub(super) lane_valid: bool,
     pub(super) column: Option<(f64, f64)>,
-    pub(super) speeds_mps: Option<[f64; 2]>,
+    pub(super) speeds_m_per_s: Option<[f64; 2]>,
 }
 
 /// The senders with their counters, and the values that a fault remembers.
@@ -33,7 +33,7 @@ pub(super) struct Senders {
     /// By signal: the value at the onset.
     held: [Option<f64>; Signal::COUNT],
     toggled: bool,
-    wishes: u32,
+    requests: u32,
     /// Whether the host wants the probe as well.
     probe: bool,
 }
@@ -44,7 +44,7 @@ impl Senders {
             counters: [0; 4],
             held: [None; Signal::COUNT],
             toggled: false,
-            wishes: 0,
+            requests: 0,
             probe,
         }
     }
@@ -52,11 +52,11 @@ impl Senders {
     /// What is read in this step, with what is wrong with it; `since_s` the onset if the injections act.
     pub(super) fn read(
         &mut self,
-        view: &Observation,
+        observation: &Observation,
         injections: &[Injection],
         since_s: Option<f64>,
         noise: &mut Xoshiro256PlusPlus,
-    ) -> Readings {
+    ) -> SensorReadings {
         let mut read = |signal: Signal, truth: f64| {
             let Some(since_s) = since_s else { return truth };
             let changes = injections.iter().filter_map(|injection| match injection {
@@ -68,54 +68,60 @@ impl Senders {
                 changed(change, value, held, since_s, noise)
             })
         };
-        let at = |period: u32| view.step.is_multiple_of(period);
-        let speeds_mps = at(HOST_PERIOD_MS).then(|| {
+        let at = |period: u32| observation.step.is_multiple_of(period);
+        let speeds_m_per_s = at(HOST_PERIOD_MS).then(|| {
             [
-                read(Signal::Speed1, view.speed_mps),
-                read(Signal::Speed2, view.speed_mps),
+                read(Signal::Speed1, observation.speed_m_per_s),
+                read(Signal::Speed2, observation.speed_m_per_s),
             ]
         });
         let column = at(COLUMN_PERIOD_MS).then(|| {
             (
-                read(Signal::DriverTorque, sensors::torque_nm(view.driver_torque_nm)),
-                read(Signal::WheelAngle, sensors::wheel_angle_rad(view.wheel_angle_rad)),
+                read(
+                    Signal::DriverTorque,
+                    sensors::torque_nm(observation.driver_torque_nm),
+                ),
+                read(
+                    Signal::WheelAngle,
+                    sensors::wheel_angle_rad(observation.wheel_angle_rad),
+                ),
             )
         });
-        let lane = view.lane.map(|errors| {
+        let lane = observation.lane.map(|errors| {
             (
                 read(Signal::LateralError, errors.e_y_m),
                 read(Signal::YawError, errors.e_theta_rad),
             )
         });
-        Readings {
+        SensorReadings {
             lane,
             lane_valid: since_s.is_none() || !injections.contains(&Injection::Invalid),
             column,
-            speeds_mps,
+            speeds_m_per_s,
         }
     }
 
     /// Whether guidance is wanted in the command of this step; `high` without a fault.
-    fn wish(&mut self, high: bool, injections: &[Injection], acts: bool) -> bool {
-        let wish = injections.iter().find_map(|injection| match injection {
-            Injection::Wish(wish) if acts => Some(*wish),
+    fn requests_guidance(&mut self, high: bool, injections: &[Injection], acts: bool) -> bool {
+        let fault = injections.iter().find_map(|injection| match injection {
+            Injection::Request(fault) if acts => Some(*fault),
             _ => None,
         });
-        let Some(wish) = wish else { return high };
+        let Some(fault) = fault else { return high };
         self.toggled = !self.toggled;
-        self.wishes += 1;
-        match wish {
-            Wish::Ends => false,
-            Wish::Drops(frames) => self.wishes > frames,
-            Wish::Toggles => !self.toggled,
+        self.requests += 1;
+        match fault {
+            RequestFault::Ends => false,
+            RequestFault::Drops(frames) => self.requests > frames,
+            RequestFault::Toggles => !self.toggled,
         }
     }
 
     /// The frames of this step, in order of sending.
     pub(super) fn send(
         &mut self,
-        view: &Observation,
-        readings: &Readings,
+        observation: &Observation,
+        readings: &SensorReadings,
         requested: bool,
         injections: &[Injection],
         acts: bool,
@@ -139,20 +145,20 @@ impl Senders {
             let message = Column {
                 driver_torque: Torque::from_nm(torque_nm),
                 wheel_angle: Radians::from_rad(angle_rad),
-                motor_torque: Torque::from_nm(view.motor_torque_nm),
+                motor_torque: Torque::from_nm(observation.motor_torque_nm),
             };
             frames.push(message.encode(count(1)));
         }
-        if let Some(speeds_mps) = readings.speeds_mps {
+        if let Some(speeds_m_per_s) = readings.speeds_m_per_s {
             let message = Vehicle {
-                speeds: speeds_mps.map(Speed::from_m_per_s),
+                speeds: speeds_m_per_s.map(Speed::from_m_per_s),
             };
             frames.push(message.encode(count(2)));
         }
-        if view.step.is_multiple_of(HOST_PERIOD_MS) {
+        if observation.step.is_multiple_of(HOST_PERIOD_MS) {
             let counter = count(3);
             let message = Demand {
-                engage: self.wish(requested, injections, acts),
+                engage: self.requests_guidance(requested, injections, acts),
                 authority: Ratio::ONE,
                 probe: self.probe,
             };

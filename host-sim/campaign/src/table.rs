@@ -1,4 +1,4 @@
-//! The table of faults: what a row is, and all of them. The rows themselves are in `rows`.
+//! The table of faults: what a row is, and all of them. The rows themselves are in `inputs`, `bus`, `time` and `memory`.
 //!
 //! | class | when | what |
 //! |---|---|---|
@@ -16,6 +16,7 @@ use serde::Serialize;
 use super::injection::{Injection, Start};
 use super::residual::Seen;
 
+mod build;
 mod bus;
 mod inputs;
 mod memory;
@@ -107,7 +108,7 @@ pub enum Expect {
 
 /// One fault of the list.
 #[derive(Debug, Clone, Copy)]
-pub struct Row {
+pub struct FaultCase {
     /// By which it is asked for.
     pub name: &'static str,
     /// What is injected.
@@ -138,7 +139,7 @@ pub struct Group {
     /// Its name.
     pub name: &'static str,
     /// Its rows.
-    pub rows: &'static [Row],
+    pub rows: &'static [FaultCase],
 }
 
 /// Every row.
@@ -162,7 +163,7 @@ pub const GROUPS: [Group; 4] = [
 ];
 
 /// Every row, in order.
-pub fn rows() -> impl Iterator<Item = &'static Row> {
+pub fn rows() -> impl Iterator<Item = &'static FaultCase> {
     GROUPS.iter().flat_map(|group| group.rows)
 }
 
@@ -179,8 +180,8 @@ const MOTOR_MS: u32 = 15;
 const ORDINARY_NM: f64 = 2.0;
 
 /// A row that goes on unless it says otherwise.
-const fn row(name: &'static str, injected: &'static str, injections: &'static [Injection]) -> Row {
-    Row {
+const fn row(name: &'static str, injected: &'static str, injections: &'static [Injection]) -> FaultCase {
+    FaultCase {
         name,
         injected,
         class: Class::L,
@@ -196,11 +197,7 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
     }
 }
 
-const fn reaches(mode: u64) -> Expect {
-    Expect::Reaches { mode, fading: false }
-}
-
-impl Row {
+impl FaultCase {
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.
     pub fn deadline_ms(&self) -> Option<u32> {
         let asked = !matches!(
@@ -208,191 +205,5 @@ impl Row {
             Expect::GoesOn { .. } | Expect::Uncut | Expect::MayHandOver | Expect::OnlyRules
         );
         asked.then_some(self.deadline_ms)
-    }
-
-    const fn rejected(self) -> Self {
-        Self {
-            class: Class::R,
-            expect: Expect::GoesOn { rejects: true },
-            ..self
-        }
-    }
-
-    /// Nothing to reject, nothing to react to: the last good value bridges it.
-    const fn bridged(self) -> Self {
-        Self {
-            class: Class::R,
-            ..self
-        }
-    }
-
-    const fn fades(self, deadline_ms: u32) -> Self {
-        Self {
-            class: Class::A,
-            expect: reaches(super::guard::FADE),
-            deadline_ms,
-            ..self
-        }
-    }
-
-    const fn hands_over(self, deadline_ms: u32) -> Self {
-        Self {
-            class: Class::B,
-            expect: reaches(super::guard::HANDOVER),
-            deadline_ms,
-            ..self
-        }
-    }
-
-    /// Once what arrives contradicts itself.
-    const fn contradicts(self) -> Self {
-        Self {
-            seen: Seen::Contradiction,
-            ..self.hands_over(CONTRADICTION_MS)
-        }
-    }
-
-    const fn may_hand_over(self) -> Self {
-        Self {
-            expect: Expect::MayHandOver,
-            deadline_ms: CONTRADICTION_MS,
-            seen: Seen::Contradiction,
-            ..self
-        }
-    }
-
-    const fn stops(self, deadline_ms: u32) -> Self {
-        Self {
-            class: Class::C,
-            expect: reaches(super::guard::FAULT),
-            deadline_ms,
-            ..self
-        }
-    }
-
-    const fn locks(self) -> Self {
-        Self {
-            class: Class::C,
-            expect: reaches(super::guard::LOCKED),
-            deadline_ms: 20,
-            torque_nm: 0.0,
-            ..self
-        }
-    }
-
-    const fn yields(self, deadline_ms: u32) -> Self {
-        Self {
-            class: Class::D,
-            expect: Expect::Yields,
-            deadline_ms,
-            ..self
-        }
-    }
-
-    const fn opposed(self) -> Self {
-        Self {
-            class: Class::D,
-            ..self
-        }
-    }
-
-    /// Frames that a fault leaves too far apart may be stale.
-    const fn gaps_may_hand_over(self) -> Self {
-        Self {
-            class: Class::R,
-            expect: Expect::MayHandOver,
-            ..self
-        }
-    }
-
-    const fn hands_over_or_stops(self, deadline_ms: u32) -> Self {
-        Self {
-            expect: Expect::HandsOverOrStops,
-            ..self.hands_over(deadline_ms)
-        }
-    }
-
-    const fn only_rules(self) -> Self {
-        Self {
-            expect: Expect::OnlyRules,
-            ..self
-        }
-    }
-
-    const fn after_fade(self) -> Self {
-        Self {
-            expect: Expect::Reaches {
-                mode: super::guard::FAULT,
-                fading: true,
-            },
-            ..self
-        }
-    }
-
-    /// `reset` is the cause in the status frame: 1 watchdog, 2 processor fault, 3 panic, 4 stack, 5 brown-out.
-    const fn restarts(self, reset: u64, deadline_ms: u32) -> Self {
-        Self {
-            class: Class::C,
-            expect: Expect::Restarts { reset },
-            deadline_ms,
-            ..self
-        }
-    }
-
-    const fn engages(self) -> Self {
-        Self {
-            expect: reaches(super::guard::ACTIVE),
-            deadline_ms: 12,
-            ..self
-        }
-    }
-
-    const fn uncut(self) -> Self {
-        Self {
-            expect: Expect::Uncut,
-            ..self
-        }
-    }
-
-    const fn seen(self, seen: Seen) -> Self {
-        Self { seen, ..self }
-    }
-
-    const fn after_sample(self) -> Self {
-        Self {
-            after_sample: true,
-            ..self
-        }
-    }
-
-    const fn torque(self, torque_nm: f64) -> Self {
-        Self { torque_nm, ..self }
-    }
-
-    const fn lasts(self, ms: u32) -> Self {
-        Self {
-            lasts_ms: Some(ms),
-            ..self
-        }
-    }
-
-    const fn from(self, start: Start) -> Self {
-        Self { start, ..self }
-    }
-
-    /// Also run in QEMU.
-    const fn q(self) -> Self {
-        Self {
-            place: Place::Both,
-            ..self
-        }
-    }
-
-    /// Run in QEMU only.
-    const fn only_q(self) -> Self {
-        Self {
-            place: Place::Target,
-            ..self
-        }
     }
 }

@@ -1,12 +1,12 @@
 //! The rows that a target has to show as well: the same runs, with the image in QEMU in the place of the ECU.
 //!
 //! The closed loop runs here. What its ECU received goes to the target tick by tick, on the same clock, and every
-//! frame that comes back has to be the host's, byte for byte: what the guard and the row have found about the one
+//! frame that comes back has to be the host's, byte for byte: what the invariant checker and the row have found about the one
 //! then holds for the other.
 //!
 //! A flipped bit is the exception: it is flipped in the target's memory only, through the debugger's stub of QEMU, and
 //! anywhere in the controller, also where no second copy guards it. From there on the target is judged by
-//! itself: the guard's rules in every cycle, and either no torque frame changes at all or the first that does is the
+//! itself: the checker's rules in every cycle, and either no torque frame changes at all or the first that does is the
 //! latched zero of class C.
 //!
 //! Not here: what breaks the image and not the controller (watchdog, stack, processor fault): `tests/resets.rs`.
@@ -15,13 +15,14 @@ use haptic_core::bus::Frame;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
+use super::bytes::FAULT;
 use super::bytes::Status;
 use super::campaign::{self, Campaign};
-use super::guard::{Broken, FAULT, Guard};
 use super::injection::{Injection, Inside};
-use super::seat::{Tick, Trace};
-use super::table::{Expect, Row};
+use super::invariants::{InvariantChecker, Violation};
+use super::table::{Expect, FaultCase};
 use super::trial::World;
+use super::trial_record::{EcuTrace, Tick};
 use haptic_target::PilError;
 use haptic_target::stepped::Stepped;
 
@@ -37,7 +38,7 @@ const STOPPED: usize = 50;
 /// What is missing or fails on the way to a running image, and a target that stops answering.
 pub fn run(
     world: &World,
-    rows: &[&'static Row],
+    rows: &[&'static FaultCase],
     seeds: std::ops::Range<u64>,
     mut done: impl FnMut(),
 ) -> Result<Campaign, PilError> {
@@ -50,7 +51,7 @@ pub fn run(
         let mut outcomes = Vec::new();
         for seed in seeds.clone() {
             // The host's ECU stays whole where the target's memory is flipped.
-            let whole = Row {
+            let whole = FaultCase {
                 injections: &[],
                 expect: Expect::OnlyRules,
                 ..**row
@@ -85,7 +86,7 @@ fn started(target: &mut Option<Stepped>, memory: bool) -> Result<&mut Stepped, P
 }
 
 /// Whether a row flips bits.
-fn flips(row: &Row) -> bool {
+fn flips(row: &FaultCase) -> bool {
     let flip = |injection: &Injection| matches!(injection, Injection::Inside(Inside::Flip(_)));
     row.injections.iter().any(flip)
 }
@@ -96,23 +97,23 @@ fn send(target: &mut Stepped, tick: &Tick) -> Result<(), PilError> {
 }
 
 /// The first tick whose answer is not the host's.
-fn compare(target: &mut Stepped, trace: &Trace) -> Result<Option<Broken>, PilError> {
+fn compare(target: &mut Stepped, trace: &EcuTrace) -> Result<Option<Violation>, PilError> {
     target.begin(&trace.params, trace.start)?;
     // All of them before the first answer: what comes back waits on our side of the pipe.
     for tick in &trace.ticks {
         send(target, tick)?;
     }
-    let mut broken = None;
+    let mut violation = None;
     for tick in &trace.ticks {
         let answer = target.answer()?;
-        if answer != tick.answer && broken.is_none() {
-            broken = Some(Broken {
+        if answer != tick.answer && violation.is_none() {
+            violation = Some(Violation {
                 step: tick.step,
                 what: format!("the host answers {:02X?}, the target {answer:02X?}", tick.answer),
             });
         }
     }
-    Ok(broken)
+    Ok(violation)
 }
 
 /// What came of a flipped bit.
@@ -120,17 +121,17 @@ fn compare(target: &mut Stepped, trace: &Trace) -> Result<Option<Broken>, PilErr
 struct Flipped {
     stopped_after_ms: Option<u32>,
     cycles: u64,
-    failure: Option<Broken>,
+    failure: Option<Violation>,
 }
 
-fn flip(target: &mut Stepped, trace: &Trace, row: &Row, seed: u64) -> Result<Flipped, PilError> {
+fn flip(target: &mut Stepped, trace: &EcuTrace, row: &FaultCase, seed: u64) -> Result<Flipped, PilError> {
     target.begin(&trace.params, trace.start)?;
     // Rows draw different bits with one seed.
     let mix = |hash: u64, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte));
-    let mut dice = Xoshiro256PlusPlus::seed_from_u64(row.name.bytes().fold(seed, mix));
-    let bit = dice.random_range(0..target.bits());
-    let at = dice.random_range(BEFORE..2 * BEFORE);
-    let mut guard = Guard::new(true, trace.start.at.us());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(row.name.bytes().fold(seed, mix));
+    let bit = rng.random_range(0..target.bits());
+    let at = rng.random_range(BEFORE..2 * BEFORE);
+    let mut checker = InvariantChecker::new(true, trace.start.at.us());
     let mut flipped = Flipped::default();
     for (k, tick) in trace.ticks.iter().take(at + WATCHED).enumerate() {
         if k == at {
@@ -141,27 +142,28 @@ fn flip(target: &mut Stepped, trace: &Trace, row: &Row, seed: u64) -> Result<Fli
         let now_us = tick.now.us();
         for (frame, accepted) in &tick.frames {
             if *accepted {
-                guard.accepted(frame, now_us);
+                checker.accepted(frame, now_us);
             }
         }
-        let broken =
-            match answer.split_first() {
-                None => Some("no answer".into()),
-                Some((guidance, others)) => {
-                    flipped.cycles += 1;
-                    guard.cycle(tick.step, u64::from(tick.step) * 1000, now_us, guidance, others);
-                    let status = Status::of(guidance);
-                    if Some(guidance) != tick.answer.first() {
-                        flipped.stopped_after_ms.get_or_insert((k - at) as u32);
-                    }
-                    let wrong = flipped.stopped_after_ms.is_some() && status.mode != FAULT;
-                    guard.broken.take().map(|broken| broken.what).or_else(|| {
-                        wrong.then(|| format!("mode {}, T = {} N.m", status.mode, status.torque_nm))
-                    })
+        let violation = match answer.split_first() {
+            None => Some("no answer".into()),
+            Some((guidance, others)) => {
+                flipped.cycles += 1;
+                checker.cycle(tick.step, u64::from(tick.step) * 1000, now_us, guidance, others);
+                let status = Status::of(guidance);
+                if Some(guidance) != tick.answer.first() {
+                    flipped.stopped_after_ms.get_or_insert((k - at) as u32);
                 }
-            };
-        if let Some(what) = broken {
-            flipped.failure = Some(Broken {
+                let wrong = flipped.stopped_after_ms.is_some() && status.mode != FAULT;
+                checker
+                    .violation
+                    .take()
+                    .map(|violation| violation.what)
+                    .or_else(|| wrong.then(|| format!("mode {}, T = {} N.m", status.mode, status.torque_nm)))
+            }
+        };
+        if let Some(what) = violation {
+            flipped.failure = Some(Violation {
                 step: tick.step,
                 what: format!("bit {bit} of the controller: {what}"),
             });

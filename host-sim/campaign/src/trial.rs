@@ -12,10 +12,11 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use super::drivers::{Driver, everyone};
-use super::guard::Broken;
+use super::ecu_harness::EcuHarness;
 use super::injection::Start;
-use super::seat::{Seat, Trace};
-use super::table::Row;
+use super::invariants::Violation;
+use super::table::FaultCase;
+use super::trial_record::EcuTrace;
 use super::verdict::judge;
 use haptic_log::Event;
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
@@ -25,12 +26,12 @@ use haptic_sim::seeds::Stream;
 use haptic_sim::{Action, Simulation};
 
 /// Lateral acceleration in the arc, m/s2: the paper course's first curve at 60 km/h.
-const LATERAL_MPS2: f64 = 0.926;
+const LATERAL_M_PER_S2: f64 = 0.926;
 /// Speeds of the campaign, km/h. Above, the participants with the longest delays drive unstably.
 const SPEEDS_KMH: [f64; 5] = [40.0, 50.0, 60.0, 70.0, 80.0];
 /// Where the heading has to pass pi the curve is tighter, or a run would take a minute.
 const TURN_KMH: f64 = 40.0;
-const TURN_MPS2: f64 = 2.0;
+const TURN_M_PER_S2: f64 = 2.0;
 const EARLIEST_ONSET_MS: u32 = 1500;
 const LATEST_ONSET_MS: u32 = 3000;
 const AFTER_MS: u32 = 3200;
@@ -46,9 +47,9 @@ pub struct World {
 }
 
 /// A straight of 0.5 s, a clothoid of 1 s, and an arc for the rest of a run and the look-ahead.
-fn road(kmh: f64, lateral_mps2: f64, run_ms: u32) -> Course {
+fn road(kmh: f64, lateral_m_per_s2: f64, run_ms: u32) -> Course {
     let v = kmh / 3.6;
-    let curvature_1pm = lateral_mps2 / (v * v);
+    let curvature_1pm = lateral_m_per_s2 / (v * v);
     let segments = vec![
         Segment::straight(0.5 * v),
         Segment::clothoid(v, 0.0, curvature_1pm),
@@ -60,14 +61,14 @@ fn road(kmh: f64, lateral_mps2: f64, run_ms: u32) -> Course {
 
 /// When the heading of the turning road passes pi.
 fn turned_ms() -> u32 {
-    let rad_per_s = TURN_MPS2 / (TURN_KMH / 3.6);
+    let rad_per_s = TURN_M_PER_S2 / (TURN_KMH / 3.6);
     // The clothoid turns half as fast for 1 s, after the straight.
     ((1.0 + std::f64::consts::PI / rad_per_s) * 1e3) as u32
 }
 
 /// What a run showed.
 #[derive(Debug, Clone)]
-pub struct Outcome {
+pub struct TrialOutcome {
     /// Seed of the run.
     pub seed: u64,
     /// Who drove.
@@ -87,39 +88,39 @@ pub struct Outcome {
     /// Whether the fault could be seen.
     pub seen: bool,
     /// What failed, and in which step.
-    pub failure: Option<Broken>,
+    pub failure: Option<Violation>,
 }
 
 impl World {
     /// Everyone who drives and every road.
     pub fn new() -> Self {
         let both = |kmh, lateral, ms| [1.0, -1.0].map(|side| road(kmh, side * lateral, ms));
-        let curve = |kmh| both(kmh, LATERAL_MPS2, LATEST_ONSET_MS + AFTER_MS);
+        let curve = |kmh| both(kmh, LATERAL_M_PER_S2, LATEST_ONSET_MS + AFTER_MS);
         Self {
             drivers: everyone(),
             roads: SPEEDS_KMH.map(curve).into(),
-            turning_road: both(TURN_KMH, TURN_MPS2, turned_ms() + AFTER_MS),
+            turning_road: both(TURN_KMH, TURN_M_PER_S2, turned_ms() + AFTER_MS),
         }
     }
 
     /// Runs a row with a seed.
-    pub fn run(&self, row: &Row, seed: u64) -> Outcome {
+    pub fn run(&self, row: &FaultCase, seed: u64) -> TrialOutcome {
         self.trial(row, seed, false).0
     }
 
     /// Runs a row with a seed, and with `traced` keeps what went into the ECU and came out of it.
-    pub(super) fn trial(&self, row: &Row, seed: u64, traced: bool) -> (Outcome, Option<Trace>) {
-        let mut dice = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
-        let driver = &self.drivers[dice.random_range(0..self.drivers.len())];
-        let speed = dice.random_range(0..SPEEDS_KMH.len());
+    pub(super) fn trial(&self, row: &FaultCase, seed: u64, traced: bool) -> (TrialOutcome, Option<EcuTrace>) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
+        let driver = &self.drivers[rng.random_range(0..self.drivers.len())];
+        let speed = rng.random_range(0..SPEEDS_KMH.len());
         let turns = row.start == Start::HeadingWraps;
         let (roads, speed_kmh) = if turns {
             (&self.turning_road, TURN_KMH)
         } else {
             (&self.roads[speed], SPEEDS_KMH[speed])
         };
-        let course = &roads[dice.random_range(0..2)];
-        let drawn_ms = dice.random_range(EARLIEST_ONSET_MS..LATEST_ONSET_MS);
+        let course = &roads[rng.random_range(0..2)];
+        let drawn_ms = rng.random_range(EARLIEST_ONSET_MS..LATEST_ONSET_MS);
         let onset_ms = if turns {
             turned_ms()
         } else if row.after_sample {
@@ -135,28 +136,28 @@ impl World {
             .seed(seed)
             .build()
             .expect("in range at these speeds");
-        let mut seat = Seat::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, dice);
+        let mut harness = EcuHarness::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, rng);
         if traced {
-            seat.keep_trace();
+            harness.keep_trace();
         }
-        let mut simulation = Simulation::with(&scenario, seat);
+        let mut simulation = Simulation::with(&scenario, harness);
         let run = catch_unwind(AssertUnwindSafe(|| drive(&mut simulation)));
-        let mut seat = simulation.into_guidance();
-        let trace = seat.take_trace();
-        let mut record = seat.into_record();
+        let mut harness = simulation.into_guidance();
+        let trace = harness.take_trace();
+        let mut record = harness.into_record();
         if let Err(panic) = run {
             let what = panic
                 .downcast_ref::<String>()
                 .cloned()
                 .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
-            record.broken = Some(Broken {
+            record.violation = Some(Violation {
                 step: record.steps,
                 what: format!("panic: {}", what.unwrap_or_default()),
             });
         }
         let reported = std::mem::take(&mut record.ecu).into_events();
         let verdict = judge(row, onset_ms, &record);
-        let outcome = Outcome {
+        let outcome = TrialOutcome {
             seed,
             driver: driver.name.clone(),
             speed_kmh: scenario.speed_kmh(),
@@ -176,7 +177,7 @@ impl World {
 }
 
 /// To the end, with the hand on the wheel that the row has.
-fn drive(simulation: &mut Simulation<Seat<'_>>) {
+fn drive(simulation: &mut Simulation<EcuHarness<'_>>) {
     loop {
         let (step, arm_nm) = (simulation.steps(), simulation.arm_torque_nm());
         let action = Action {

@@ -1,17 +1,18 @@
 //! Whether a run did what its row asks for.
 
-use super::guard::{ACTIVE, Broken, FADE, FAULT, HANDOVER, STANDBY};
+use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER, STANDBY};
+use super::invariants::Violation;
 use super::residual::Seen;
-use super::seat::Record;
-use super::table::{Expect, Row};
+use super::table::{Expect, FaultCase};
+use super::trial_record::TrialRecord;
 
 /// Before a contradiction has used this share of its margin nobody may react to it.
 const TOO_EARLY: f64 = 0.8;
 
 /// Judges a run: first by the rules of every cycle, then by the row. The step of the reaction, if there was one.
-pub(super) fn judge(row: &Row, onset: u32, record: &Record) -> Result<Option<u32>, Broken> {
-    if let Some(broken) = &record.broken {
-        return Err(broken.clone());
+pub(super) fn judge(row: &FaultCase, onset: u32, record: &TrialRecord) -> Result<Option<u32>, Violation> {
+    if let Some(violation) = &record.violation {
+        return Err(violation.clone());
     }
     let reacted_at = reaction(row, onset, record)?;
     if record.peak_nm > row.torque_nm {
@@ -24,15 +25,15 @@ pub(super) fn judge(row: &Row, onset: u32, record: &Record) -> Result<Option<u32
     Ok(reacted_at)
 }
 
-fn failed(step: u32, what: impl Into<String>) -> Broken {
-    Broken {
+fn failed(step: u32, what: impl Into<String>) -> Violation {
+    Violation {
         step,
         what: what.into(),
     }
 }
 
 /// When the ECU reacted, if it did.
-fn reaction(row: &Row, onset: u32, record: &Record) -> Result<Option<u32>, Broken> {
+fn reaction(row: &FaultCase, onset: u32, record: &TrialRecord) -> Result<Option<u32>, Violation> {
     if row.expect == Expect::OnlyRules {
         return Ok(None);
     }
@@ -109,11 +110,11 @@ fn reaction(row: &Row, onset: u32, record: &Record) -> Result<Option<u32>, Broke
 }
 
 fn in_time(
-    row: &Row,
-    record: &Record,
+    row: &FaultCase,
+    record: &TrialRecord,
     mode: u64,
     reached: Option<(u32, u64)>,
-) -> Result<Option<u32>, Broken> {
+) -> Result<Option<u32>, Violation> {
     // What cannot be seen need not be reacted to; the run counts as not seen.
     let Some(seen_at) = record.seen_at else {
         return match reached {
@@ -142,7 +143,7 @@ fn in_time(
     }
 }
 
-fn too_early(row: &Row, record: &Record, reacted_at: Option<u32>) -> Result<(), Broken> {
+fn too_early(row: &FaultCase, record: &TrialRecord, reacted_at: Option<u32>) -> Result<(), Violation> {
     match reacted_at {
         Some(step) if row.seen == Seen::Contradiction && record.used < TOO_EARLY => Err(failed(
             step,

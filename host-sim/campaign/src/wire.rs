@@ -59,9 +59,9 @@ impl Bus {
     }
 
     /// How often the senders have to send in this step, where it is not once.
-    pub(super) fn rush(injections: &[Injection], acts: bool) -> Option<u8> {
+    pub(super) fn burst(injections: &[Injection], acts: bool) -> Option<u8> {
         injections.iter().find_map(|injection| match injection {
-            Injection::Wire(Wire::Rushed(times)) if acts => Some(*times),
+            Injection::Wire(Wire::Burst(times)) if acts => Some(*times),
             _ => None,
         })
     }
@@ -73,7 +73,7 @@ impl Bus {
         sent: &[Frame],
         injections: &[Injection],
         acts: bool,
-        dice: &mut Xoshiro256PlusPlus,
+        rng: &mut Xoshiro256PlusPlus,
         arrivals: &mut Vec<Arrival>,
     ) {
         if self.log_length > 0 {
@@ -98,7 +98,7 @@ impl Bus {
             let sender = MESSAGES.iter().position(|id| *id == frame.id()).unwrap_or(0);
             match wire {
                 Some(wire) => {
-                    self.disturb(wire, step, sender, frame, dice, arrivals);
+                    self.disturb(wire, step, sender, frame, rng, arrivals);
                     self.since_onset[sender] += 1;
                 }
                 None => arrivals.push(good(*frame)),
@@ -115,7 +115,7 @@ impl Bus {
         step: u32,
         sender: usize,
         frame: &Frame,
-        dice: &mut Xoshiro256PlusPlus,
+        rng: &mut Xoshiro256PlusPlus,
         arrivals: &mut Vec<Arrival>,
     ) {
         let within = |frames: Option<u32>| frames.is_none_or(|n| self.since_onset[sender] < n);
@@ -139,7 +139,7 @@ impl Bus {
             }
             Wire::Flipped(frames) => {
                 if within(frames) {
-                    let bit = dice.random_range(0..64);
+                    let bit = rng.random_range(0..64);
                     arrivals.push(bad(bytes::with_bit_flipped(frame, bit)));
                 } else {
                     arrivals.push(good(*frame));
@@ -164,13 +164,13 @@ impl Bus {
             }
             Wire::Short => arrivals.push(bad(bytes::renamed(frame.id(), &frame.data()[..7]))),
             Wire::Renamed => arrivals.push(good(bytes::renamed(frame.id() ^ 0x400, frame.data()))),
-            Wire::Rushed(times) => {
+            Wire::Burst(times) => {
                 let again = |ahead| good(bytes::with_counter(frame, counter.wrapping_add(ahead)));
                 arrivals.extend((0..times).map(again));
             }
             Wire::Jittered(ms) => {
                 // In order: none arrives before the one that was sent before it.
-                let due = (step + dice.random_range(0..=ms)).max(self.last_due[sender]);
+                let due = (step + rng.random_range(0..=ms)).max(self.last_due[sender]);
                 self.last_due[sender] = due;
                 let place = self.late.partition_point(|(other, _)| *other <= due);
                 self.late.insert(place, (due, *frame));

@@ -33,12 +33,12 @@ impl EcuEvents {
     /// Takes what came of a step.
     pub fn observe(&mut self, outcome: &Outcome) {
         if let Some(frame) = outcome.frames_out.first() {
-            self.hear(outcome.observation.step, frame);
+            self.take_frame(outcome.observation.step, frame);
         }
     }
 
     /// Takes the frame of a step.
-    pub fn hear(&mut self, step: u32, frame: &Frame) {
+    pub fn take_frame(&mut self, step: u32, frame: &Frame) {
         let Ok(guidance) = Guidance::decode(&mut self.receiver, frame) else {
             return;
         };
@@ -98,7 +98,7 @@ mod tests {
             (2, Mode::Handover, 9),
             (3, Mode::Standby, 9),
         ] {
-            ecu.hear(step, &frame(step, mode, bits));
+            ecu.take_frame(step, &frame(step, mode, bits));
         }
         let told: Vec<_> = ecu
             .into_events()

@@ -121,7 +121,7 @@ pub struct Simulation<G = AnyGuidance> {
 /// What the scenario decides for every step.
 #[derive(Debug, Clone)]
 struct Plan {
-    speed_mps: f64,
+    speed_m_per_s: f64,
     relying: Transition,
     manual: Transition,
     changed: Option<(u32, Transition)>,
@@ -142,7 +142,7 @@ impl<G: Guidance> Simulation<G> {
     /// The start of a scenario's run with any guidance; the scenario's condition and sensors do not choose it.
     pub fn with(scenario: &Scenario, guidance: G) -> Self {
         let road = scenario.course().centreline();
-        let v = scenario.speed_mps();
+        let v = scenario.speed_m_per_s();
         let driver = scenario.driver();
         let [t_n, t_f] = [scenario.guidance().t_n, scenario.guidance().t_f];
         Self {
@@ -200,7 +200,7 @@ impl<G: Guidance> Simulation<G> {
             driver_torque_nm: self.plant.arm_torque_nm() + remnant_nm,
             wheel_angle_rad: self.plant.wheel_angle_rad(),
             motor_torque_nm: self.motor_torque_nm,
-            speed_mps: self.plan.speed_mps,
+            speed_m_per_s: self.plan.speed_m_per_s,
             request: self.plan.request(action),
         };
         let seen = match &mut self.sensing {
@@ -284,7 +284,7 @@ impl<G: Guidance> Simulation<G> {
     /// Drives to the end as the scenario has it; `observe` sees every step.
     pub fn run_observed(mut self, mut observe: impl FnMut(&Outcome)) -> Run {
         let left_m = self.road.length_m() - self.last_s_m;
-        let samples = left_m / self.plan.speed_mps * f64::from(SAMPLE_RATE_HZ);
+        let samples = left_m / self.plan.speed_m_per_s * f64::from(SAMPLE_RATE_HZ);
         let mut trace = Trace {
             sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
             samples: Vec::with_capacity(samples as usize + 1),
@@ -328,12 +328,12 @@ impl<G: Guidance> Simulation<G> {
 
 impl Plan {
     fn new(scenario: &Scenario, road: &Centreline) -> Self {
-        let v = scenario.speed_mps();
+        let v = scenario.speed_m_per_s();
         let (vehicle, driver) = (scenario.vehicle(), scenario.driver());
         let transition = |gains| Transition::new(v, vehicle, driver, gains);
         let failure = scenario.failure();
         Self {
-            speed_mps: v,
+            speed_m_per_s: v,
             relying: transition(scenario.gains()),
             manual: transition(ArmGains::MANUAL),
             changed: scenario
@@ -441,8 +441,8 @@ fn record(
         guidance_e_y_m: camera.e_y_m,
         guidance_e_theta_rad: camera.e_theta_rad,
         wheel_angle_rad: plant.wheel_angle_rad(),
-        wheel_rate_rad_s: plant.wheel_rate_rad_s(),
-        yaw_rate_rad_s: plant.yaw_rate_rad_s(),
+        wheel_rate_rad_per_s: plant.wheel_rate_rad_per_s(),
+        yaw_rate_rad_per_s: plant.yaw_rate_rad_per_s(),
         sideslip_rad: plant.sideslip_rad(),
         driver_torque_nm: observation.driver_torque_nm,
         guidance_torque_nm: applied.torque_nm,

@@ -93,11 +93,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })
 }
 
+/// What a reader of the table cannot guess.
+const LEGEND: &str = "t_p: the driver's delay. Condition: how much the driver relies on the guidance.
+Failure: none, the guidance torque lost at once, or its input lost and the torque handed over.";
+
 fn readable(evaluation: &Evaluation) -> String {
     let results = &evaluation.results;
     let [from, to] = results.window_m;
     let mut text = format!(
-        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}",
+        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}\n{LEGEND}\n",
         results.course,
         results.speed_kmh,
         from,

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::experiment::{Drive, Experiment, Plan, Repetitions, experiment, repeat};
+use haptic_batch::experiment::{
+    Drive, Experiment, POPULATION, Plan, Repetitions, experiment, repeat, spoiled,
+};
 
 use haptic_report::studies::experiment as files;
 
@@ -16,7 +18,8 @@ pub(super) struct Arguments {
     /// Participants: numbers and ranges such as 1,3..5
     #[arg(long, value_name = "LIST", default_value = "1..14")]
     participants: Participants,
-    /// Amplitude of the probe in the guided drives, N.m (0: none)
+    /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
+    /// the driver's answer to it tells K_hg
     #[arg(
         long,
         value_name = "AMPLITUDE",
@@ -31,6 +34,14 @@ pub(super) struct Arguments {
     /// default method against the truth
     #[arg(long, value_name = "N", conflicts_with = "out", value_parser = clap::value_parser!(u32).range(1..))]
     repetitions: Option<u32>,
+    /// Instead: spoil N guided drives of each participant as real logs are (noise, outliers, gaps, hands off, wrong
+    /// scales, delays and signs), and count the values that are called identified and are wrong; needs a --probe.
+    /// Exit code 1 if more than 1 of 1,000 is, or if lane noise costs too much
+    #[arg(long, value_name = "N", conflicts_with_all = ["out", "repetitions"], value_parser = clap::value_parser!(u32).range(1..))]
+    spoiled: Option<u32>,
+    /// Of --spoiled: only the ways whose name holds this
+    #[arg(long, value_name = "TEXT", default_value = "", requires = "spoiled")]
+    only: String,
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/experiment")]
     out: PathBuf,
@@ -60,6 +71,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         return Ok(Outcome::Good);
     }
+    if let Some(seeds) = arguments.spoiled {
+        return run_spoiled(arguments, &plan, seeds);
+    }
     let output = Output::begin(&arguments.out)?;
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
@@ -77,6 +91,43 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(Outcome::Good)
+}
+
+fn run_spoiled(arguments: &Arguments, plan: &Plan, seeds: u32) -> Result<Outcome, BadInput> {
+    let chosen = POPULATION
+        .iter()
+        .filter(|(name, _)| name.contains(&arguments.only));
+    let ways = chosen.count() as u64;
+    if ways == 0 {
+        let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
+        return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
+    }
+    let drives = ways * plan.participants.len() as u64 * u64::from(seeds);
+    let bar = progress::bar(drives, "drives");
+    let result = spoiled(plan, seeds, &arguments.only, || bar.inc(1))?;
+    bar.finish_and_clear();
+    if arguments.json {
+        print_json(&result)?;
+    } else {
+        let mut text = format!(
+            "{} drives of each participant, probe {} N.m, seeds from {}\n\n{}\n{} wrong of {} identified",
+            result.seeds,
+            plan.probe_nm,
+            plan.seed,
+            files::spoiled_table(&result).to_text(),
+            result.lies,
+            result.identified
+        );
+        for broken in &result.broken {
+            text.push_str(&format!("\nNOT KEPT: {broken}"));
+        }
+        print(&text)?;
+    }
+    Ok(if result.broken.is_empty() {
+        Outcome::Good
+    } else {
+        Outcome::Failed
+    })
 }
 
 fn readable(result: &Experiment) -> String {

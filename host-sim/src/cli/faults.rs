@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_campaign::campaign::{self, Campaign};
-use haptic_campaign::table::{self as rows, Place, Row};
+use haptic_campaign::table::{self as rows, FaultCase, Place};
 use haptic_campaign::{World, document, target};
 use haptic_report::studies::faults as files;
 
@@ -75,8 +75,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })
 }
 
-fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static Row>, BadInput> {
-    let runs = |row: &&'static Row| match row.place {
+fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, BadInput> {
+    let runs = |row: &&'static FaultCase| match row.place {
         Place::Host => !in_qemu,
         Place::Both => true,
         Place::Target => false,
@@ -111,7 +111,7 @@ fn readable(campaign: &Campaign) -> String {
 }
 
 /// What the ECU reported in one run.
-fn story(world: &World, row: &'static Row, seed: u64) -> String {
+fn story(world: &World, row: &'static FaultCase, seed: u64) -> String {
     let outcome = world.run(row, seed);
     let mut text = format!(
         "\n{}: {}; {}, {} km/h, fault at {:.3} s\n",

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::handover::{ROWS, Results, Row, study};
+use haptic_batch::handover::{HandoverResults, HandoverRow, ROWS, study};
 use haptic_report::studies::handover as files;
 
 use super::output::Output;
@@ -33,14 +33,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&readable(&results))?;
     }
-    Ok(if results.rows.iter().any(Row::is_broken) {
+    Ok(if results.rows.iter().any(HandoverRow::is_broken) {
         Outcome::Failed
     } else {
         Outcome::Good
     })
 }
 
-fn readable(results: &Results) -> String {
+fn readable(results: &HandoverResults) -> String {
     format!(
         "{}\n\n{}\n{}",
         files::SUMMARY,

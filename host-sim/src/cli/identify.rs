@@ -22,16 +22,33 @@ pub(super) struct Arguments {
     /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
-    /// A drive without guidance: there is no K_hg, and guidance_torque_nm may be missing
+    /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
+    /// missing
     #[arg(long)]
     manual: bool,
     /// Prediction errors with a disturbance model, or the published way
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
-    /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms);
-    /// may be repeated
+    /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
+    /// how much a column is late, s: t_h_late, t_d_late); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
+    /// Estimate what is otherwise taken as known: k_nms, t_nms, t_h_late, t_d_late, in a range if one is given, such as
+    /// t_nms=0.06..0.15; may be repeated
+    #[arg(long, value_name = "NAME[=LOW..HIGH]")]
+    estimate: Vec<String>,
+    /// Use the log from this time on, s; may be repeated with --to for several stretches
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    from: Vec<f64>,
+    /// Use the log up to this time, s
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    to: Vec<f64>,
+    /// Take the lane signals as they are: no camera noise is estimated and removed
+    #[arg(long)]
+    exact_lane: bool,
+    /// Use every row: hands off, standstill and lane changes are not looked for
+    #[arg(long)]
+    whole: bool,
     #[command(flatten)]
     course: CourseArguments,
     /// Speed on that course, km/h (20 to 250)
@@ -52,7 +69,13 @@ enum MethodArgument {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let options = Options::given(arguments.manual, &arguments.fix)?;
+    let mut options = Options::given(arguments.manual, &arguments.fix)?;
+    for what in &arguments.estimate {
+        options.estimate(what)?;
+    }
+    options.between(&arguments.from, &arguments.to)?;
+    options.lane_noise = !arguments.exact_lane;
+    options.leave_out = !arguments.whole;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
@@ -88,6 +111,18 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.fit_percent,
         files::parameters(found).to_text()
     );
+    if let Some(in_the_log) = files::in_the_log(found) {
+        text.insert_str(0, &format!("{}\n", in_the_log.to_text()));
+    }
+    for sentence in files::refutations(found) {
+        text.push_str(&format!("\n{sentence}\n"));
+    }
+    if !found.assumed.is_empty() {
+        text.push_str("\nAssumed, for the log cannot show it:\n");
+        for assumed in &found.assumed {
+            text.push_str(&format!("- {assumed}\n"));
+        }
+    }
     if !found.combinations.is_empty() {
         text.push_str(&format!("\n{}", files::combinations(found).to_text()));
     }

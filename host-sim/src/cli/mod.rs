@@ -31,7 +31,8 @@ use serde::Serialize;
 
 /// Closed-loop workbench for the haptic-guidance steering controller.
 ///
-/// Without a subcommand: the evaluation, as `evaluate` with the same options.
+/// Without a subcommand: the evaluation, as `evaluate` with the same options. New here? The tutorial is
+/// docs/tutorials/first-evaluation.md, and docs/glossary.md explains every word and symbol.
 ///
 /// Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage, or a program that is not
 /// installed.
@@ -58,7 +59,7 @@ enum Command {
     Run(run::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
     Faults(faults::Arguments),
-    /// What a failed input costs when the ECU hands over, and what a sudden loss costs: 40 to 120 km/h
+    /// What a lost input costs if the ECU hands over within 2 s, and if the torque is lost at once: 40 to 120 km/h
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
@@ -66,7 +67,7 @@ enum Command {
     Parameters(parameters::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
-    /// How well the ECU reads the drivers' reliance from its probe, against the truth
+    /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
     Reliance(reliance::Arguments),
 }
 

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
+use haptic_core::params::{PARAMETERS, Params};
 use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
 
+use super::table::text;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -30,12 +32,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(path) => Some(haptic_batch::files::load_scenario(path)?.controller_params()),
         None => None,
     };
-    let status = Product::on(&arguments.can).and_then(|mut product| match &params {
-        Some(params) => product.store(params),
-        None => product.status(),
+    let told = Product::on(&arguments.can).and_then(|mut product| {
+        let status = match &params {
+            Some(params) => product.store(params),
+            None => product.status(),
+        }?;
+        Ok((status, product.values()?))
     });
-    let status = match status {
-        Ok(status) => status,
+    let (status, in_use) = match told {
+        Ok(told) => told,
         Err(error @ PilError::Missing(_)) => return Err(error.into()),
         Err(error) => {
             eprintln!("error: {error}");
@@ -47,6 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             "stored": status.stored,
             "sequence": status.sequence,
             "damaged": status.damaged,
+            "parameters": values(&in_use).collect::<serde_json::Map<_, _>>(),
         }))?;
     } else {
         let set = if status.stored {
@@ -59,7 +65,61 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         } else {
             ""
         };
-        print(&format!("the ECU uses {set}{damage}"))?;
+        print(&format!("the ECU uses {set}{damage}:\n\n{}", listing(&in_use)))?;
     }
     Ok(Outcome::Good)
+}
+
+/// Names and values, in the order of the list.
+fn values(params: &Params) -> impl Iterator<Item = (String, serde_json::Value)> {
+    PARAMETERS
+        .into_iter()
+        .zip(params.to_values())
+        .map(|(parameter, value)| (parameter.name.to_owned(), shortest(value).into()))
+}
+
+/// The bus carries a binary32: of the doubles that it stands for, the one with the fewest digits.
+fn shortest(value: f64) -> f64 {
+    format!("{}", value as f32).parse().unwrap_or(value)
+}
+
+fn listing(params: &Params) -> String {
+    let head = ["parameter", "value", "unit", "range", "meaning"].map(String::from);
+    let mut lines = vec![head.to_vec()];
+    lines.extend(
+        PARAMETERS
+            .iter()
+            .zip(params.to_values())
+            .map(|(parameter, value)| {
+                vec![
+                    parameter.name.to_owned(),
+                    shortest(value).to_string(),
+                    parameter.unit.to_owned(),
+                    format!("{} to {}", parameter.min, parameter.max),
+                    parameter.meaning.trim().to_owned(),
+                ]
+            }),
+    );
+    text(&lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_shown_as_it_was_written_and_not_as_the_bus_rounds_it() {
+        let params = Params {
+            k_1: f64::from(0.3_f32),
+            ..Params::PAPER
+        };
+        assert_ne!(params.k_1, 0.3);
+        let listing = listing(&params);
+        let row = listing.lines().find(|line| line.starts_with("k_1 ")).unwrap();
+        assert!(
+            row.contains(" 0.3 ") && row.contains("N.m") && row.contains("0 to 4"),
+            "{row}"
+        );
+        assert_eq!(listing.lines().filter(|line| line.contains(" to ")).count(), 19);
+    }
 }

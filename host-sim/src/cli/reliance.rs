@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::reliance::{Plan, Results, study};
+use haptic_batch::reliance::{Plan, RelianceResults, study};
 use haptic_report::studies::reliance as files;
 
 use super::output::Output;
@@ -18,7 +18,7 @@ pub(super) struct Arguments {
     /// Drives of each participant, each with its own remnant
     #[arg(long, value_name = "N", default_value_t = 20)]
     seeds: u32,
-    /// Frequency of the probe, Hz
+    /// Frequency of the probe, Hz: a small sine added to the guidance torque, whose answer tells K_hg
     #[arg(long, value_name = "HZ", default_value_t = 2.5, allow_negative_numbers = true)]
     frequency: f64,
     /// Amplitude of the probe, N.m
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     Ok(Outcome::Good)
 }
 
-fn readable(results: &Results) -> String {
+fn readable(results: &RelianceResults) -> String {
     format!(
         "Reliance read live: probe {} N.m at {} Hz, {} seeds\n\n{}\n{}\n{}",
         results.amplitude_nm,

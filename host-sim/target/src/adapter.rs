@@ -1,7 +1,7 @@
 //! The way to a board: a CAN adapter that this computer sees as a network interface (SocketCAN) or as a serial line
 //! that speaks SLCAN.
 //!
-//! SocketCAN's frames travel as the pipe's records, so that whoever reads and writes bytes need not know.
+//! SocketCAN's frames travel as the pipe's records, so that code that reads and writes bytes need not know.
 //! Not here: the interface's bit rate, which `ip link` sets.
 
 use std::io::{Read, Write};

@@ -7,7 +7,7 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 /// Longest wait for an answer.
-const PATIENCE: Duration = Duration::from_secs(10);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// A machine that is halted as long as this lives.
 pub(super) struct Gdb(TcpStream);
@@ -16,18 +16,18 @@ impl Gdb {
     /// QEMU halts its machine when somebody connects.
     pub(super) fn halt(port: u16) -> Result<Self> {
         let stream = TcpStream::connect(("127.0.0.1", port))?;
-        stream.set_read_timeout(Some(PATIENCE))?;
+        stream.set_read_timeout(Some(REPLY_TIMEOUT))?;
         stream.set_nodelay(true)?;
         Ok(Self(stream))
     }
 
     pub(super) fn read(&mut self, address: u32) -> Result<u8> {
-        let answer = self.ask(&format!("m{address:x},1"))?;
+        let answer = self.request(&format!("m{address:x},1"))?;
         u8::from_str_radix(&answer, 16).map_err(|_| refused(&answer))
     }
 
     pub(super) fn write(&mut self, address: u32, byte: u8) -> Result<()> {
-        match self.ask(&format!("M{address:x},1:{byte:02x}"))?.as_str() {
+        match self.request(&format!("M{address:x},1:{byte:02x}"))?.as_str() {
             "OK" => Ok(()),
             answer => Err(refused(answer)),
         }
@@ -35,13 +35,13 @@ impl Gdb {
 
     /// Detaches: the machine goes on.
     pub(super) fn resume(mut self) -> Result<()> {
-        match self.ask("D")?.as_str() {
+        match self.request("D")?.as_str() {
             "OK" => Ok(()),
             answer => Err(refused(answer)),
         }
     }
 
-    fn ask(&mut self, text: &str) -> Result<String> {
+    fn request(&mut self, text: &str) -> Result<String> {
         let sum = text.bytes().fold(0_u8, u8::wrapping_add);
         self.0.write_all(format!("${text}#{sum:02x}").as_bytes())?;
         loop {

@@ -1,7 +1,7 @@
 //! Processor in the loop: the same frames to the controller of this host and to the ELF in QEMU, and every
 //! frame of their answers compared byte for byte.
 //!
-//! The closed loop runs here with its own `Ecu`; whoever runs it reports each tick with [`Pil::tick`]. The
+//! The closed loop runs here with its own `Ecu`; its caller reports each tick with [`Pil::tick`]. The
 //! target gets the frames of the tick and then the time, steps, and answers with its own. Since both
 //! controllers must answer the same, the host need not wait: over the pipe (*fifo*) thousands of ticks are
 //! under way at once, over SLCAN one, as an outside client of the bus would do it.
@@ -11,19 +11,31 @@
 //!
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`adapter`]: the way to a board.
 //! - [`link`]: frames as bytes.
-//! - [`judge`]: compares the answers, on its own thread. - [`stepped`]: a target for whoever judges by himself,
+//! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
 //!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
+//!
+//! ```
+//! use haptic_target::{Channel, PilError};
+//!
+//! // Over pipes thousands of ticks are under way at once; SLCAN is what an outside client speaks.
+//! assert_eq!("slcan".parse(), Ok(Channel::Slcan));
+//! let unknown: Result<Channel, _> = "usb".parse();
+//! assert_eq!(unknown.unwrap_err(), "channel 'usb' is neither fifo nor slcan");
+//! // What is missing says what to install or to plug in.
+//! let missing = haptic_target::parameters::Product::on("no-such-interface");
+//! assert!(matches!(missing, Err(PilError::Missing(_) | PilError::Failed(_))));
+//! ```
 //!
 //! Not here: the plant and the scenario.
 
 mod adapter;
-mod answers;
+pub mod comparator;
 mod gdb;
 pub mod image;
-pub mod judge;
 mod link;
 pub mod parameters;
 pub mod qemu;
+mod responses;
 pub mod stepped;
 
 use std::fmt;
@@ -39,11 +51,11 @@ use haptic_lockstep::SimTime;
 use haptic_lockstep::{Start, parameter_frames};
 use serde::Serialize;
 
-use answers::Answers;
-use judge::{Counter, Expected, Judge};
-pub use judge::{Mismatch, Spent};
+use comparator::{Comparator, Counter, Expected};
+pub use comparator::{Mismatch, Spent};
 pub use qemu::Machine;
 use qemu::{Extras, Qemu};
+use responses::ResponseStream;
 
 /// How frames reach the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -145,9 +157,9 @@ pub struct Pil {
     /// None once the run is over: closing it tells the target so.
     input: Option<BufWriter<Box<dyn Write + Send>>>,
     expected: Option<SyncSender<Expected>>,
-    /// Closed by the judge when no answer is missing any more, or none will come.
+    /// Closed by the comparator when no answer is missing any more, or none will come.
     answered: Receiver<()>,
-    judge: Option<JoinHandle<Result<Report, PilError>>>,
+    comparator: Option<JoinHandle<Result<Report, PilError>>>,
     channel: Channel,
 }
 
@@ -158,7 +170,7 @@ impl Pil {
     /// # Errors
     /// What is missing or fails on the way to a running image.
     pub fn on(target: &Target, params: &Params, start: Start) -> Result<Self, PilError> {
-        let (channel, input, judge, window) = match target {
+        let (channel, input, comparator, window) = match target {
             &Target::Qemu {
                 machine,
                 channel,
@@ -173,13 +185,14 @@ impl Pil {
                 } else {
                     Counter::Nothing
                 };
-                let judge = Judge::new(Answers::new(Some(qemu), output, channel), channel, counter);
+                let comparator =
+                    Comparator::new(ResponseStream::new(Some(qemu), output, channel), channel, counter);
                 let window = match channel {
                     Channel::Fifo => WINDOW,
                     Channel::Slcan => 0,
                 };
                 let input: Box<dyn Write + Send> = Box::new(input);
-                (channel, input, judge, window)
+                (channel, input, comparator, window)
             }
             Target::Board(adapter) => {
                 let adapter::Adapter {
@@ -187,8 +200,12 @@ impl Pil {
                     input,
                     output,
                 } = adapter::open(adapter)?;
-                let judge = Judge::new(Answers::new(None, output, channel), channel, Counter::Cycles);
-                (channel, input, judge, 0)
+                let comparator = Comparator::new(
+                    ResponseStream::new(None, output, channel),
+                    channel,
+                    Counter::Cycles,
+                );
+                (channel, input, comparator, 0)
             }
         };
         let (expected, expectations) = sync_channel(window);
@@ -197,14 +214,16 @@ impl Pil {
             input: Some(BufWriter::new(input)),
             expected: Some(expected),
             answered,
-            judge: Some(std::thread::spawn(move || judge.run(&expectations, answering))),
+            comparator: Some(std::thread::spawn(move || {
+                comparator.run(&expectations, answering)
+            })),
             channel,
         };
-        pil.greet(params, start)?;
+        pil.handshake(params, start)?;
         Ok(pil)
     }
 
-    fn greet(&mut self, params: &Params, start: Start) -> Result<(), PilError> {
+    fn handshake(&mut self, params: &Params, start: Start) -> Result<(), PilError> {
         if self.channel == Channel::Slcan {
             self.write(link::OPEN)?;
         }
@@ -260,7 +279,7 @@ impl Pil {
         }
     }
 
-    /// Why the other end is gone: the judge knows.
+    /// Why the other end is gone: the comparator knows.
     fn failure(&mut self) -> PilError {
         match self.end() {
             Err(error) => error,
@@ -271,11 +290,11 @@ impl Pil {
         }
     }
 
-    /// Says that no more is expected, closes the target's input, and takes the judge's word.
+    /// Says that no more is expected, closes the target's input, and takes the report of the comparator.
     fn end(&mut self) -> Result<Report, PilError> {
         self.expected = None;
         if let Some(mut input) = self.input.take() {
-            // What is lost is lost only if the target is gone, which the judge will say.
+            // What is lost is lost only if the target is gone, which the comparator will report.
             let _ = input.flush();
             // A serial port forgets what was not yet read when its other end, told to end, closes it.
             let _ = self.answered.recv();
@@ -283,11 +302,11 @@ impl Pil {
                 let _ = input.write_all(link::CLOSE);
             }
         }
-        let judge = self
-            .judge
+        let comparator = self
+            .comparator
             .take()
             .ok_or_else(|| PilError::Failed("the run is over".into()))?;
-        judge.join().unwrap_or_else(|_| {
+        comparator.join().unwrap_or_else(|_| {
             Err(PilError::Failed(
                 "the thread that reads the target panicked".into(),
             ))
@@ -297,8 +316,8 @@ impl Pil {
 
 impl Drop for Pil {
     fn drop(&mut self) {
-        if self.judge.is_some() {
-            // An error elsewhere broke the run off: what the judge found is of no interest, only that QEMU ends.
+        if self.comparator.is_some() {
+            // An error elsewhere broke the run off: what the comparator found is of no interest, only that QEMU ends.
             let _ = self.end();
         }
     }

@@ -1,7 +1,8 @@
 //! The parameters of a product on a bus: which set it has in use, and a new one for it to store.
 //!
 //! The client sends a set as `haptic_core::download` has it and believes it stored when the ECU, started anew, says
-//! that a set of another number is in use: an ECU reads back what it stores, and the bus carries no values out.
+//! that a set of another number is in use. The ECU takes a set at standstill only, by the speeds on the bus; where nobody
+//! sends any, as on a bench, the client does, while it sends the set.
 //! Not here: what is in a set, and the way to the bus (`adapter`).
 
 use std::io::Write;
@@ -10,20 +11,27 @@ use std::time::{Duration, Instant};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance, Message, ParameterStatus, WriteOutcome};
-use haptic_core::download::{Download, frames};
+use haptic_core::bus::messages::{Guidance, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome};
+use haptic_core::config::Config;
+use haptic_core::download::{frames, mode_for_parameters, unlock};
 use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::quantity::Speed;
 
 use super::adapter::{self, Adapter};
-use super::answers::pump;
 use super::link::{self, Decoder};
+use super::responses::pump;
 use super::{Channel, PilError};
 
 /// Longest wait for a status, which comes every second, and a start takes less than another.
-const PATIENCE: Duration = Duration::from_secs(5);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Statuses after a set was sent: its storing and the start take less than these seconds.
 const STATUSES: usize = 5;
+/// The parameters in use come one every 100 ms, and a frame may be lost.
+const VALUES_WITHIN: Duration = Duration::from_secs(10);
+/// Speeds before a set: three that a new sender has to show, and more. At their period.
+const SPEEDS: u8 = 6;
+const SPEED_PERIOD: Duration = Duration::from_millis(10);
 /// A port that is silent for so long may belong to an ECU that speaks SLCAN itself and has just started anew.
 const REOPEN: Duration = Duration::from_millis(100);
 
@@ -34,6 +42,8 @@ pub struct Product {
     pending: std::vec::IntoIter<u8>,
     decoder: Decoder,
     channel: Channel,
+    /// Somebody sends the vehicle's speed.
+    hears_speed: bool,
 }
 
 impl Product {
@@ -53,6 +63,7 @@ impl Product {
             pending: Vec::new().into_iter(),
             decoder: Decoder::new(channel),
             channel,
+            hears_speed: false,
         };
         if channel == Channel::Slcan {
             product.write(link::OPEN)?;
@@ -75,21 +86,21 @@ impl Product {
     pub fn store(&mut self, params: &Params) -> Result<ParameterStatus, PilError> {
         let frames = frames(params);
         // The bus rounds to f32, which may be too far at the end of a range: the ECU's own judgement, before it is asked.
-        let mut judge = Download::NEW;
-        if !frames
-            .iter()
-            .any(|frame| judge.receive(frame, Mode::Standby).is_some())
-        {
+        let rounded = Params::from_values(&params.to_values().map(|value| f64::from(value as f32)));
+        if Config::new(&rounded).is_err() {
             let message = "a parameter is at the end of its range, and beyond it as the bus's 32-bit number";
             return Err(PilError::Failed(message.into()));
         }
         let (before, mode) = self.status_and_mode()?;
         if mode != Mode::Standby {
             return Err(PilError::Failed(format!(
-                "the ECU is in {mode:?}; it takes parameters in Standby only"
+                "the ECU is in {mode:?}; it takes parameters in Standby only, or where it is locked for want of them"
             )));
         }
-        for frame in &frames {
+        if !self.hears_speed {
+            self.send_standstill()?;
+        }
+        for frame in [unlock(before.sequence)].iter().chain(&frames) {
             self.write(&link::encode(self.channel, frame))?;
         }
         for since in 0..STATUSES {
@@ -103,9 +114,47 @@ impl Product {
         )))
     }
 
+    /// Speeds of zero, for an ECU on a bench: nobody else sends any.
+    fn send_standstill(&mut self) -> Result<(), PilError> {
+        let standing = Vehicle {
+            speeds: [Speed::ZERO; 2],
+        };
+        for counter in 0..SPEEDS {
+            self.write(&link::encode(self.channel, &standing.encode(counter)))?;
+            std::thread::sleep(SPEED_PERIOD);
+        }
+        Ok(())
+    }
+
+    /// The parameters in use, as the ECU tells them.
+    ///
+    /// # Errors
+    /// It does not tell all of them: it is locked for want of a set, or is an older one.
+    pub fn values(&mut self) -> Result<Params, PilError> {
+        let until = Instant::now() + VALUES_WITHIN;
+        let mut values = [None; PARAMETERS.len()];
+        while Instant::now() < until {
+            let Some(frame) = self.frame()?.filter(|frame| frame.id() == ParameterValue::ID) else {
+                continue;
+            };
+            if let Ok(value) = ParameterValue::decode(&mut { ReceiverState::TRUSTED }, &frame) {
+                values[usize::from(value.index)] = Some(f64::from(value.value));
+            }
+            if values.iter().all(Option::is_some) {
+                return Ok(Params::from_values(&values.map(Option::unwrap_or_default)));
+            }
+        }
+        Err(PilError::Failed(format!(
+            "the ECU told {} of {} parameters within {} s: it is locked for want of a set, or runs an older image",
+            values.iter().flatten().count(),
+            PARAMETERS.len(),
+            VALUES_WITHIN.as_secs()
+        )))
+    }
+
     /// The next status, and the mode of the last torque frame before it.
     fn status_and_mode(&mut self) -> Result<(ParameterStatus, Mode), PilError> {
-        let until = Instant::now() + PATIENCE;
+        let until = Instant::now() + REPLY_TIMEOUT;
         let mut mode = None;
         while Instant::now() < until {
             let Some(frame) = self.frame()? else {
@@ -117,7 +166,7 @@ impl Product {
                 Guidance::ID => {
                     mode = Guidance::decode(&mut receiver, &frame)
                         .ok()
-                        .map(|guidance| guidance.mode)
+                        .map(|guidance| mode_for_parameters(guidance.mode, guidance.faults))
                         .or(mode);
                 }
                 ParameterStatus::ID => {
@@ -126,13 +175,14 @@ impl Product {
                         return Ok(found);
                     }
                 }
+                Vehicle::ID => self.hears_speed = true,
                 _ => {}
             }
         }
         Err(PilError::Failed(format!(
             "no ECU told of its parameters for {} s: does it run steering-ecu, is the bus terminated, and do adapter \
              and ECU both run at 500 kbit/s?",
-            PATIENCE.as_secs()
+            REPLY_TIMEOUT.as_secs()
         )))
     }
 
@@ -194,6 +244,13 @@ fn verdict(
             "the ECU refused the set: a frame was lost, or somebody else sends parameters too"
         }
         WriteOutcome::OutOfRange => "the ECU refused the set: its ranges are not this program's",
+        WriteOutcome::NotStanding => {
+            "the ECU refused the set: the vehicle moves, or the speeds on the bus are not usable"
+        }
+        WriteOutcome::NotUnlocked => "the ECU refused the set: frames were lost, or another set came between",
+        WriteOutcome::TooSoon => {
+            "the ECU refused the set: it takes one ten seconds after a reset at the earliest; try again then"
+        }
     }))
 }
 

@@ -144,7 +144,7 @@ impl Qemu {
         None
     }
 
-    /// The run went well: nobody will ask for its log.
+    /// The run went well: its log is not needed.
     pub fn discard_log(&self) {
         let _ = std::fs::remove_file(&self.log);
     }

@@ -1,4 +1,4 @@
-//! A target that takes ticks and gives back its answers, for whoever judges them by himself; and whose memory can be
+//! A target that takes ticks and gives back its answers, for a caller that compares them by itself; and whose memory can be
 //! changed between two ticks, as a particle would.
 
 use std::io::{BufWriter, Write};
@@ -12,9 +12,9 @@ use haptic_lockstep::SimTime;
 use haptic_lockstep::{StackUse, Start, StepCost, parameter_frames};
 use object::{Object, ObjectSymbol};
 
-use super::answers::Answers;
 use super::gdb::Gdb;
 use super::qemu::{Extras, Machine, Qemu};
+use super::responses::ResponseStream;
 use super::{Channel, PilError, image, link};
 
 /// Name of the static that holds the controller (`firmware/src/bin/lockstep`).
@@ -24,7 +24,7 @@ const CONTROLLER: &str = "3ECU";
 pub struct Stepped {
     // Declared first, so that the machine's input closes before its end is waited for.
     input: BufWriter<ChildStdin>,
-    answers: Answers,
+    responses: ResponseStream,
     channel: Channel,
     /// Port of the debugger's stub.
     port: Option<u16>,
@@ -56,7 +56,7 @@ impl Stepped {
         let (qemu, input, output) = Qemu::start(Machine::default(), &elf, channel, extras)?;
         let mut stepped = Self {
             input: BufWriter::new(input),
-            answers: Answers::new(Some(qemu), output, channel),
+            responses: ResponseStream::new(Some(qemu), output, channel),
             channel,
             port,
             controller,
@@ -95,13 +95,13 @@ impl Stepped {
     /// Why there is none.
     pub fn answer(&mut self) -> Result<Vec<Frame>, PilError> {
         if self.input.flush().is_err() {
-            return Err(self.answers.gone("closed its input"));
+            return Err(self.responses.gone("closed its input"));
         }
         let mut answer = Vec::new();
         loop {
-            let frame = self.answers.frame()?;
+            let frame = self.responses.frame()?;
             if StepCost::decode(&frame).is_some() {
-                self.answers.steps += 1;
+                self.responses.steps += 1;
                 return Ok(answer);
             }
             if StackUse::decode(&frame).is_none() {
@@ -143,11 +143,11 @@ impl Stepped {
             self.write(link::CLOSE)?;
         }
         let Self {
-            input, mut answers, ..
+            input, mut responses, ..
         } = self;
         drop(input);
-        answers.end()?;
-        answers.discard_log();
+        responses.end()?;
+        responses.discard_log();
         Ok(())
     }
 
@@ -159,7 +159,7 @@ impl Stepped {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PilError> {
         match self.input.write_all(bytes) {
             Ok(()) => Ok(()),
-            Err(_) => Err(self.answers.gone("closed its input")),
+            Err(_) => Err(self.responses.gone("closed its input")),
         }
     }
 }

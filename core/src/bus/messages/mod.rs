@@ -11,14 +11,16 @@ mod service;
 
 pub use inputs::{Column, Demand, LanePreview, Vehicle};
 pub use outputs::{FaultRecord, Guidance, ResetCause, Telemetry, Warning};
-pub use service::{ParameterStatus, ParameterWrite, WriteOutcome};
+pub use service::{
+    ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
+};
 
 use super::e2e::{Protection, ReceiverState, Reject};
 use super::frame::Frame;
 use crate::quantity::{Micros, shift_round};
 
 /// Version of the bus: of identifiers, layouts and data IDs. `core/haptic.dbc` carries the same.
-pub const VERSION: &str = "2.0.0";
+pub const VERSION: &str = "2.1.0";
 
 /// Who sends a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +28,7 @@ pub enum Sender {
     /// The camera's computer.
     Camera,
     /// The column's sensors.
-    Column,
+    ColumnModule,
     /// The vehicle's computer, which wants guidance.
     Host,
     /// This ECU.
@@ -82,13 +84,16 @@ messages! {
     0x0C0 Guidance, 0x5A, 14, Ecu, 1.0;
     0x0D0 Warning, 0x66, 14, Ecu, 100.0;
     0x100 LanePreview, 0x11, 3, Camera, 8.333_333_333_333_334;
-    0x110 Column, 0x22, 14, Column, 2.0;
+    0x110 Column, 0x22, 3, ColumnModule, 2.0;
     0x120 Vehicle, 0x33, 3, Host, 10.0;
     0x130 Demand, 0x44, 3, Host, 10.0;
     0x140 ParameterWrite, 0x55, 14, Host, 10.0;
+    0x148 ParameterUnlock, 0xBB, 14, Host, 1000.0;
     0x300 FaultRecord, 0x77, 14, Ecu, 100.0;
     0x310 Telemetry, 0x88, 2, Ecu, 20.0;
     0x320 ParameterStatus, 0x99, 2, Ecu, 1000.0;
+    0x330 ParameterValue, 0xCC, 14, Ecu, 100.0;
+    0x340 Rejection, 0xAA, 14, Ecu, 100.0;
 }
 
 /// A safety message: what the list says of it, and how its signals lie in a 64-bit little-endian word.
@@ -121,11 +126,20 @@ pub trait Message: Copy {
     /// # Errors
     /// The first check that it fails: length, CRC, counter, trust, range.
     fn decode(state: &mut ReceiverState, frame: &Frame) -> Result<Self, Reject> {
+        Self::decode_within(state, frame, Self::MAX_DELTA)
+    }
+
+    /// The same, with the step of the counter that may have been lost: more, the longer the sender was silent.
+    ///
+    /// # Errors
+    /// As [`Message::decode`].
+    #[inline(always)]
+    fn decode_within(state: &mut ReceiverState, frame: &Frame, max_delta: u8) -> Result<Self, Reject> {
         let data = frame.full_data().ok_or(Reject::Length)?;
         let signals = Self::unpack(u64::from_le_bytes(data));
         // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
         if signals.is_some() || state.is_trusted() {
-            state.accept(&Self::PROTECTION, &data, Self::MAX_DELTA)?;
+            state.accept(&Self::PROTECTION, &data, max_delta)?;
         }
         signals.ok_or(Reject::Range)
     }

@@ -1,4 +1,5 @@
-//! What writes parameters, and says which are in use. Only in Standby, and never the torque path's.
+//! What writes parameters and says which are in use, and what tells of frames that were not used. Never the torque
+//! path's.
 
 #![expect(
     clippy::as_conversions,
@@ -6,6 +7,7 @@
 )]
 
 use super::{Info, Message, info, put, unsigned};
+use crate::bus::e2e::Reject;
 use crate::params::PARAMETERS;
 
 /// One field of a new set of parameters.
@@ -33,6 +35,81 @@ impl Message for ParameterWrite {
     }
 }
 
+/// What has to come before a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ParameterUnlock {
+    /// The number of the set in use, as [`ParameterStatus`] says it: a download that was recorded names another one.
+    pub sequence: u32,
+}
+
+impl Message for ParameterUnlock {
+    const INFO: Info = info::ParameterUnlock;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.sequence), 32, 32)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        Some(Self {
+            sequence: unsigned(word, 32, 32) as u32,
+        })
+    }
+}
+
+/// One parameter in use; the next every 100 ms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterValue {
+    /// Which field, in the order of [`PARAMETERS`].
+    pub index: u8,
+    /// Its value, SI, rounded to a binary32.
+    pub value: f32,
+}
+
+impl Message for ParameterValue {
+    const INFO: Info = info::ParameterValue;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.index), 12, 8) | put(i64::from(self.value.to_bits()), 32, 32)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        let index = unsigned(word, 12, 8) as u8;
+        (usize::from(index) < PARAMETERS.len()).then(|| Self {
+            index,
+            value: f32::from_bits(unsigned(word, 32, 32) as u32),
+        })
+    }
+}
+
+/// How often a message was not used for a reason; the next pair that there is every 100 ms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rejection {
+    /// Its identifier.
+    pub id: u16,
+    /// Why.
+    pub reason: Reject,
+    /// How many times since the start, saturating.
+    pub count: u16,
+}
+
+impl Message for Rejection {
+    const INFO: Info = info::Rejection;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.id), 12, 11)
+            | put(i64::from(self.reason as u8), 24, 4)
+            | put(i64::from(self.count), 32, 16)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        Some(Self {
+            id: unsigned(word, 12, 11) as u16,
+            reason: Reject::from_code(unsigned(word, 24, 4))?,
+            count: unsigned(word, 32, 16) as u16,
+        })
+    }
+}
+
 /// What became of the last set that was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -49,6 +126,12 @@ pub enum WriteOutcome {
     OutOfRange = 4,
     /// It is being stored, and the ECU starts anew with it.
     Taken = 5,
+    /// Refused: the vehicle moves, or nobody says that it stands.
+    NotStanding = 6,
+    /// Refused: it was not unlocked within the last two seconds, by the number of the set in use.
+    NotUnlocked = 7,
+    /// Refused: the ECU has not run for ten seconds since a reset.
+    TooSoon = 8,
 }
 
 impl WriteOutcome {
@@ -62,6 +145,9 @@ impl WriteOutcome {
             3 => Self::OutOfOrder,
             4 => Self::OutOfRange,
             5 => Self::Taken,
+            6 => Self::NotStanding,
+            7 => Self::NotUnlocked,
+            8 => Self::TooSoon,
             _ => return None,
         })
     }
@@ -86,7 +172,7 @@ impl Message for ParameterStatus {
     fn pack(&self) -> u64 {
         put(i64::from(self.stored), 12, 1)
             | put(i64::from(self.damaged), 13, 1)
-            | put(i64::from(self.outcome as u8), 16, 3)
+            | put(i64::from(self.outcome as u8), 16, 4)
             | put(i64::from(self.sequence), 32, 32)
     }
 
@@ -94,7 +180,7 @@ impl Message for ParameterStatus {
         Some(Self {
             stored: unsigned(word, 12, 1) != 0,
             damaged: unsigned(word, 13, 1) != 0,
-            outcome: WriteOutcome::from_code(unsigned(word, 16, 3))?,
+            outcome: WriteOutcome::from_code(unsigned(word, 16, 4))?,
             sequence: unsigned(word, 32, 32) as u32,
         })
     }

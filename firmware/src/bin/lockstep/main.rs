@@ -25,6 +25,7 @@ mod target {
     use embedded_can::nb::Can;
     use embedded_hal_nb::nb;
     use haptic_core::bus::Frame;
+    use haptic_core::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
     use haptic_core::params::Params;
     use haptic_core::quantity::{Instant, Micros};
@@ -166,8 +167,8 @@ mod target {
     /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
     #[inline(never)]
     fn begin(ecu: &mut Option<Ecu>, start: Start, params: &Params) {
-        match start.ecu(params) {
-            Ok(new) => *ecu = Some(new),
+        match Setup::new(params) {
+            Ok(setup) => *ecu = Some(start.ecu_with(&setup)),
             Err(error) => panic!("{error}"),
         }
     }

@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::log::DriveLog;
+use super::signals::SWITCH_RATE_NM_S;
 
 /// Time constant of each stage of the low-pass, s.
 const STAGE_S: f64 = 0.06;
@@ -38,6 +39,8 @@ pub struct Balance {
     pub driver_late_s: [f64; 2],
     /// By how much T_h is late against the wheel angle, and its standard error, s; none without T_h.
     pub guidance_late_s: Option<[f64; 2]>,
+    /// By how much T_h is late against T_d, and its standard error, s; none without T_h.
+    pub between_s: Option<[f64; 2]>,
     /// Torque per angle at slow motion, and its standard error, N.m/rad: positive, or a sign is wrong.
     pub stiffness: [f64; 2],
 }
@@ -95,6 +98,19 @@ fn lagged(u: &[f64], dt: f64, t: f64) -> Vec<f64> {
         .collect()
 }
 
+/// T_h with its switches half a row later: the old value was held up to the row of the new one, where the signals that are
+/// continuous are on the line between.
+fn held(torque: &[f64], dt: f64) -> Vec<f64> {
+    let mut out = torque.to_vec();
+    for k in 1..torque.len() {
+        let rise = torque[k] - torque[k - 1];
+        if rise.abs() > SWITCH_RATE_NM_S * dt {
+            out[k] -= 0.5 * rise;
+        }
+    }
+    out
+}
+
 /// Weighs the torques of `log` over the `stretches`; none if there is too little of them.
 pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) -> Option<Balance> {
     let dt = log.dt_s;
@@ -107,6 +123,7 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
     if rows.len() < 10 * settle.min(120) {
         return None;
     }
+    let held = held(&log.guidance_torque_nm, dt);
     let phi = pass(&log.wheel_angle_rad, dt, 0.0);
     let mut columns = vec![phi.acceleration.clone(), phi.rate.clone(), phi.value.clone()];
     columns.extend(VEHICLE_LAGS_S.map(|t| lagged(&phi.value, dt, t)));
@@ -120,7 +137,7 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
         columns.truncate(first_of_torques);
         columns.push(driver.rate);
         if guided {
-            let guidance = pass(&log.guidance_torque_nm, dt, guidance_late);
+            let guidance = pass(&held, dt, guidance_late);
             columns.push(guidance.value);
             columns.push(guidance.rate);
         }
@@ -132,6 +149,7 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
         let error = |i: usize| fit.errors[(i, i)].max(0.0).sqrt();
         let mut scale = None;
         let mut late = None;
+        let mut between = None;
         if guided {
             let s = -fit.weights[d + 1];
             scale = Some([s, error(d + 1)]);
@@ -139,6 +157,9 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
                 more = -fit.weights[d + 2] / s;
                 guidance_late += more.clamp(-0.03, 0.03);
                 late = Some([guidance_late, error(d + 2) / s.abs()]);
+                let variance = fit.errors[(d, d)] + fit.errors[(d + 2, d + 2)] / (s * s)
+                    - 2.0 * fit.errors[(d, d + 2)] / s;
+                between = Some([guidance_late - driver_late, variance.max(0.0).sqrt()]);
             }
         }
         let stiffness: f64 = stiff.clone().map(|i| fit.weights[i]).sum();
@@ -152,6 +173,7 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
             scale,
             driver_late_s: [driver_late, error(d)],
             guidance_late_s: late,
+            between_s: between,
             stiffness: [stiffness, variance.max(0.0).sqrt()],
         });
         if driver_late.abs() > 0.3 || guidance_late.abs() > 0.3 || (step.abs() < 5e-4 && more.abs() < 5e-4) {

@@ -59,7 +59,7 @@ pub(crate) fn whiteness(residual: &[f64], estimated: usize) -> Whiteness {
             largest = r;
         }
     }
-    let freedom = (lags - estimated.min(lags - 1)) as f64;
+    let freedom = (lags - estimated.min(lags.saturating_sub(1))).max(1) as f64;
     let p_value = ChiSquared::new(freedom).map_or(0.0, |d| d.sf(statistic));
     Whiteness {
         largest_autocorrelation: largest,

@@ -27,17 +27,17 @@ mod verdict;
 pub use balance::Balance;
 pub use bus_trace::open_recording;
 pub use diagnostics::{autocorrelation, fit_percent};
+pub use lane::LaneNoise;
 pub use log::{COLUMNS, DriveLog, LogError};
 pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};
-pub use lane::LaneNoise;
 pub use options::{FixError, Options};
-pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use paper::{TABLE_4, identify as identify_as_published};
+pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use result::{
     Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start,
     Traces, Whiteness,
 };
 pub use search::Termination;
 pub use signals::Muscle;
-pub use verdict::Refutation;
 pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, track};
+pub use verdict::Refutation;

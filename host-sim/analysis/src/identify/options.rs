@@ -65,7 +65,7 @@ impl Default for Options {
 }
 
 /// Names that can be fixed, with the range of each.
-const FIXABLE: [(&str, f64, f64); 11] = [
+const FIXABLE: [(&str, f64, f64); 13] = [
     ("a_1", 1e-4, 10.0),
     ("a_2", 1e-4, 10.0),
     ("a_3", 1e-4, 100.0),
@@ -78,6 +78,16 @@ const FIXABLE: [(&str, f64, f64); 11] = [
     ("k_hg", 0.0, 1.0),
     ("k_nms", 0.0, 10.0),
     ("t_nms", 0.01, 1.0),
+    ("t_h_late", -0.1, 0.3),
+    ("t_d_late", -0.1, 0.3),
+];
+
+/// Names that are known unless they are to be estimated, with the range in which they are then searched.
+const ESTIMABLE: [(&str, f64, f64); 4] = [
+    ("k_nms", 0.0, 10.0),
+    ("t_nms", 0.02, 0.5),
+    ("t_h_late", -0.1, 0.2),
+    ("t_d_late", -0.1, 0.2),
 ];
 
 impl Options {
@@ -146,9 +156,74 @@ impl Options {
             "k_d" => self.k_d = Some(value),
             "k_hg" => self.k_hg = Some(value),
             "k_nms" => self.muscle.k_nms = value,
+            "t_h_late" => self.late_s[0] = value,
+            "t_d_late" => self.late_s[1] = value,
             _ => self.muscle.t_nms_s = value,
         }
         Ok(name)
+    }
+
+    /// Takes a `NAME` or a `NAME=LOW..HIGH` of what is to be estimated instead of taken as known.
+    ///
+    /// # Errors
+    /// An unknown name, a range that is none or goes beyond the name's.
+    pub fn estimate(&mut self, what: &str) -> Result<(), FixError> {
+        let refuse = |why: String| Err(FixError(format!("--estimate {what}: {why}")));
+        let (name, range) = what.split_once('=').map_or((what, None), |(n, r)| (n, Some(r)));
+        let name = name.trim().to_ascii_lowercase();
+        let Some(i) = ESTIMABLE.iter().position(|e| e.0 == name) else {
+            let names: Vec<&str> = ESTIMABLE.iter().map(|e| e.0).collect();
+            return refuse(format!("unknown, one of {} is wanted", names.join(", ")));
+        };
+        let (_, least, most) = ESTIMABLE[i];
+        let [low, high] = match range {
+            None => [least, most],
+            Some(text) => {
+                let ends = text
+                    .split_once("..")
+                    .map(|(a, b)| (a.trim().parse(), b.trim().parse()));
+                let Some((Ok(low), Ok(high))) = ends else {
+                    return refuse("LOW..HIGH is wanted, such as t_nms=0.06..0.15".to_owned());
+                };
+                [low, high]
+            }
+        };
+        if !(low < high && low >= least && high <= most) {
+            return refuse(format!("a range within {least} to {most} is wanted"));
+        }
+        self.estimate[i] = Some([low, high]);
+        let within = |x: &mut f64| *x = x.clamp(low, high);
+        match i {
+            0 => within(&mut self.muscle.k_nms),
+            1 => within(&mut self.muscle.t_nms_s),
+            _ => within(&mut self.late_s[i - 2]),
+        }
+        Ok(())
+    }
+
+    /// Takes stretches of the log's time, s: the n-th from with the n-th to; a last to may be missing.
+    ///
+    /// # Errors
+    /// More ends than beginnings, an end before its beginning.
+    pub fn between(&mut self, from: &[f64], to: &[f64]) -> Result<(), FixError> {
+        if to.len() > from.len().max(1) || from.len() > to.len() + 1 {
+            return Err(FixError(format!(
+                "--from is given {} times and --to {} times: a stretch has both, the last may lack its --to",
+                from.len(),
+                to.len()
+            )));
+        }
+        for i in 0..from.len().max(to.len()) {
+            let begin = from.get(i).copied().unwrap_or(f64::NEG_INFINITY);
+            let end = to.get(i).copied().unwrap_or(f64::INFINITY);
+            if !(begin < end) {
+                return Err(FixError(format!(
+                    "--from {begin} --to {end}: the end is not after the beginning"
+                )));
+            }
+            self.stretches.push((begin, end));
+        }
+        Ok(())
     }
 
     /// Whether what is given can all be true for the noise model, in which gain_i = (K_d + K_nms)*a_i: K_d and one
@@ -204,6 +279,38 @@ mod tests {
             let e = o.fix(fix).unwrap_err().to_string();
             assert!(e.contains(says), "{e}");
         }
+    }
+
+    #[test]
+    fn what_is_to_be_estimated_has_a_range_and_a_stretch_two_ends() {
+        let mut o = Options::default();
+        o.estimate("t_nms=0.12..0.2").unwrap();
+        o.estimate("T_d_late").unwrap();
+        assert_eq!(o.estimate, [None, Some([0.12, 0.2]), None, Some([-0.1, 0.2])]);
+        assert_eq!(o.muscle.t_nms_s, 0.12);
+        for (what, says) in [
+            ("a_1", "one of k_nms, t_nms"),
+            ("t_nms=0.1", "LOW..HIGH"),
+            ("t_nms=0.2..0.1", "within 0.02 to 0.5"),
+            ("k_nms=0..20", "within 0 to 10"),
+        ] {
+            let e = o.estimate(what).unwrap_err().to_string();
+            assert!(e.contains(says), "{e}");
+        }
+        o.between(&[10.0, 50.0], &[20.0]).unwrap();
+        assert_eq!(o.stretches, [(10.0, 20.0), (50.0, f64::INFINITY)]);
+        assert!(
+            o.between(&[10.0], &[9.0])
+                .unwrap_err()
+                .to_string()
+                .contains("not after")
+        );
+        assert!(
+            o.between(&[1.0, 2.0, 3.0], &[9.0])
+                .unwrap_err()
+                .to_string()
+                .contains("3 times")
+        );
     }
 
     #[test]

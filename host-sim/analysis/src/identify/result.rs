@@ -211,8 +211,10 @@ pub struct Correlation {
 impl Correlation {
     /// Of the `free` parameters that have a name, from the covariance of the errors.
     pub(crate) fn new(names: &[Option<&'static str>], errors: &DMatrix<f64>, free: &[usize]) -> Self {
-        let shown: Vec<(usize, &'static str)> =
-            free.iter().filter_map(|&i| names.get(i).copied().flatten().map(|n| (i, n))).collect();
+        let shown: Vec<(usize, &'static str)> = free
+            .iter()
+            .filter_map(|&i| names.get(i).copied().flatten().map(|n| (i, n)))
+            .collect();
         let entry = |i: usize, j: usize| {
             let c = errors[(i, j)] / (errors[(i, i)] * errors[(j, j)]).sqrt();
             c.is_finite()
@@ -323,6 +325,8 @@ pub struct Identification {
     pub balance: Option<Balance>,
     /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.
     pub delay_profile: Vec<[f64; 2]>,
+    /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late.
+    pub beyond: Vec<(&'static str, Parameter)>,
     /// Assumptions that the record refutes: with any, nothing is identified.
     pub refuted: Vec<Refutation>,
     /// What was taken as true and cannot be seen in the record.

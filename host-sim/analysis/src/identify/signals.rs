@@ -36,7 +36,7 @@ impl Default for Muscle {
 }
 
 /// A torque that changes faster than this, N.m/s, has switched: it is the fastest that the envelope allows.
-const SWITCH_RATE_NM_S: f64 = 8.0;
+pub(super) const SWITCH_RATE_NM_S: f64 = 8.0;
 
 /// The ECU decides a torque every so many seconds, counted from time zero of the log.
 const ECU_PERIOD_S: f64 = 1e-3;

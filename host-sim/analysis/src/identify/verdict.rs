@@ -30,10 +30,15 @@ const BALANCE_SEEN: f64 = 0.8;
 /// Differences of scale and of delay, s, that are too small to matter.
 const SMALL_SCALE: f64 = 0.1;
 const SMALL_DELAY_S: f64 = 0.0045;
+/// The same of T_d against the wheel angle, which moves t_p alone: less is not told from the column's own lags.
+const SMALL_DRIVER_DELAY_S: f64 = 0.015;
 /// Largest autocorrelation of residuals that leaves the noise model standing: more is another noise.
 const WHITE_ENOUGH: f64 = 0.1;
 /// Largest cross-correlation with an input, in standard deviations, that leaves the driver model standing.
 const INDEPENDENT_ENOUGH: f64 = 7.0;
+
+/// Above this fit, %, what is left over is the error of interpolation, which is neither white nor independent.
+const ALL_BUT_PERFECT: f64 = 98.0;
 
 /// What the balance of torques on the column refutes.
 pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
@@ -95,31 +100,57 @@ pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
         }),
         _ => {}
     }
-    let mut late = |name: &str, option: &str, [value, error]: [f64; 2]| {
-        if sure(value, error) && value.abs() > SMALL_DELAY_S {
-            let (size, word) = (1e3 * value.abs(), if value > 0.0 { "late" } else { "early" });
-            out.push(Refutation {
-                assumption: "all columns were sampled at the same instant",
-                evidence: evidence(format!(
-                    "{name} {:.1} +- {:.1} ms {word} against wheel_angle_rad",
-                    size,
-                    1e3 * error
-                )),
-                cause: format!("{name} is {size:.0} ms {word}"),
-                cure: format!("--fix {option}={value:.4}"),
-            });
-        }
+    let mut late = |name: &str, than: &str, option: &str, [value, error]: [f64; 2]| {
+        let (size, word) = (1e3 * value.abs(), if value > 0.0 { "late" } else { "early" });
+        out.push(Refutation {
+            assumption: "all columns were sampled at the same instant",
+            evidence: evidence(format!(
+                "{name} {size:.1} +- {:.1} ms {word} against {than}",
+                1e3 * error
+            )),
+            cause: format!("{name} is {size:.0} ms {word}"),
+            cure: format!("--fix {option}={value:.4}, or --estimate {option}"),
+        });
     };
-    late("driver_torque_nm", "t_d_late", b.driver_late_s);
-    if let Some(h) = b.guidance_late_s {
-        late("guidance_torque_nm", "t_h_late", h);
+    let [driver, error] = b.driver_late_s;
+    let driver_is = sure(driver, error) && driver.abs() > SMALL_DRIVER_DELAY_S;
+    if driver_is {
+        late("driver_torque_nm", "wheel_angle_rad", "t_d_late", b.driver_late_s);
+    }
+    if let Some([value, error]) = b.between_s.filter(|_| !driver_is)
+        && sure(value, error)
+        && value.abs() > SMALL_DELAY_S
+    {
+        // A sensor is never early: of the two, the other one is late.
+        if value > 0.0 {
+            late(
+                "guidance_torque_nm",
+                "driver_torque_nm",
+                "t_h_late",
+                [value, error],
+            );
+        } else {
+            late(
+                "driver_torque_nm",
+                "guidance_torque_nm",
+                "t_d_late",
+                [-value, error],
+            );
+        }
     }
     out
 }
 
 /// What the residuals refute.
-pub(crate) fn of_residuals(white: &Whiteness, inputs: &[InputCorrelation]) -> Vec<Refutation> {
+pub(crate) fn of_residuals(
+    fit_percent: f64,
+    white: &Whiteness,
+    inputs: &[InputCorrelation],
+) -> Vec<Refutation> {
     let mut out = Vec::new();
+    if fit_percent > ALL_BUT_PERFECT {
+        return out;
+    }
     if white.p_value < 1e-6 && white.largest_autocorrelation.abs() > WHITE_ENOUGH {
         out.push(Refutation {
             assumption: "the disturbance is a low-passed remnant and white sensor noise",
@@ -127,7 +158,8 @@ pub(crate) fn of_residuals(white: &Whiteness, inputs: &[InputCorrelation]) -> Ve
                 "the prediction errors are not white: autocorrelation {:.3}",
                 white.largest_autocorrelation
             ),
-            cause: "a part of the drive is no driving, a sensor filters, or the driver is another one".to_owned(),
+            cause: "a part of the drive is no driving, a sensor filters, or the driver is another one"
+                .to_owned(),
             cure: "look at the residuals over time; leave out stretches with --from and --to".to_owned(),
         });
     }
@@ -138,7 +170,10 @@ pub(crate) fn of_residuals(white: &Whiteness, inputs: &[InputCorrelation]) -> Ve
                 "the prediction errors hold more of {}: {:.1} standard deviations",
                 test.input, test.largest_z
             ),
-            cause: format!("{} is late, filtered or at another scale, or the driver is another one", test.input),
+            cause: format!(
+                "{} is late, filtered or at another scale, or the driver is another one",
+                test.input
+            ),
             cure: "--estimate t_nms, k_nms, t_h_late or t_d_late".to_owned(),
         });
     }

@@ -12,16 +12,16 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
-mod participants;
 mod recorder;
 mod repetitions;
+mod spoiled;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use participants::{Participant, PublishedDriver, participants};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
+pub use spoiled::{POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
@@ -30,6 +30,7 @@ use haptic_log::trace::Trace;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::Course;
+use haptic_sim::participants::{Participant, PublishedDriver, participants};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
 use haptic_sim::simulation;
 
@@ -147,8 +148,18 @@ struct Driven {
     path: Vec<(f64, f64)>,
 }
 
-/// Lets a published driver drive, with his remnant and the paper's sensors.
+/// Lets a published driver drive, with a remnant and the paper's sensors.
 fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
+    driven_by(plan, number, truth, truth.parameters())
+}
+
+/// The same, by a driver who differs from the published one in what the log does not name.
+fn driven_by(
+    plan: &Plan,
+    number: u32,
+    truth: &PublishedDriver,
+    driver: DriverParameters,
+) -> Result<Driven, String> {
     let guided = truth.k_hg.is_some();
     let seed = plan
         .seed
@@ -162,7 +173,7 @@ fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, S
     };
     let driver = DriverParameters {
         remnant_sd_nm,
-        ..*scenario.driver()
+        ..driver
     };
     let scenario = scenario.to_builder().driver(driver).build()?;
     let mut recorder = Recorder::new(true);
@@ -217,18 +228,9 @@ fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scena
         guidance.controller.probe_amplitude_nm = plan.probe_nm;
     }
     let scenario = Scenario::builder()
-        .driver(DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
-            ..DriverParameters::default()
-        })
+        .driver(driver.parameters())
         .condition(condition)
-        .gains(ArmGains {
-            k_d: driver.k_d,
-            k_hg: driver.k_hg.unwrap_or(0.0),
-        })
+        .gains(driver.gains())
         .guidance(guidance)
         .seed(seed);
     Ok(scenario.build()?)
@@ -247,9 +249,9 @@ pub(super) fn identified_driver(
     let sum = k_d + muscle.k_nms;
     let a = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| gain.optimum.unwrap_or(0.0) / sum);
     let driver = DriverParameters {
-        a1: a[0],
-        a2: a[1],
-        a3: a[2],
+        a_1: a[0],
+        a_2: a[1],
+        a_3: a[2],
         t_p: p.t_p.optimum.unwrap_or(0.0).max(STEP_S),
         t_nms: muscle.t_nms_s,
         k_nms: muscle.k_nms,

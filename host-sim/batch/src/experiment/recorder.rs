@@ -15,12 +15,12 @@ const RATE_HZ: u32 = 120;
 #[derive(Debug, Clone)]
 pub struct Recorder {
     rounded: bool,
-    last: Option<Row>,
+    last: Option<StepValues>,
     log: DriveLog,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Row {
+struct StepValues {
     step: u32,
     e_y_m: f64,
     e_theta_rad: f64,
@@ -50,7 +50,7 @@ impl Recorder {
 
     /// Takes in one step.
     pub fn observe(&mut self, outcome: &Outcome) {
-        let now = Row {
+        let now = StepValues {
             step: outcome.observation.step,
             e_y_m: outcome.preview.e_y_m,
             e_theta_rad: outcome.preview.e_theta_rad,

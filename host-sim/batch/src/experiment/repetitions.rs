@@ -10,7 +10,7 @@ use super::{Plan, PublishedDriver, chosen, driven};
 use haptic_analysis::identify::{Muscle, Options, Parameter, Parameters, identify_with_noise_model};
 
 /// What is compared with the truth: the parameters that a torque record can carry.
-const COMPARED: usize = 5;
+pub(super) const COMPARED: usize = 5;
 
 /// What the repetitions found.
 #[derive(Debug, Clone, Serialize)]
@@ -98,9 +98,9 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
 }
 
 /// A parameter's key, what was found, and the truth.
-type Compared = (&'static str, Parameter, f64);
+pub(super) type Compared = (&'static str, Parameter, f64);
 
-fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
+pub(super) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared; COMPARED] {
     let sum = truth.k_d + Muscle::default().k_nms;
     [
         ("gain_1", found.gain_1, sum * truth.a_1),

@@ -19,10 +19,10 @@ use serde::Serialize;
 
 pub use readings::{Reading, Readings};
 
-use super::experiment::{Participant, participants};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::STEP_S;
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::participants::{Participant, participants};
 use haptic_sim::scenario::{DriverChange, GuidanceParameters, Scenario};
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Simulation};
@@ -31,9 +31,9 @@ use haptic_sim::{Action, Simulation};
 pub const REMNANT: (f64, f64) = (0.1, 0.5);
 /// Times after the start of a session at which the estimate is held against the truth, s.
 pub const TIMES_S: [f64; 3] = [10.0, 30.0, 40.0];
-/// A session, with the second of silence that ends it, s.
+/// A session, with the second of pause that ends it, s.
 const SESSION_S: f64 = 45.0;
-const SILENCE_S: f64 = 1.0;
+const PAUSE_S: f64 = 1.0;
 /// Sessions of a drive of 186 s.
 const SESSIONS: usize = 4;
 /// How long after a change the estimate must be near the new truth, s, and how near.
@@ -99,7 +99,7 @@ pub struct Settling {
 
 /// What came of it.
 #[derive(Debug, Clone, Serialize)]
-pub struct Results {
+pub struct RelianceResults {
     /// Amplitude of the probe, N.m.
     pub amplitude_nm: f64,
     /// Its frequency, Hz.
@@ -151,7 +151,7 @@ struct Drive {
 ///
 /// # Errors
 /// A participant or a parameter of the probe that is out of range.
-pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String> {
+pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults, String> {
     let all = participants();
     let chosen: Vec<usize> = plan
         .participants
@@ -187,7 +187,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String>
     };
     let lines = chosen.iter().zip(drives.chunks(plan.seeds as usize));
     let lines = lines.map(|(&place, drives)| {
-        let truth = gains(&all[place]).k_hg;
+        let truth = all[place].guided.gains().k_hg;
         let accuracy = accuracy(drives);
         ParticipantResult {
             participant: all[place].number,
@@ -200,7 +200,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<Results, String>
             accuracy,
         }
     });
-    Ok(Results {
+    Ok(RelianceResults {
         amplitude_nm: plan.amplitude_nm,
         frequency_hz: plan.frequency_hz,
         seeds: plan.seeds,
@@ -224,7 +224,7 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
         diverged: 0,
         example: None,
     };
-    let truth = gains(&all[place]);
+    let truth = all[place].guided.gains();
     let steady = scenario(plan, &all[place], seed)?;
     let readings = run(&steady, SESSION_S, &mut result);
     if result.diverged == 0 {
@@ -239,7 +239,9 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
 
     // Every other participant in turn, and the change on the straight, in the curves and between them.
     let count = all.len();
-    let other = gains(&all[(place + 1 + (seed as usize * 3) % (count - 1)) % count]);
+    let other = all[(place + 1 + (seed as usize * 3) % (count - 1)) % count]
+        .guided
+        .gains();
     let time_s = 40.0 + f64::from(seed * 37 % 100);
     let changing = scenario(plan, &all[place], seed + 1000)?
         .to_builder()
@@ -271,7 +273,7 @@ fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Readings {
     loop {
         let into_s = f64::from(simulation.steps()) * STEP_S % session_s;
         let action = Action {
-            probe: Some(into_s < session_s - SILENCE_S),
+            probe: Some(into_s < session_s - PAUSE_S),
             ..Action::default()
         };
         let Some(outcome) = simulation.step(&action) else {
@@ -291,27 +293,15 @@ fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenari
     guidance.controller.probe_amplitude_nm = plan.amplitude_nm;
     guidance.controller.probe_frequency_hz = plan.frequency_hz;
     let scenario = Scenario::builder()
-        .gains(gains(participant))
+        .gains(driver.gains())
         .driver(DriverParameters {
-            a1: driver.a_1,
-            a2: driver.a_2,
-            a3: driver.a_3,
-            t_p: driver.t_p,
             remnant_sd_nm: REMNANT.0,
             remnant_corner_hz: REMNANT.1,
-            ..DriverParameters::default()
+            ..driver.parameters()
         })
         .guidance(guidance)
         .seed(u64::from(participant.number) * 10_000 + u64::from(seed));
     Ok(scenario.build()?)
-}
-
-fn gains(participant: &Participant) -> ArmGains {
-    let driver = participant.guided;
-    ArmGains {
-        k_d: driver.k_d,
-        k_hg: driver.k_hg.unwrap_or(0.0),
-    }
 }
 
 impl Accuracy {

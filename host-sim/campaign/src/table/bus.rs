@@ -1,8 +1,8 @@
 //! Faults of the bus: frames lost, late, again, damaged, forged. All of them also run in QEMU.
 
-use super::{Row, STALE_MS, row};
+use super::{FaultCase, STALE_MS, row};
 use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
-use crate::injection::{Injection, Wire, Wish};
+use crate::injection::{Injection, RequestFault, Wire};
 
 const ALL: &[u16] = &[LANE, COLUMN, VEHICLE, DEMAND];
 
@@ -16,7 +16,7 @@ const fn wire(wire: Wire) -> Injection {
     Injection::Wire(wire)
 }
 
-pub(super) const ROWS: &[Row] = &[
+pub(super) const ROWS: &[FaultCase] = &[
     row("silence-20", "no frames for 20 ms after a lane preview", &[SILENCE]).after_sample().bridged().lasts(20).q(),
     row("silence-31", "no frames for 31 ms", &[SILENCE]).hands_over(STALE_MS).lasts(31).q(),
     row("silence-1000", "no frames for 1 s", &[SILENCE]).hands_over(STALE_MS).lasts(1000).q(),
@@ -40,8 +40,8 @@ pub(super) const ROWS: &[Row] = &[
     row("masquerade", "each message's bytes also under another identifier", &[wire(Wire::Masquerade)]).rejected().q(),
     row("wrong-length", "frames of seven bytes", &[wire(Wire::Short)]).hands_over(STALE_MS).q(),
     row("wrong-identifier", "frames under an unknown identifier", &[wire(Wire::Renamed)]).hands_over(STALE_MS).q(),
-    row("ten-times-the-rate", "ten frames where one is due, counters running", &[wire(Wire::Rushed(10))]).q(),
+    row("ten-times-the-rate", "ten frames where one is due, counters running", &[wire(Wire::Burst(10))]).q(),
     row("jitter", "frames up to 25 ms late, in order: a gap may pass the time-out", &[wire(Wire::Jittered(25))]).gaps_may_hand_over().q(),
-    row("request-toggles", "request toggles at 50 Hz", &[Injection::Wish(Wish::Toggles)]).fades(22).q(),
+    row("request-toggles", "request toggles at 50 Hz", &[Injection::Request(RequestFault::Toggles)]).fades(22).q(),
     row("bus-off", "bus off for 100 ms, then back", &[SILENCE]).hands_over(STALE_MS).lasts(100).q(),
 ];

@@ -3,9 +3,9 @@
 //! Sigma of the lane errors is 5 mm and 0.5 mrad. A jerk of the wheel moves the vehicle where a fault can only
 //! be seen by a movement that does not come.
 
-use super::{Row, STALE_MS, row};
+use super::{FaultCase, STALE_MS, row};
 use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
-use crate::injection::{Change, Hand, Injection, Signal, Start, Wire, Wish};
+use crate::injection::{Change, Hand, Injection, RequestFault, Signal, Start, Wire};
 use crate::residual::Seen;
 
 use Change::{Approaching, Drifting, Frozen, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
@@ -42,7 +42,7 @@ const fn opposing(torque_nm: f64, ms: i32) -> Injection {
     Injection::Hand(Hand::Opposes { torque_nm, ms })
 }
 
-pub(super) const ROWS: &[Row] = &[
+pub(super) const ROWS: &[FaultCase] = &[
     row("jerk", "driver jerks the wheel: no fault", &[JERK]),
     row(
         "lateral-error-frozen",
@@ -360,7 +360,7 @@ pub(super) const ROWS: &[Row] = &[
         "noise of 50 mm and 5 mrad",
         &[Sensor(LateralError, Noisy(0.05)), Sensor(YawError, Noisy(0.005))],
     ),
-    // The driver and his sensor.
+    // The driver and the torque sensor.
     row(
         "driver-torque-zero",
         "T_d stuck at 0",
@@ -478,11 +478,16 @@ pub(super) const ROWS: &[Row] = &[
     .hands_over(420),
     row("heading-wraps", "the road's heading passes +-pi: no jump", &[]).from(Start::HeadingWraps),
     // The host's request.
-    row("request-ends", "request ends", &[Injection::Wish(Wish::Ends)]).fades(12),
+    row(
+        "request-ends",
+        "request ends",
+        &[Injection::Request(RequestFault::Ends)],
+    )
+    .fades(12),
     row(
         "request-drops",
         "request low in one frame: no way around the rate limits",
-        &[Injection::Wish(Wish::Drops(1))],
+        &[Injection::Request(RequestFault::Drops(1))],
     )
     .fades(12),
 ];

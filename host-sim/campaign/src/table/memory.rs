@@ -2,22 +2,22 @@
 
 use haptic_core::ecu::injection::Region;
 
-use super::{MOTOR_MS, Row, row};
-use crate::injection::{Hand, Injection, Inside, Motor, Start, Wish};
+use super::{FaultCase, MOTOR_MS, row};
+use crate::injection::{Hand, Injection, Inside, Motor, RequestFault, Start};
 use crate::residual::Seen;
 
 const fn inside(inside: Inside) -> Injection {
     Injection::Inside(inside)
 }
 
-pub(super) const ROWS: &[Row] = &[
+pub(super) const ROWS: &[FaultCase] = &[
     row("hard-fault", "the processor faults", &[])
         .restarts(2, 20)
         .only_q(),
     row("panic", "a check fails outside the torque path", &[])
         .restarts(3, 20)
         .only_q(),
-    row("stack-overflow", "the stack runs into its guard", &[])
+    row("stack-overflow", "the stack runs into its MPU guard", &[])
         .restarts(4, 20)
         .only_q(),
     row(
@@ -99,7 +99,10 @@ pub(super) const ROWS: &[Row] = &[
     row(
         "motor-ignores",
         "the motor goes on with its torque while the request ends",
-        &[Injection::Motor(Motor::Stuck), Injection::Wish(Wish::Ends)],
+        &[
+            Injection::Motor(Motor::Stuck),
+            Injection::Request(RequestFault::Ends),
+        ],
     )
     .stops(MOTOR_MS)
     .seen(Seen::Motor)

@@ -1,6 +1,6 @@
 //! Faults of time: clocks, ticks, deadlines.
 
-use super::{Row, row};
+use super::{FaultCase, row};
 use crate::injection::{Clock, Injection};
 
 const fn clock(clock: Clock) -> Injection {
@@ -10,7 +10,7 @@ const fn clock(clock: Clock) -> Injection {
 /// Two steps in a row, or one by 10 ms, late: seen at the end of the second.
 const LATE_MS: u32 = 20;
 
-pub(super) const ROWS: &[Row] = &[
+pub(super) const ROWS: &[FaultCase] = &[
     row("clock-fast", "clock 5 % fast", &[clock(Clock::Rate(1.05))]).q(),
     row("clock-slow", "clock 5 % slow", &[clock(Clock::Rate(0.95))]).q(),
     row(

@@ -11,6 +11,11 @@
     return `rgba(${channel(1)},${channel(3)},${channel(5)},${opacity})`;
   }
 
+  // Numbers as they can be copied elsewhere: no separator of thousands.
+  function plain(u, ticks) {
+    return ticks.map((v) => (v == null ? "" : String(Number(v.toPrecision(10)))));
+  }
+
   // Shaded stretches below everything, markers above them.
   function backdrop(figure) {
     return (u) => {
@@ -70,6 +75,11 @@
     return [[series.x, series.y], [series.x, series.high]];
   }
 
+  // A value under the cursor with so many digits.
+  function read(digits) {
+    return (u, v) => (v == null ? "–" : String(Number(v.toPrecision(digits))));
+  }
+
   function look(series, index) {
     const points = series.mark !== "line" && series.mark !== "interval";
     const label = series.label || "value";
@@ -79,23 +89,25 @@
         stroke: pale(series.colour, 0.5),
         width: 0.5,
         points: { show: false },
+        value: read(5),
       };
     }
     return {
       label,
       stroke: series.colour,
       width: points ? 0 : series.width,
+      fill: points ? series.colour : undefined,
       dash: series.dash.length ? series.dash : undefined,
       paths: points ? () => null : undefined,
       points: points ? { show: true, size: 7, fill: series.colour, width: 0 } : { show: false },
-      value: (u, v) => (v == null ? "–" : String(Number(v.toPrecision(5)))),
+      value: read(5),
     };
   }
 
   function chart(figure, panel, last, place, siblings, key) {
     const tables = panel.series.flatMap(columns);
     const data = tables.length ? uPlot.join(tables.map(([x, y]) => [x, y])) : [[]];
-    const shown = [{ label: figure.x || "x", value: (u, v) => (v == null ? "–" : String(Number(v.toPrecision(6)))) }];
+    const shown = [{ label: figure.x || "x", value: read(6) }];
     const areas = [];
     for (const series of panel.series) {
       if (series.mark === "interval") {
@@ -110,12 +122,25 @@
       title: panel.title || undefined,
       series: shown,
       bands: areas,
+      pxAlign: 0,
       scales: {
         x: { time: false, range: (u, low, high) => (low == null ? whole : [low, high]) },
         y: panel.limits ? { range: () => panel.limits } : {},
       },
-      axes: [{ label: last ? figure.x : undefined, size: last ? 34 : 24 }, { label: panel.label, size: 66 }],
-      cursor: { sync: { key }, drag: { x: true, y: false } },
+      axes: [
+        {
+          label: last ? figure.x : undefined,
+          size: last ? 34 : 24,
+          values: plain,
+          incrs: figure.whole ? [1, 2, 5, 10, 20, 50, 100] : undefined,
+        },
+        { label: panel.label, size: 66, values: plain },
+      ],
+      // The cursor moves in all panels, a drag is one panel's: its scale goes to the others below.
+      cursor: {
+        sync: { key, filters: { pub: (type) => type !== "mousedown" && type !== "mouseup" } },
+        drag: { x: true, y: false },
+      },
       hooks: {
         drawClear: [backdrop(figure)],
         draw: [uprights(panel)],
@@ -151,6 +176,14 @@
     figure.panels.forEach((panel, i) => {
       chart(figure, panel, i + 1 === figure.panels.length, place, siblings, "figure-" + number);
     });
+    const keys = new Set(figure.markers.map((m) => "dotted: " + m.label));
+    for (const band of figure.bands) keys.add((band.dark ? "shaded: " : "lightly shaded: ") + band.label);
+    if (keys.size) {
+      const line = document.createElement("div");
+      line.className = "keys";
+      line.textContent = [...keys].join("; ");
+      place.append(line);
+    }
     addEventListener("resize", () => {
       for (const made of siblings) made.setSize({ width: place.clientWidth, height: HEIGHT });
     });

@@ -38,7 +38,9 @@ pub(super) fn data(figure: &Figure) -> Option<String> {
         .iter()
         .zip(figure.y_limits())
         .map(|(panel, limits)| {
-            let fixed = figure.same_y || panel.y.limits.is_some();
+            // The browser finds the limits of lines again when it zooms in; it knows nothing of stems and intervals.
+            let lines = panel.series.iter().all(|s| matches!(s.mark, Mark::Line));
+            let fixed = figure.same_y || panel.y.limits.is_some() || !lines;
             let series = panel.series.iter().map(|series| self::series(series, x_limits));
             json!({
                 "title": panel.title,
@@ -49,6 +51,7 @@ pub(super) fn data(figure: &Figure) -> Option<String> {
         });
     let data = json!({
         "x": figure.x.label,
+        "whole": figure.x.whole,
         "limits": x_limits,
         "panels": panels.collect::<Vec<_>>(),
         "markers": figure.markers.iter().map(|m| json!({ "label": m.label, "x": m.x })).collect::<Vec<_>>(),
@@ -129,6 +132,7 @@ mod tests {
             x: Axis {
                 label: "s".into(),
                 limits: Some((0.0, 3.0)),
+                ..Axis::default()
             },
             panels: vec![Panel {
                 series: vec![

@@ -128,6 +128,7 @@ fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
     let x = Axis {
         label: "x".into(),
         limits: Some((1.0, 0.0)),
+        ..Axis::default()
     };
     let figure = Figure {
         title: "Figure 8".into(),

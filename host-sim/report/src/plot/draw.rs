@@ -105,7 +105,10 @@ impl Page {
         let across = (fitting.max(1.0) as usize).min(entries.len());
         self.heights
             .push(LEGEND_LINE * entries.len().div_ceil(across) as f64 + 14.0);
-        let plot = LegendPlot::from_entries(entries).with_cols(across).without_box();
+        let plot = LegendPlot::from_entries(entries)
+            .with_cols(across)
+            .with_max_cols(across)
+            .without_box();
         self.cells.push(vec![Plot::LegendPlot(plot)]);
         let layout = Layout::new((0.0, 1.0), (0.0, 1.0)).with_body_size(TEXT_SIZE);
         let layout = layout

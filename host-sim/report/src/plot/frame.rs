@@ -28,6 +28,8 @@ const SCRIBBLE: f64 = 5.0 * PAGE_WIDTH;
 const SCRIBBLE_WIDTH: f64 = 1.0;
 /// Most points of an area's edge.
 const MOST_AREA_POINTS: usize = 600;
+/// A whole axis no longer than this has a tick at every number.
+const MOST_WHOLE_TICKS: f64 = 20.0;
 const STEM_WIDTH: f64 = 1.2;
 
 /// Where a panel lies and what its axes show.
@@ -115,6 +117,9 @@ impl<'a> Frame<'a> {
             return layout;
         }
         layout = layout.with_y_label(&panel.y.label);
+        if self.figure.x.whole && across.1 - across.0 <= MOST_WHOLE_TICKS {
+            layout = layout.with_x_tick_step(1.0);
+        }
         if self.has_x_axis() {
             layout = layout.with_x_label(&self.figure.x.label);
         }
@@ -143,11 +148,17 @@ impl<'a> Frame<'a> {
     }
 
     pub(super) fn plots(&self, panel: &Panel) -> Vec<Plot> {
-        panel
+        let plots: Vec<_> = panel
             .series
             .iter()
             .flat_map(|series| self.plots_of(series))
-            .collect()
+            .collect();
+        // A panel without anything is not drawn at all; one with an empty line has its frame.
+        if plots.is_empty() {
+            vec![Plot::Line(LinePlot::new())]
+        } else {
+            plots
+        }
     }
 
     fn plots_of(&self, series: &Series) -> Vec<Plot> {

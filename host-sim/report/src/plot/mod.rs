@@ -50,6 +50,8 @@ pub struct Axis {
     pub label: String,
     /// Lower and upper end; `None` takes them from the data.
     pub limits: Option<(f64, f64)>,
+    /// Whether only whole numbers mean anything on it.
+    pub whole: bool,
 }
 
 impl Axis {
@@ -57,7 +59,7 @@ impl Axis {
     pub fn of(label: &str) -> Self {
         Self {
             label: label.into(),
-            limits: None,
+            ..Self::default()
         }
     }
 }
@@ -240,7 +242,10 @@ impl Figure {
         let of_all = extent(extents.iter().flatten().flat_map(|&(low, high)| [low, high]));
         let limits = |(panel, own): (&Panel, &Option<(f64, f64)>)| {
             let data = if self.same_y { of_all } else { *own };
-            panel.y.limits.unwrap_or_else(|| with_room(data))
+            panel
+                .y
+                .limits
+                .unwrap_or_else(|| with_room(data, self.has_lines() || !self.rows.is_empty()))
         };
         self.panels.iter().zip(&extents).map(limits).collect()
     }
@@ -270,21 +275,21 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         })
 }
 
-/// Limits that hold `extent` with room; a single value gets half of itself on both sides, no value or zero (-1, 1).
-fn with_room(extent: Option<(f64, f64)>) -> (f64, f64) {
+/// Limits that hold `extent` with room; a single value gets half of itself on both sides, no value or zero (-1, 1). What
+/// starts from zero may stand on the frame if it `stands` there, as lines do; a dot would be cut.
+fn with_room(extent: Option<(f64, f64)>, stands: bool) -> (f64, f64) {
     match extent {
         None | Some((0.0, 0.0)) => (-1.0, 1.0),
         Some((low, high)) if low == high => (low - 0.5 * low.abs(), high + 0.5 * high.abs()),
         Some((low, high)) => {
             let room = ROOM * (high - low);
-            // What starts from zero may stand on the frame.
-            (
-                if low == 0.0 { 0.0 } else { low - room },
-                if high == 0.0 { 0.0 } else { high + room },
-            )
+            let room_at = |end: f64| if stands && end == 0.0 { 0.0 } else { room };
+            (low - room_at(low), high + room_at(high))
         }
     }
 }
 
+#[cfg(test)]
+mod pixel_tests;
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_batch::bus_load::{BIT_RATE, MAX_LOAD, Row};
+use haptic_batch::bus_load::{BIT_RATE, MAX_LOAD, MessageLoad};
 
 /// The load of the bus, as JSON holds it.
 #[derive(Debug, Clone, Serialize)]
@@ -16,7 +16,7 @@ pub struct Load {
     /// Bits per second.
     pub bit_rate: f64,
     /// Every message, most urgent first.
-    pub messages: Vec<Row>,
+    pub messages: Vec<MessageLoad>,
     /// Of all messages, as a share.
     pub load: f64,
     /// Most that it may be.
@@ -25,7 +25,7 @@ pub struct Load {
 
 impl Load {
     /// Of these messages.
-    pub fn of(messages: Vec<Row>) -> Self {
+    pub fn of(messages: Vec<MessageLoad>) -> Self {
         Self {
             bit_rate: BIT_RATE,
             load: messages.iter().map(|row| row.load).sum(),

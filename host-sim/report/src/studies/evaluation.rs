@@ -12,7 +12,7 @@ use crate::document::{
 use crate::plot::{Axis, Figure, Marker, Panel, Series};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::RunRecord;
-use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, Results};
+use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
 use haptic_sim::models::road::PAPER_COURSE;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
 use haptic_sim::simulation::Run;
@@ -56,7 +56,7 @@ pub fn write(evaluation: &Evaluation, series: SeriesFormat, directory: &Path) ->
 }
 
 /// The results as JSON holds them, with the scenario that the runs vary.
-pub fn stamped(evaluation: &Evaluation) -> Stamped<'_, Results> {
+pub fn stamped(evaluation: &Evaluation) -> Stamped<'_, EvaluationResults> {
     provenance(evaluation).stamp(&evaluation.results)
 }
 
@@ -68,7 +68,7 @@ fn provenance(evaluation: &Evaluation) -> Provenance {
 }
 
 /// The main metrics of each run.
-pub fn table(results: &Results) -> Table {
+pub fn table(results: &EvaluationResults) -> Table {
     table_of(results, "The main metrics of each run.", |d| {
         IN_SHORT.contains(&d.name)
     })
@@ -170,6 +170,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
         x: Axis {
             label: "Distance along the road (m)".into(),
             limits: Some((from, to)),
+            ..Axis::default()
         },
         same_y: true,
         panels,
@@ -232,7 +233,7 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
         sections.push(claims_section(results));
     }
     sections.push(Section {
-        heading: "Results".into(),
+        heading: "EvaluationResults".into(),
         blocks: vec![Block::Table(table(results))],
     });
     sections.push(Section {
@@ -257,7 +258,7 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
     }
 }
 
-fn claims_section(results: &Results) -> Section {
+fn claims_section(results: &EvaluationResults) -> Section {
     Section {
         heading: "What it must show".into(),
         blocks: vec![Block::Table(claims_table(results))],
@@ -265,7 +266,7 @@ fn claims_section(results: &Results) -> Section {
 }
 
 /// What the evaluation must show, and whether it does.
-pub fn claims_table(results: &Results) -> Table {
+pub fn claims_table(results: &EvaluationResults) -> Table {
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
         [holds, claim.claim.as_str(), &claim.evidence]
@@ -279,7 +280,7 @@ pub fn claims_table(results: &Results) -> Table {
     }
 }
 
-fn table_of(results: &Results, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
+fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
     let keys = |r: &RunRecord| {
         let ended = if r.diverged {
             format!("diverged at {:.0} m", r.end_m)

@@ -8,7 +8,7 @@ use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
-use haptic_batch::experiment::{Drive, Experiment, Finding, Repeated, Repetitions};
+use haptic_batch::experiment::{Drive, Experiment, Finding, Repeated, Repetitions, Spoiled, SpoiledLine};
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
@@ -138,6 +138,7 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         x: Axis {
             label: "Participant".into(),
             limits: Some((ends[0], ends[1])),
+            whole: true,
         },
         panels: panels.to_vec(),
         same_y: true,
@@ -159,7 +160,10 @@ fn estimates(experiment: &Experiment) -> Figure {
         Some((f64::from(d.participant) + ASIDE, k_hg.optimum?))
     });
     Figure {
-        x: Axis::of("Participant"),
+        x: Axis {
+            whole: true,
+            ..Axis::of("Participant")
+        },
         panels: vec![Panel {
             title: String::new(),
             y: Axis::of("K_hg"),
@@ -307,6 +311,52 @@ pub fn trajectory_table(experiment: &Experiment) -> Table {
             .map(String::from)
             .to_vec(),
         rows: rows.collect(),
+    }
+}
+
+/// What was made of each way of spoiling a log.
+pub fn spoiled_table(result: &Spoiled) -> Table {
+    let row = |l: &SpoiledLine| {
+        let count = |n: usize| Cell::number(n as f64, 0);
+        let mut cells = vec![
+            Cell::Text(l.spoiled_by.into()),
+            count(l.drives),
+            count(l.refuted),
+            count(l.identified),
+            count(l.lies),
+            Cell::Number {
+                value: l.coverage,
+                decimals: 3,
+            },
+        ];
+        cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
+        cells.push(count(l.k_hg_read));
+        let cause = l.cause.as_ref().map(|(cause, n)| format!("{n}: {cause}"));
+        cells.push(Cell::Text(cause.unwrap_or_default()));
+        cells
+    };
+    Table {
+        caption: "Wrong: called identified, and more than 4 standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. RMS \
+                  errors are those of all drives, refuted or not."
+            .into(),
+        columns: [
+            "Spoiled by",
+            "Drives",
+            "Refuted",
+            "Identified",
+            "Wrong",
+            "Coverage of 95 %",
+            "RMS gain_1",
+            "gain_2",
+            "gain_3",
+            "t_p",
+            "K_hg",
+            "K_hg read",
+            "Cause named most",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: result.lines.iter().map(row).collect(),
     }
 }
 

@@ -6,7 +6,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_campaign::campaign::{Campaign, RowResult};
+use haptic_campaign::campaign::{Campaign, CaseResult};
 use haptic_campaign::document;
 
 /// Writes the figure (SVG, PNG), the results (JSON), the table of faults (Markdown) and a report (HTML).
@@ -20,7 +20,7 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
     let faults = document::table_of_faults();
     write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
     let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
-                   they must keep."
+                   they must keep. A fault without a mark on the left has no deadline."
         .into();
     let mut blocks = vec![Block::Figure { figure, caption }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
@@ -56,7 +56,7 @@ pub fn summary(campaign: &Campaign) -> String {
 }
 
 /// A run that failed, and how to run it again.
-pub fn failure(f: &haptic_campaign::campaign::Failure) -> String {
+pub fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
     format!(
         "{} seed {}, cycle {}: {}: {}",
         f.row, f.seed, f.cycle, f.what, f.replay
@@ -66,7 +66,7 @@ pub fn failure(f: &haptic_campaign::campaign::Failure) -> String {
 /// Fault by fault.
 pub fn table(campaign: &Campaign) -> Table {
     let count = |n: u64| Cell::number(n as f64, 0);
-    let row = |row: &RowResult| {
+    let row = |row: &CaseResult| {
         let time = |ms: Option<u32>| Cell::Number {
             value: ms.map(f64::from),
             decimals: 0,
@@ -111,7 +111,7 @@ pub fn table(campaign: &Campaign) -> Table {
 /// Reaction beside deadline, torque beside bound. Deadlines span 1 ms to seconds, so the reaction is a share of its
 /// own.
 fn figure(campaign: &Campaign) -> Figure {
-    let of = |value: &dyn Fn(&RowResult) -> Option<f64>| -> Vec<(f64, f64)> {
+    let of = |value: &dyn Fn(&CaseResult) -> Option<f64>| -> Vec<(f64, f64)> {
         let rows = campaign.rows.iter().enumerate();
         rows.filter_map(|(i, row)| Some((i as f64 + 1.0, value(row)?)))
             .collect()

@@ -7,7 +7,7 @@ use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::evaluate::DRIVERS_T_P;
-use haptic_batch::handover::{Results, Row, SPEEDS_KMH};
+use haptic_batch::handover::{HandoverResults, HandoverRow, SPEEDS_KMH};
 use haptic_sim::scenario::Condition;
 
 /// What of the study a page or a terminal says before the table.
@@ -18,7 +18,7 @@ pub const SUMMARY: &str = "Peak lateral error in the first curve of paper-course
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
+pub fn write(results: &HandoverResults, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(results);
     write_figure(directory, "handover", &figure)?;
     write_json(&directory.join("results.json"), &stamped(results))?;
@@ -49,12 +49,12 @@ pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
 }
 
 /// The results as JSON holds them.
-pub fn stamped(results: &Results) -> Stamped<'_, Results> {
+pub fn stamped(results: &HandoverResults) -> Stamped<'_, HandoverResults> {
     Provenance::of(None).stamp(results)
 }
 
 /// The sentence that says whether the bound is kept.
-pub fn judgement(results: &Results) -> String {
+pub fn judgement(results: &HandoverResults) -> String {
     format!(
         "Largest handover ratio of a judged row: {:.2} (at most {}).",
         results.largest_judged_ratio, results.most
@@ -62,8 +62,8 @@ pub fn judgement(results: &Results) -> String {
 }
 
 /// Every row of the study.
-pub fn table(results: &Results) -> Table {
-    let row = |row: &Row| {
+pub fn table(results: &HandoverResults) -> Table {
+    let row = |row: &HandoverRow| {
         let verdict = match (row.manual_stable, row.is_judged(), row.is_broken()) {
             (false, ..) => "manual driver unstable",
             (true, false, _) => "not judged",
@@ -103,11 +103,11 @@ pub fn table(results: &Results) -> Table {
 }
 
 /// A panel for each driver that is judged: ratios over the speed.
-fn figure(results: &Results) -> Figure {
+fn figure(results: &HandoverResults) -> Figure {
     let conditions = [(Condition::High, 1), (Condition::Mid, 2)];
     let panel = |t_p: f64| {
         let mut series = vec![Series::line(
-            "most that a judged handover may cost",
+            "most that is allowed",
             0,
             vec![
                 (SPEEDS_KMH[0], results.most),
@@ -122,8 +122,8 @@ fn figure(results: &Results) -> Figure {
                     .filter(move |r| r.t_p == t_p && r.condition == condition)
             };
             // A driver who is not stable alone is not judged, and breaks the line.
-            let points = |ratio: fn(&Row) -> Option<f64>| {
-                let value = move |r: &Row| if r.is_judged() { ratio(r) } else { None };
+            let points = |ratio: fn(&HandoverRow) -> Option<f64>| {
+                let value = move |r: &HandoverRow| if r.is_judged() { ratio(r) } else { None };
                 rows()
                     .map(move |r| (r.speed_kmh, value(r).unwrap_or(f64::NAN)))
                     .collect::<Vec<_>>()
@@ -152,6 +152,7 @@ fn figure(results: &Results) -> Figure {
         x: Axis {
             label: "Speed (km/h)".into(),
             limits: Some((SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0)),
+            ..Axis::default()
         },
         same_y: true,
         panels: DRIVERS_T_P.map(panel).to_vec(),

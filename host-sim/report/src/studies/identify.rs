@@ -13,6 +13,9 @@ use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
 
+/// Highest value of the delay's profile that is drawn.
+const HIGHEST: f64 = 40.0;
+
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
 /// # Errors
@@ -23,6 +26,7 @@ pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputErro
         ("residuals", residuals(&drive.results.identification)),
         ("autocorrelation", correlogram(&drive.results.identification)),
         ("over_time", over_time(drive)),
+        ("delay_profile", delay_profile(&drive.results.identification)),
     ];
     for (name, figure) in &figures {
         write_figure(directory, name, figure)?;
@@ -48,6 +52,35 @@ fn panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
     }
 }
 
+/// A line that is broken where the rows are.
+fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Series> {
+    let step = x.get(1).map_or(0.0, |second| 1.5 * (second - x[0]));
+    let mut out = Vec::new();
+    let mut from = 0;
+    for k in 1..=x.len() {
+        if k == x.len() || x[k] - x[k - 1] > step {
+            out.push(line(label, style, &x[from..k], &y[from..k]));
+            from = k;
+        }
+    }
+    out
+}
+
+/// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %.
+fn delay_profile(found: &Identification) -> Figure {
+    let profile = &found.delay_profile;
+    let (x, y): (Vec<f64>, Vec<f64>) = profile.iter().map(|&[t_p, d]| (t_p, d.min(HIGHEST))).unzip();
+    let ends = [
+        x.first().copied().unwrap_or(0.0),
+        x.last().copied().unwrap_or(1.0),
+    ];
+    let series = vec![line("profile", 0, &x, &y), line("95 %", 1, &ends, &[3.84, 3.84])];
+    over(
+        "t_p (s)",
+        vec![panel("", "-2 log likelihood above the optimum", series)],
+    )
+}
+
 fn over(x: &str, panels: Vec<Panel>) -> Figure {
     Figure {
         x: Axis::of(x),
@@ -58,10 +91,13 @@ fn over(x: &str, panels: Vec<Panel>) -> Figure {
 
 fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
-    let series = vec![
-        line("measured", 0, &t.time_s, &t.measured_nm),
-        line("simulated", 3, &t.time_s, &t.simulated_nm),
-    ];
+    let mut series = pieces("measured", 0, &t.time_s, &t.measured_nm);
+    series.extend(pieces("simulated", 3, &t.time_s, &t.simulated_nm));
+    // What was left out, on the zero line, with its reason.
+    for l in found.preflight.iter().flat_map(|p| &p.left_out) {
+        let label = format!("left out: {}", l.reason);
+        series.push(line(&label, 1, &[l.from_s, l.to_s], &[0.0, 0.0]));
+    }
     over("Time (s)", vec![panel("", "Driver torque (N.m)", series)])
 }
 
@@ -114,20 +150,38 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     )
 }
 
-fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
+fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
     let found = &drive.results.identification;
-    let [torque, residuals, correlogram, over_time] = figures;
+    let [torque, residuals, correlogram, over_time, delay_profile] = figures;
     let figure = |figure, caption: &str| Block::Figure {
         figure,
         caption: caption.into(),
     };
-    let mut verdict: Vec<Block> = vec![Block::Table(parameters(found))];
+    let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
+    verdict.push(Block::Table(parameters(found)));
+    verdict.push(figure(
+        delay_profile,
+        "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
+    ));
+    if !found.assumed.is_empty() {
+        let assumed = found.assumed.join("; ");
+        verdict.push(Block::Text(format!(
+            "Assumed, for the log cannot show it: {assumed}."
+        )));
+    }
     verdict.extend(found.notes.iter().cloned().map(Block::Text));
     if !found.combinations.is_empty() {
         verdict.push(Block::Table(combinations(found)));
     }
     verdict.push(Block::Table(correlation(found)));
-    let mut sections = vec![
+    let mut sections: Vec<Section> = in_the_log(found)
+        .map(|table| Section {
+            heading: "In the log".into(),
+            blocks: vec![Block::Table(table)],
+        })
+        .into_iter()
+        .collect();
+    sections.extend([
         Section {
             heading: "Parameters".into(),
             blocks: verdict,
@@ -160,7 +214,7 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
                 "The same drive followed by the constrained Kalman filter, for drivers who change.",
             )],
         },
-    ];
+    ]);
     if let Some(again) = drives_again(drive) {
         sections.push(Section {
             heading: "The identified driver on the course".into(),
@@ -176,6 +230,27 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 4]) -> Report {
         sections,
         provenance: Some(Provenance::of(None)),
     }
+}
+
+/// What was found in the log and done about it.
+pub fn in_the_log(found: &Identification) -> Option<Table> {
+    let rows = found.preflight.as_ref()?.findings().into_iter();
+    Some(Table {
+        caption: "What was found in the log, and what was done about it.".into(),
+        columns: ["In the log", "Found", "Done"].map(String::from).to_vec(),
+        rows: rows.map(|row| row.map(Cell::Text).to_vec()).collect(),
+    })
+}
+
+/// What the record refutes, a sentence each.
+pub fn refutations(found: &Identification) -> Vec<String> {
+    let sentence = |r: &haptic_analysis::identify::Refutation| {
+        format!(
+            "Refuted: {}. Evidence: {}. Likeliest cause: {}. Cure: {}.",
+            r.assumption, r.evidence, r.cause, r.cure
+        )
+    };
+    found.refuted.iter().map(sentence).collect()
 }
 
 /// How the identified driver drives a course, if asked.
@@ -206,25 +281,32 @@ fn number(value: Option<f64>) -> Cell {
 
 /// Every parameter with its interval and verdict.
 pub fn parameters(found: &Identification) -> Table {
-    let rows = found.parameters.list().into_iter().map(|(name, unit, p)| {
-        let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
-        let verdict = match (p.fixed, p.identified, p.on_bound) {
-            (true, ..) => "given",
-            (_, true, true) => "identified, on a bound",
-            (_, true, false) => "identified",
-            (_, false, true) => "not identified, on a bound",
-            (_, false, false) => "not identified",
-        };
-        vec![
-            Cell::Text(name.into()),
-            Cell::Text(unit.into()),
-            number(p.estimate),
-            number(p.standard_error),
-            number(low),
-            number(high),
-            Cell::Text(verdict.into()),
-        ]
-    });
+    let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
+    let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
+    let rows = found
+        .parameters
+        .list()
+        .into_iter()
+        .chain(beyond)
+        .map(|(name, unit, p)| {
+            let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
+            let verdict = match (p.fixed, p.identified, p.on_bound) {
+                (true, ..) => "given",
+                (_, true, true) => "identified, on a bound",
+                (_, true, false) => "identified",
+                (_, false, true) => "not identified, on a bound",
+                (_, false, false) => "not identified",
+            };
+            vec![
+                Cell::Text(name.into()),
+                Cell::Text(unit.into()),
+                number(p.estimate),
+                number(p.standard_error),
+                number(low),
+                number(high),
+                Cell::Text(verdict.into()),
+            ]
+        });
     Table {
         caption: "An estimate is given only where the data identify the parameter.".into(),
         columns: [

@@ -7,7 +7,7 @@ use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::reliance::{
-    Accuracy, Example, NEAR, ParticipantResult, REMNANT, Reading, Results, SETTLING_S,
+    Accuracy, Example, NEAR, ParticipantResult, REMNANT, Reading, RelianceResults, SETTLING_S,
 };
 
 /// Most examples in the figure.
@@ -33,6 +33,7 @@ pub(super) fn panel(
         y: Axis {
             label: "K_hg".into(),
             limits: Some((-0.5, 1.5)),
+            ..Axis::default()
         },
         series: vec![
             Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
@@ -46,7 +47,7 @@ pub(super) fn panel(
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
+pub fn write(results: &RelianceResults, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(results);
     write_figure(directory, "reliance", &figure)?;
     write_json(&directory.join("results.json"), &stamped(results))?;
@@ -54,12 +55,12 @@ pub fn write(results: &Results, directory: &Path) -> Result<(), OutputError> {
 }
 
 /// The results as JSON holds them. Every drive follows from the published drivers, the probe and the seeds.
-pub fn stamped(results: &Results) -> Stamped<'_, Results> {
+pub fn stamped(results: &RelianceResults) -> Stamped<'_, RelianceResults> {
     Provenance::of(None).stamp(results)
 }
 
 /// The errors of all participants together, by time.
-pub fn pooled_table(results: &Results) -> Table {
+pub fn pooled_table(results: &RelianceResults) -> Table {
     let row = |a: &Accuracy| {
         vec![
             Cell::number(a.after_s, 0),
@@ -87,7 +88,7 @@ pub fn pooled_table(results: &Results) -> Table {
 }
 
 /// The errors of each participant, by time.
-pub fn participants_table(results: &Results) -> Table {
+pub fn participants_table(results: &RelianceResults) -> Table {
     let times = |what: &'static str| {
         results
             .pooled
@@ -112,7 +113,7 @@ pub fn participants_table(results: &Results) -> Table {
 }
 
 /// How many estimates are near after a change, and what limited or ended the drives.
-pub fn settling(results: &Results) -> String {
+pub fn settling(results: &RelianceResults) -> String {
     let (settling, [limited, steps]) = (&results.settling, results.limited_steps);
     format!(
         "Of {} changes {:.1} % of the estimates are within {NEAR} of the new truth after {SETTLING_S} s; of those by \
@@ -127,7 +128,7 @@ pub fn settling(results: &Results) -> String {
 }
 
 /// Changing drives, spread over the participants.
-fn figure(results: &Results) -> Figure {
+fn figure(results: &RelianceResults) -> Figure {
     let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
     let examples = results.examples.iter().step_by(stride);
     Figure {
@@ -138,7 +139,7 @@ fn figure(results: &Results) -> Figure {
     }
 }
 
-fn report(results: &Results, figure: Figure) -> Report {
+fn report(results: &RelianceResults, figure: Figure) -> Report {
     Report {
         title: "The driver's reliance, read live".into(),
         summary: format!(

@@ -46,7 +46,7 @@ impl Guidance for Direct {
                 driver_torque: Torque::from_nm(observation.driver_torque_nm),
                 wheel_angle: Radians::from_rad(observation.wheel_angle_rad),
             }),
-            speeds: Input::New([Speed::from_m_per_s(observation.speed_mps); 2]),
+            speeds: Input::New([Speed::from_m_per_s(observation.speed_m_per_s); 2]),
             request: Input::New(Request {
                 engage: observation.request.engage,
                 authority: Ratio::from_si(observation.request.authority),

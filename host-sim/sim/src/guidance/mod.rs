@@ -48,7 +48,7 @@ pub struct Observation {
     /// Guidance torque really applied since the last step, N.m.
     pub motor_torque_nm: f64,
     /// Speed, m/s.
-    pub speed_mps: f64,
+    pub speed_m_per_s: f64,
     /// What the host asks for.
     pub request: Request,
 }
@@ -80,7 +80,7 @@ pub trait Guidance {
     fn looks_at_road(&self, step: u32) -> bool;
 
     /// One step of 1 ms.
-    fn step(&mut self, view: &Observation) -> Actuation;
+    fn step(&mut self, observation: &Observation) -> Actuation;
 
     /// The frames that went to the ECU in the last step, in order of sending.
     fn frames_in(&self) -> &[Frame] {

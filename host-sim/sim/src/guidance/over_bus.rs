@@ -78,7 +78,7 @@ impl OverBus {
         if observation.step.is_multiple_of(HOST_PERIOD_STEPS) {
             let counter = (observation.step / HOST_PERIOD_STEPS) as u8;
             let vehicle = Vehicle {
-                speeds: [Speed::from_m_per_s(observation.speed_mps); 2],
+                speeds: [Speed::from_m_per_s(observation.speed_m_per_s); 2],
             };
             let _ = self.sent.push(vehicle.encode(counter));
             let demand = Demand {

@@ -15,12 +15,12 @@ use crate::input::{RangeError, in_range};
 /// Tables 4 and 8. The gains of the arm depend on the condition and are given apart ([`ArmGains`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriverParameters {
-    /// a1, target angle per lateral error at the near point, rad/m.
-    pub a1: f64,
-    /// a2, target angle per integral of that error, rad/(m.s).
-    pub a2: f64,
-    /// a3, target angle per yaw error at the far point.
-    pub a3: f64,
+    /// a_1, target angle per lateral error at the near point, rad/m.
+    pub a_1: f64,
+    /// a_2, target angle per integral of that error, rad/(m.s).
+    pub a_2: f64,
+    /// a_3, target angle per yaw error at the far point.
+    pub a_3: f64,
     /// t_p, processing delay, s, at least one step.
     pub t_p: f64,
     /// t_n, look-ahead time of the near point, s.
@@ -55,9 +55,9 @@ impl Default for DriverParameters {
     /// Driver 1 of table 7 with table 8, without remnant.
     fn default() -> Self {
         Self {
-            a1: 0.1,
-            a2: 0.05,
-            a3: 3.7,
+            a_1: 0.1,
+            a_2: 0.05,
+            a_3: 3.7,
             t_p: 0.1,
             t_n: 0.3,
             t_f: 1.0,
@@ -75,9 +75,9 @@ impl DriverParameters {
     /// # Errors
     /// The first field out of range, with its value and range.
     pub fn check(&self) -> Result<(), RangeError> {
-        in_range("a1", self.a1, 0.0..=10.0, "rad/m")?;
-        in_range("a2", self.a2, 0.0..=10.0, "rad/(m.s)")?;
-        in_range("a3", self.a3, 0.0..=100.0, "")?;
+        in_range("a_1", self.a_1, 0.0..=10.0, "rad/m")?;
+        in_range("a_2", self.a_2, 0.0..=10.0, "rad/(m.s)")?;
+        in_range("a_3", self.a_3, 0.0..=100.0, "")?;
         in_range("t_p", self.t_p, STEP_S..=2.0, "s")?;
         in_range("t_n", self.t_n, 0.0..=5.0, "s")?;
         in_range("t_f", self.t_f, 0.0..=5.0, "s")?;
@@ -91,9 +91,9 @@ impl DriverParameters {
 /// Equation (7) with its delay: errors in, delayed target angle out.
 #[derive(Debug, Clone)]
 pub struct Vision {
-    a1: f64,
-    a2: f64,
-    a3: f64,
+    a_1: f64,
+    a_2: f64,
+    a_3: f64,
     integral: f64,
     last_e_y_m: f64,
     delay: Delay,
@@ -103,9 +103,9 @@ impl Vision {
     /// A driver at rest.
     pub fn new(parameters: &DriverParameters) -> Self {
         Self {
-            a1: parameters.a1,
-            a2: parameters.a2,
-            a3: parameters.a3,
+            a_1: parameters.a_1,
+            a_2: parameters.a_2,
+            a_3: parameters.a_3,
             integral: 0.0,
             last_e_y_m: 0.0,
             delay: Delay::new(parameters.t_p),
@@ -118,7 +118,7 @@ impl Vision {
         self.integral += 0.5 * STEP_S * (e_y_m + self.last_e_y_m);
         self.last_e_y_m = e_y_m;
         self.delay
-            .step(self.a1 * e_y_m + self.a2 * self.integral + self.a3 * e_theta_rad)
+            .step(self.a_1 * e_y_m + self.a_2 * self.integral + self.a_3 * e_theta_rad)
     }
 }
 

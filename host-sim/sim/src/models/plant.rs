@@ -85,7 +85,12 @@ pub struct Plant {
 
 impl Transition {
     /// The exact step of `STEP_S` at a constant speed.
-    pub fn new(v_mps: f64, vehicle: &VehicleParameters, driver: &DriverParameters, gains: ArmGains) -> Self {
+    pub fn new(
+        v_m_per_s: f64,
+        vehicle: &VehicleParameters,
+        driver: &DriverParameters,
+        gains: ArmGains,
+    ) -> Self {
         let VehicleParameters {
             m,
             i,
@@ -98,7 +103,7 @@ impl Transition {
             k_t,
             ..
         } = *vehicle;
-        let v = v_mps;
+        let v = v_m_per_s;
         let k_aln = vehicle.aligning_stiffness();
         let moment = l_f * k_f - l_r * k_r;
         // Rows and columns: the six states, then target angle, its slope, guidance torque, remnant. The target
@@ -256,7 +261,7 @@ impl Plant {
     }
 
     /// r, rad/s.
-    pub fn yaw_rate_rad_s(&self) -> f64 {
+    pub fn yaw_rate_rad_per_s(&self) -> f64 {
         self.linear[YAW_RATE]
     }
 
@@ -266,7 +271,7 @@ impl Plant {
     }
 
     /// phi', rad/s.
-    pub fn wheel_rate_rad_s(&self) -> f64 {
+    pub fn wheel_rate_rad_per_s(&self) -> f64 {
         self.linear[WHEEL_RATE]
     }
 
@@ -405,10 +410,10 @@ mod tests {
         for _ in 0..20_000 {
             plant.step(&transition, &input);
         }
-        let ratio = plant.yaw_rate_rad_s() / (plant.wheel_angle_rad() / 17.0);
+        let ratio = plant.yaw_rate_rad_per_s() / (plant.wheel_angle_rad() / 17.0);
         let a = 1100.0 / (2.0 * 2.635 * 2.635) * (1.635 * 117_000.0 - 53_300.0) / (53_300.0 * 117_000.0);
         let textbook = V / (2.635 * (1.0 + a * V * V));
         assert!((ratio - textbook).abs() < 1e-9, "{ratio} against {textbook}");
-        assert!(plant.yaw_rate_rad_s() > 0.01, "a positive angle turns left");
+        assert!(plant.yaw_rate_rad_per_s() > 0.01, "a positive angle turns left");
     }
 }

@@ -2,13 +2,10 @@
 //! `driver_change`, every field with a default, an unknown one an error. docs/files.md lists them all. Ranges
 //! are checked by the scenario itself.
 
-use haptic_core::params::Params;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, ScenarioBuilder,
-    Sensors,
-};
+use super::guidance_file::GuidanceFile;
+use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
@@ -41,9 +38,9 @@ pub(super) fn parse(
         }
     };
     let DriverFile {
-        a1,
-        a2,
-        a3,
+        a_1,
+        a_2,
+        a_3,
         t_p,
         t_n,
         t_f,
@@ -58,15 +55,14 @@ pub(super) fn parse(
         k_d: k_d.unwrap_or(named.k_d),
         k_hg: k_hg.unwrap_or(named.k_hg),
     };
-    let g = file.guidance;
     Ok(Scenario::builder()
         .course(course)
         .speed_kmh(file.speed)
         .condition(file.condition)
         .driver(DriverParameters {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -77,30 +73,7 @@ pub(super) fn parse(
         })
         .gains(gains)
         .vehicle(file.vehicle)
-        .guidance(GuidanceParameters {
-            controller: Params {
-                k_1: g.k_1,
-                a_1: g.a1,
-                a_2: g.a2,
-                a_3: g.a3,
-                a_4: g.a4,
-                rate_corner_hz: g.rate_corner_hz,
-                torque_limit_nm: g.torque_limit_nm,
-                wind_up_nm_per_s: g.wind_up_nm_per_s,
-                reduction_nm_per_s: g.reduction_nm_per_s,
-                least_speed_m_per_s: g.least_speed_m_per_s,
-                probe_amplitude_nm: g.probe_amplitude_nm,
-                probe_frequency_hz: g.probe_frequency_hz,
-                // What the controller takes for granted, whatever the driver is.
-                t_nms_s: Params::PAPER.t_nms_s,
-                k_nms: Params::PAPER.k_nms,
-                // Follows from the vehicle, see `Scenario::setup`.
-                vehicle: Params::PAPER.vehicle,
-            },
-            t_n: g.t_n,
-            t_f: g.t_f,
-            probe: g.probe,
-        })
+        .guidance(file.guidance.0)
         .sensors(file.sensors)
         .failure(file.failure)
         .driver_change(file.driver_change)
@@ -128,7 +101,6 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         seed,
     } = &scenario.values;
     let built_in = *course == Course::paper();
-    let c = guidance.controller;
     toml::to_string(&ScenarioFile {
         course: if built_in {
             CourseField::Named(PAPER_COURSE.into())
@@ -146,9 +118,9 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         sensors: *sensors,
         seed: *seed,
         driver: DriverFile {
-            a1: d.a1,
-            a2: d.a2,
-            a3: d.a3,
+            a_1: d.a_1,
+            a_2: d.a_2,
+            a_3: d.a_3,
             t_p: d.t_p,
             t_n: d.t_n,
             t_f: d.t_f,
@@ -160,23 +132,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
             remnant_corner: d.remnant_corner_hz,
         },
         vehicle: *vehicle,
-        guidance: GuidanceFile {
-            k_1: c.k_1,
-            a1: c.a_1,
-            a2: c.a_2,
-            a3: c.a_3,
-            a4: c.a_4,
-            t_n: guidance.t_n,
-            t_f: guidance.t_f,
-            rate_corner_hz: c.rate_corner_hz,
-            torque_limit_nm: c.torque_limit_nm,
-            wind_up_nm_per_s: c.wind_up_nm_per_s,
-            reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_m_per_s: c.least_speed_m_per_s,
-            probe: guidance.probe,
-            probe_amplitude_nm: c.probe_amplitude_nm,
-            probe_frequency_hz: c.probe_frequency_hz,
-        },
+        guidance: GuidanceFile(*guidance),
         failure: *failure,
         driver_change: *driver_change,
         world: (*world != WorldParameters::default()).then_some(*world),
@@ -330,9 +286,12 @@ impl Default for ScenarioFile {
 #[derive(Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
 struct DriverFile {
-    a1: f64,
-    a2: f64,
-    a3: f64,
+    #[serde(alias = "a1")]
+    a_1: f64,
+    #[serde(alias = "a2")]
+    a_2: f64,
+    #[serde(alias = "a3")]
+    a_3: f64,
     t_p: f64,
     t_n: f64,
     t_f: f64,
@@ -350,9 +309,9 @@ struct DriverFile {
 impl Default for DriverFile {
     fn default() -> Self {
         let DriverParameters {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -362,9 +321,9 @@ impl Default for DriverFile {
             remnant_corner_hz,
         } = DriverParameters::default();
         Self {
-            a1,
-            a2,
-            a3,
+            a_1,
+            a_2,
+            a_3,
             t_p,
             t_n,
             t_f,
@@ -374,60 +333,6 @@ impl Default for DriverFile {
             k_hg: None,
             remnant_sd: remnant_sd_nm,
             remnant_corner: remnant_corner_hz,
-        }
-    }
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(default, deny_unknown_fields)]
-struct GuidanceFile {
-    #[serde(rename = "K_1", alias = "k_1")]
-    k_1: f64,
-    #[serde(alias = "a_1")]
-    a1: f64,
-    #[serde(alias = "a_2")]
-    a2: f64,
-    #[serde(alias = "a_3")]
-    a3: f64,
-    #[serde(alias = "a_4")]
-    a4: f64,
-    t_n: f64,
-    t_f: f64,
-    rate_corner_hz: f64,
-    torque_limit_nm: f64,
-    wind_up_nm_per_s: f64,
-    reduction_nm_per_s: f64,
-    #[serde(alias = "least_speed_mps")]
-    least_speed_m_per_s: f64,
-    probe: bool,
-    probe_amplitude_nm: f64,
-    probe_frequency_hz: f64,
-}
-
-impl Default for GuidanceFile {
-    fn default() -> Self {
-        let GuidanceParameters {
-            controller: c,
-            t_n,
-            t_f,
-            probe,
-        } = GuidanceParameters::default();
-        Self {
-            k_1: c.k_1,
-            a1: c.a_1,
-            a2: c.a_2,
-            a3: c.a_3,
-            a4: c.a_4,
-            t_n,
-            t_f,
-            rate_corner_hz: c.rate_corner_hz,
-            torque_limit_nm: c.torque_limit_nm,
-            wind_up_nm_per_s: c.wind_up_nm_per_s,
-            reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_m_per_s: c.least_speed_m_per_s,
-            probe,
-            probe_amplitude_nm: c.probe_amplitude_nm,
-            probe_frequency_hz: c.probe_frequency_hz,
         }
     }
 }

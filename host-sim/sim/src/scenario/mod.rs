@@ -7,7 +7,7 @@
 
 mod builder;
 mod file;
-mod names;
+mod guidance_file;
 #[cfg(test)]
 mod tests;
 
@@ -280,7 +280,7 @@ impl Scenario {
         text: &str,
         course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
-        let builder = file::parse(name, text, course)?;
+        let builder = ScenarioBuilder::from_toml(name, text, course)?;
         builder.build().map_err(|e| InputError::new(name, e))
     }
 
@@ -400,14 +400,14 @@ impl Scenario {
     }
 
     /// Speed, m/s.
-    pub fn speed_mps(&self) -> f64 {
+    pub fn speed_m_per_s(&self) -> f64 {
         self.values.speed_kmh / 3.6
     }
 
     /// Distance of the farthest point that anybody looks at, m: the run ends when it reaches the end of the
     /// course. With table 8 it is the driver's far point.
     pub fn look_ahead_m(&self) -> f64 {
-        self.speed_mps() * self.longest_look_ahead_s()
+        self.speed_m_per_s() * self.longest_look_ahead_s()
     }
 
     /// Arc length that the centre of gravity reaches in a run that does not diverge, m: the course's, less the
@@ -419,7 +419,7 @@ impl Scenario {
     /// How long a run lasts that does not diverge, s. In curves the points ahead lie a little further along
     /// the road than their distance, so a run may end some hundredths of a second earlier.
     pub fn duration_s(&self) -> f64 {
-        self.reach_m() / self.speed_mps()
+        self.reach_m() / self.speed_m_per_s()
     }
 
     fn longest_look_ahead_s(&self) -> f64 {

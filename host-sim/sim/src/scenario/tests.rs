@@ -11,7 +11,7 @@ fn an_empty_file_is_tables_4_8_and_9() {
     let s = parse("").unwrap();
     assert_eq!(s, Scenario::default());
     let d = s.driver();
-    assert_eq!((d.a1, d.a2, d.a3), (0.1, 0.05, 3.7));
+    assert_eq!((d.a_1, d.a_2, d.a_3), (0.1, 0.05, 3.7));
     assert_eq!((d.t_n, d.t_f, d.t_nms, d.k_nms), (0.3, 1.0, 0.1, 1.0));
     let g = s.guidance();
     assert_eq!(
@@ -97,15 +97,15 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ),
         (
             "[guidance]\na3 = 1e3",
-            "guidance.a3 = 1000 1/rad is outside 0 to 100 1/rad",
+            "guidance.a_3 = 1000 1/rad is outside 0 to 100 1/rad",
         ),
         (
             "[guidance]\na4 = -1",
-            "guidance.a4 = -1 s/rad is outside 0 to 100 s/rad",
+            "guidance.a_4 = -1 s/rad is outside 0 to 100 s/rad",
         ),
         (
             "[guidance]\nK_1 = 4\na1 = 9",
-            "guidance: K_1*a1 = 36 N.m/m is outside 0 to 32 N.m/m",
+            "guidance: K_1*a_1 = 36 N.m/m is outside 0 to 32 N.m/m",
         ),
         (
             "[guidance]\nt_f = 0.05",

@@ -37,10 +37,10 @@ pub(super) const AHEAD_S: f64 = 0.3;
 pub(super) fn driver_yaw_error(
     yaw_error_rad: &[f64],
     wheel_angle_rad: &[f64],
-    speed_mps: f64,
+    speed_m_per_s: f64,
     dt_s: f64,
 ) -> Vec<f64> {
-    let direction = direction(wheel_angle_rad, speed_mps, dt_s);
+    let direction = direction(wheel_angle_rad, speed_m_per_s, dt_s);
     let road: Vec<f64> = yaw_error_rad.iter().zip(&direction).map(|(e, d)| e + d).collect();
     let (whole, share) = ((AHEAD_S / dt_s).floor(), (AHEAD_S / dt_s).fract());
     let whole = whole as usize;
@@ -54,7 +54,7 @@ pub(super) fn driver_yaw_error(
 
 /// chi over time, rad, from zero, of the vehicle of table 9 at rest in yaw at first; the wheel angle is straight
 /// between samples.
-fn direction(wheel_angle_rad: &[f64], speed_mps: f64, dt_s: f64) -> Vec<f64> {
+fn direction(wheel_angle_rad: &[f64], speed_m_per_s: f64, dt_s: f64) -> Vec<f64> {
     let SingleTrack {
         m,
         i,
@@ -64,7 +64,7 @@ fn direction(wheel_angle_rad: &[f64], speed_mps: f64, dt_s: f64) -> Vec<f64> {
         k_r,
         k_t,
     } = TABLE_9;
-    let v = speed_mps;
+    let v = speed_m_per_s;
     let moment = l_f * k_f - l_r * k_r;
     // States beta, r, psi; inputs the wheel angle and its slope, held over a step.
     let mut a = SMatrix::<f64, 5, 5>::zeros();

@@ -9,7 +9,6 @@
 //! between their neighbours. A signal that pauses, a preview that is not valid and a speed that changes are refused
 //! with their line. What is not here: counters and CRCs, which were the business of those who received the frames.
 
-mod candump;
 mod far_point;
 
 use std::path::Path;
@@ -17,7 +16,7 @@ use std::path::Path;
 use can_dbc::{ByteOrder, Dbc, MessageId, Signal, ValueType};
 
 use super::log::{DriveLog, LogError};
-use candump::Record;
+use haptic_log::candump::{self, CandumpFrame};
 
 /// The product's own bus.
 const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
@@ -29,7 +28,7 @@ const LONGEST_PAUSE_S: f64 = 0.03;
 /// The speed's largest share of deviation from its mean: the vehicle model is one of constant speed.
 const SPEED_TOLERANCE: f64 = 0.03;
 /// Slowest mean speed, m/s, at which the guidance works.
-const SLOWEST_MPS: f64 = 5.0;
+const SLOWEST_M_PER_S: f64 = 5.0;
 
 /// Said of every log that comes from a trace.
 const NOTE: &str = "From a bus trace: e_theta at the driver's far point (1.0 s) is computed from the guidance's far point \
@@ -95,7 +94,7 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
         Some(course("Guidance_Torque")?)
     };
     let speed = course("Vehicle_Speed1")?;
-    let speed_mps = speed.steady()?;
+    let speed_m_per_s = speed.steady()?;
 
     let needed: Vec<&Course> = [&e_y, &e_theta, &torque, &angle]
         .into_iter()
@@ -114,7 +113,7 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
     let at = |k: usize| start_s + k as f64 * dt_s;
     let on_grid = |c: &Course| -> Vec<f64> { sampled(c, (0..rows).map(at), Hold::Line) };
     let wheel_angle_rad = on_grid(&angle);
-    let e_theta_rad = far_point::driver_yaw_error(&on_grid(&e_theta), &wheel_angle_rad, speed_mps, dt_s);
+    let e_theta_rad = far_point::driver_yaw_error(&on_grid(&e_theta), &wheel_angle_rad, speed_m_per_s, dt_s);
     let rows = e_theta_rad.len();
     let cut = |mut values: Vec<f64>| {
         values.truncate(rows);
@@ -141,7 +140,7 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
 
 impl Course {
     /// The signal in SI units, from all frames that carry it.
-    fn of(name: &'static str, dbc: &Dbc, records: &[Record]) -> Result<Self, String> {
+    fn of(name: &'static str, dbc: &Dbc, records: &[CandumpFrame]) -> Result<Self, String> {
         let found = dbc
             .messages
             .iter()
@@ -222,9 +221,9 @@ impl Course {
     /// The mean of a speed that does not change.
     fn steady(&self) -> Result<f64, String> {
         let mean = self.value.iter().sum::<f64>() / self.value.len() as f64;
-        if mean < SLOWEST_MPS {
+        if mean < SLOWEST_M_PER_S {
             return Err(format!(
-                "{} is {mean:.2} m/s in the mean, below {SLOWEST_MPS}: there is no guidance",
+                "{} is {mean:.2} m/s in the mean, below {SLOWEST_M_PER_S}: there is no guidance",
                 self.name
             ));
         }

@@ -133,7 +133,8 @@ pub(crate) fn smooth(
     let mut ratio = 1.0;
     let mut found: Option<(Filter, Likelihood)> = None;
     for round in 0..3 {
-        let (best, filter, fit) = best_ratio(signal, &answers, dt, &weight, floor, (round > 0).then_some(ratio));
+        let (best, filter, fit) =
+            best_ratio(signal, &answers, dt, &weight, floor, (round > 0).then_some(ratio));
         ratio = best;
         let before = outliers.len();
         for (k, (w, v)) in weight.iter_mut().zip(&fit.innovations).enumerate() {
@@ -152,7 +153,13 @@ pub(crate) fn smooth(
     };
     let filter = Filter::new(dt, ratio, &weight);
     let motion: Vec<f64> = (0..signal.len())
-        .map(|k| answers.iter().zip(fit.weights.iter()).map(|(x, w)| x[k] * w).sum())
+        .map(|k| {
+            answers
+                .iter()
+                .zip(fit.weights.iter())
+                .map(|(x, w)| x[k] * w)
+                .sum()
+        })
         .collect();
     let road: Vec<f64> = signal.iter().zip(&motion).map(|(y, m)| y - m).collect();
     let (course, variance) = filter.smoothed(&road);

@@ -117,7 +117,11 @@ impl Filter {
         let mut innovations = Vec::with_capacity(n);
         for (&x, gain) in u.iter().zip(&self.gains) {
             states.push((level, slope));
-            let v = if gain.innovation.is_finite() { x - level } else { 0.0 };
+            let v = if gain.innovation.is_finite() {
+                x - level
+            } else {
+                0.0
+            };
             innovations.push(v);
             slope += gain.slope * v;
             level += gain.level * v + self.dt * slope;
@@ -131,7 +135,11 @@ impl Filter {
             // r_{k-1} = z v/F + L' r_k with L = T - T K z, T = [1 dt; 0 1].
             let (kl, ks) = (gain.level + self.dt * gain.slope, gain.slope);
             let (l11, l12, l21, l22) = (1.0 - kl, self.dt, -ks, 1.0);
-            let inverse = if gain.innovation.is_finite() { 1.0 / gain.innovation } else { 0.0 };
+            let inverse = if gain.innovation.is_finite() {
+                1.0 / gain.innovation
+            } else {
+                0.0
+            };
             r = [
                 inverse * innovations[k] + l11 * r[0] + l21 * r[1],
                 l12 * r[0] + l22 * r[1],

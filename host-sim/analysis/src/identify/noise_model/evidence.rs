@@ -94,7 +94,11 @@ impl Problem<'_> {
 fn freed(full: &Quadratic, free: &[usize], place: usize, variance: f64) -> Option<Alternative> {
     let inverse = covariance(&full.hessian, free);
     let mixed = DVector::from_fn(full.hessian.nrows(), |i, _| {
-        if free.contains(&i) { full.hessian[(i, place)] } else { 0.0 }
+        if free.contains(&i) {
+            full.hessian[(i, place)]
+        } else {
+            0.0
+        }
     });
     let follow = &inverse * &mixed;
     let curvature = full.hessian[(place, place)] - mixed.dot(&follow);

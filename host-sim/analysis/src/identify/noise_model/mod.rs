@@ -106,12 +106,15 @@ pub fn identify(log: &DriveLog, options: &Options) -> Identification {
 pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Identification {
     let mut problem = Problem::new(prepared, options);
     let (optimum, starts) = problem.search();
+    problem.assume_muscle(&optimum.point);
     problem.report(prepared, options, &optimum, starts)
 }
 
 struct Problem<'a> {
     log: &'a DriveLog,
     muscle: Muscle,
+    /// Where a search for t_nms begins.
+    assumed_t_nms_s: f64,
     signals: Signals,
     bounds: Vec<Bounds>,
     /// Rows that the loss is taken over.
@@ -167,6 +170,7 @@ impl<'a> Problem<'a> {
         Self {
             log,
             muscle,
+            assumed_t_nms_s: muscle.t_nms_s,
             signals,
             bounds,
             stretches,
@@ -192,7 +196,8 @@ impl<'a> Problem<'a> {
     #[inline]
     fn rows<const N: usize>(&self, p: &[f64], mut visit: impl FnMut(usize, f64, [f64; N])) {
         let s = &self.signals;
-        let delay = s.delay(p[T_P]);
+        // T_d is recorded late: all that it answers to is as much longer ago.
+        let delay = s.delay((p[T_P] + p[D_LATE]).max(0.0));
         let shifted = p[H_LATE] != 0.0 || p[D_LATE] != 0.0;
         let decay = (-s.dt_s / s.t_nms_s).exp();
         for (stretch, range) in self.stretches.iter().enumerate() {
@@ -223,7 +228,7 @@ impl<'a> Problem<'a> {
                     out[K_NMS] = w;
                     out[T_NMS] = -(arm - lagged) / s.t_nms_s;
                     out[H_LATE] = -h_rate;
-                    out[D_LATE] = h_rate + w_rate;
+                    out[D_LATE] = out[T_P] + h_rate + w_rate;
                 }
                 visit(stretch, s.torque[k] - arm - offset, out);
             }
@@ -273,12 +278,17 @@ impl<'a> Problem<'a> {
         });
     }
 
-    /// Loss, gradient and Gauss-Newton matrix at `p`, after what is linear was solved for.
-    fn evaluate(&mut self, p: &mut [f64]) -> Quadratic {
+    /// Makes the signals those of the muscle at `p`.
+    fn assume_muscle(&mut self, p: &[f64]) {
         if p[T_NMS] != self.signals.t_nms_s {
             self.muscle.t_nms_s = p[T_NMS];
             self.signals = Signals::new(self.log, self.muscle);
         }
+    }
+
+    /// Loss, gradient and Gauss-Newton matrix at `p`, after what is linear was solved for.
+    fn evaluate(&mut self, p: &mut [f64]) -> Quadratic {
+        self.assume_muscle(p);
         let linear = self.sums::<LINEAR>(p);
         let solution = step(p, &self.bounds, &linear, 0.0);
         for (x, d) in p.iter_mut().zip(solution.iter()) {
@@ -367,16 +377,17 @@ impl<'a> Problem<'a> {
     }
 
     /// A start, and the loss there after the linear part is solved for.
-    fn start(&self, t_p_s: f64, corner_hz: f64) -> (f64, Vec<f64>) {
+    fn start(&mut self, t_p_s: f64, corner_hz: f64) -> (f64, Vec<f64>) {
         let mut point = vec![0.0; self.size()];
         point[..LINEAR].copy_from_slice(&START);
         point[T_P] = t_p_s;
         point[K_NMS] = self.muscle.k_nms;
-        point[T_NMS] = self.signals.t_nms_s;
+        point[T_NMS] = self.assumed_t_nms_s;
         point[RHO] = (-std::f64::consts::TAU * corner_hz * self.signals.dt_s).exp();
         for (x, b) in point.iter_mut().zip(&self.bounds) {
             *x = x.clamp(b.low, b.high);
         }
+        self.assume_muscle(&point);
         let linear = self.sums::<LINEAR>(&point);
         let solution = step(&point, &self.bounds, &linear, 0.0);
         let gain = -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));

@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
 use super::{
-    CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, T_NMS, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA, VARIATION_WIDTHS,
+    CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P,
+    THETA, VARIATION_WIDTHS,
 };
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
@@ -17,7 +18,8 @@ use crate::identify::options::Options;
 use crate::identify::paper::TABLE_4;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::{
-    Combination, Correlation, Identification, Parameter, Parameters, Remnant, STANDARD_NORMAL_95, Start, Traces,
+    Combination, Correlation, Identification, Parameter, Parameters, Remnant, STANDARD_NORMAL_95, Start,
+    Traces,
 };
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict::{self, Refutation};
@@ -150,6 +152,11 @@ impl Problem<'_> {
             delay_profile,
             refuted: Vec::new(),
             assumed: Vec::new(),
+            beyond: [K_NMS, T_NMS, H_LATE, D_LATE]
+                .into_iter()
+                .filter(|&i| self.is_free(i))
+                .filter_map(|i| Some((NAMES[i]?, parameter(i))))
+                .collect(),
             starts,
             loss_history: optimum.history.clone(),
             termination: optimum.termination,
@@ -182,7 +189,11 @@ impl Problem<'_> {
                 }
             })
             .collect();
-        let near: Vec<f64> = profile.iter().filter(|x| x[1] <= PROFILE_95).map(|x| x[0]).collect();
+        let near: Vec<f64> = profile
+            .iter()
+            .filter(|x| x[1] <= PROFILE_95)
+            .map(|x| x[0])
+            .collect();
         if let (Some(first), Some(last)) = (near.first(), near.last()) {
             let usual = errors[(T_P, T_P)].sqrt();
             let half = (p[T_P] - first).max(last - p[T_P]) / STANDARD_NORMAL_95;
@@ -206,8 +217,23 @@ impl Problem<'_> {
         alternatives: &[Alternative],
         errors: &DMatrix<f64>,
     ) {
-        let mut refuted: Vec<Refutation> = found.balance.iter().flat_map(verdict::of_balance).collect();
-        refuted.extend(verdict::of_residuals(&found.whiteness, &found.input_correlation));
+        let mut refuted: Vec<Refutation> = Vec::new();
+        if options.manual && self.log.guidance_torque_nm.iter().any(|t| t.abs() > GUIDED_NM) {
+            // All else that is wrong follows from it.
+            found.balance = None;
+            refuted.push(Refutation {
+                assumption: "the drive was a manual one",
+                evidence: "guidance_torque_nm is not zero".to_owned(),
+                cause: "--manual was given for a guided drive".to_owned(),
+                cure: "leave --manual out".to_owned(),
+            });
+        }
+        refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
+        refuted.extend(verdict::of_residuals(
+            found.fit_percent,
+            &found.whiteness,
+            &found.input_correlation,
+        ));
         refuted.extend(self.beside_nothing(optimum));
         let p = &optimum.point;
         let tolerance = |i: usize| match i {
@@ -229,17 +255,12 @@ impl Problem<'_> {
             let (assumed, drawn) = (p[a.place], p[a.place] + a.step);
             refuted.push(Refutation {
                 assumption: "muscle and sensors are as given (k_nms, t_nms, t_h_late, t_d_late)",
-                evidence: format!("freed, {name} would move from {assumed:.3} by {:.1} standard errors", a.z),
+                evidence: format!(
+                    "freed, {name} would move from {assumed:.3} by {:.1} standard errors",
+                    a.z
+                ),
                 cause: format!("{name} is near {drawn:.3}, not {assumed:.3}"),
                 cure: format!("--estimate {name}, or --fix {name}=VALUE if it is known"),
-            });
-        }
-        if options.manual && self.log.guidance_torque_nm.iter().any(|t| t.abs() > GUIDED_NM) {
-            refuted.push(Refutation {
-                assumption: "the drive was a manual one",
-                evidence: "guidance_torque_nm is not zero".to_owned(),
-                cause: "--manual was given for a guided drive".to_owned(),
-                cure: "leave --manual out".to_owned(),
             });
         }
         if !refuted.is_empty() {
@@ -269,7 +290,8 @@ impl Problem<'_> {
         }
         let nothing = minimise(&point, &bounds, 1e-6, |p| self.sums::<CORE>(p));
         let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
-        let gain = 2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
+        let gain =
+            2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
         (gain < LEAST_GAIN).then(|| Refutation {
             assumption: "driver_torque_nm is a driver's answer to the inputs",
             evidence: format!(
@@ -406,7 +428,13 @@ impl Problem<'_> {
                 .collect::<Vec<f64>>()
         };
         let traces = Traces {
-            time_s: self.stretches.iter().cloned().flatten().map(|k| log.time_s(k)).collect(),
+            time_s: self
+                .stretches
+                .iter()
+                .cloned()
+                .flatten()
+                .map(|k| log.time_s(k))
+                .collect(),
             measured_nm: measured.clone(),
             simulated_nm: without(&disturbance),
             residual_nm: residual,
@@ -417,7 +445,10 @@ impl Problem<'_> {
 
     /// The rows of `u` that the loss is taken over.
     fn used(&self, u: &[f64]) -> Vec<f64> {
-        self.stretches.iter().flat_map(|s| u[s.clone()].iter().copied()).collect()
+        self.stretches
+            .iter()
+            .flat_map(|s| u[s.clone()].iter().copied())
+            .collect()
     }
 
     /// `(1 - rho/q)/(1 - theta/q)` applied to `u` over each stretch, begun as in [`Problem::errors`].

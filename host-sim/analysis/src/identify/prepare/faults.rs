@@ -74,9 +74,7 @@ pub(super) fn bridge(signal: &mut [f64], bad: &[bool]) {
         let end = (k..n).find(|&j| !bad[j]);
         for j in k..end.unwrap_or(n) {
             signal[j] = match (last, end) {
-                (Some(a), Some(b)) => {
-                    signal[a] + (signal[b] - signal[a]) * (j - a) as f64 / (b - a) as f64
-                }
+                (Some(a), Some(b)) => signal[a] + (signal[b] - signal[a]) * (j - a) as f64 / (b - a) as f64,
                 (Some(a), None) => signal[a],
                 (None, Some(b)) => signal[b],
                 (None, None) => 0.0,

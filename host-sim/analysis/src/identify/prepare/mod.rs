@@ -46,6 +46,63 @@ pub struct Preflight {
     pub used_s: f64,
 }
 
+impl Preflight {
+    /// In words: what, found, done.
+    pub fn findings(&self) -> Vec<[String; 3]> {
+        let mut out = Vec::new();
+        for (name, faults) in &self.columns {
+            let mut add = |count: usize, found: &str, done: &str| {
+                if count > 0 {
+                    out.push([(*name).to_owned(), format!("{count} {found}"), done.to_owned()]);
+                }
+            };
+            add(
+                faults.missing,
+                "values that are no number",
+                "bridged, or cut where longer than 0.3 s",
+            );
+            add(
+                faults.stuck,
+                "values stuck",
+                "bridged, or cut where longer than 0.3 s",
+            );
+            add(faults.spikes, "values out of line", "bridged");
+            add(
+                faults.held_rows,
+                "rows for each fresh value",
+                "only fresh values used",
+            );
+            if faults.step > 0.0 {
+                let found = format!("moves in steps of {:.2e}", faults.step);
+                out.push([(*name).to_owned(), found, "weighed by where it steps".to_owned()]);
+            }
+        }
+        for ((name, unit), noise) in [("e_y_m", "m"), ("e_theta_rad", "rad")]
+            .into_iter()
+            .zip(&self.lane_noise)
+        {
+            if noise.smoothed {
+                out.push([
+                    name.to_owned(),
+                    format!("noise of {:.1e} {unit}", noise.noise_sd),
+                    format!("smoothed to {:.1e} {unit}", noise.left_sd),
+                ]);
+            }
+            if noise.outliers > 0 {
+                let found = format!("{} values beyond 5 standard deviations", noise.outliers);
+                out.push([name.to_owned(), found, "left out".to_owned()]);
+            }
+        }
+        for l in &self.left_out {
+            let found = format!("{:.1} to {:.1} s: {}", l.from_s, l.to_s, l.reason);
+            out.push(["stretch".to_owned(), found, "left out".to_owned()]);
+        }
+        let found = format!("{:.1} s", self.recorded_s);
+        out.push(["record".to_owned(), found, format!("{:.1} s used", self.used_s)]);
+        out
+    }
+}
+
 /// A log that is ready.
 #[derive(Debug, Clone)]
 pub(crate) struct Prepared {
@@ -96,12 +153,17 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     let [e_y, e_theta, phi, t_h, t_d] = examined;
     let named = [&e_y, &e_theta, &phi, &t_h, &t_d];
     let mut preflight = Preflight {
-        columns: COLUMNS[1..].iter().copied().zip(named.map(|e| e.faults)).collect(),
+        columns: COLUMNS[1..]
+            .iter()
+            .copied()
+            .zip(named.map(|e| e.faults))
+            .collect(),
         recorded_s: log.len() as f64 * dt,
         ..Preflight::default()
     };
     let [y, theta] = lane;
-    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed {
+    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed
+    {
         Some(s) => {
             *noise = s.noise;
             s.signal

@@ -55,6 +55,8 @@ const HANDS_OFF_OFFSET_NM: f64 = 0.1;
 const HANDS_OFF_S: f64 = 2.0;
 /// ... if the far point and the guidance would have asked this of any driver meanwhile, N.m.
 const ASKED_NM: f64 = 0.05;
+/// A driver whose torque usually moves by so many of those bands in [`HANDS_OFF_S`] is never quiet for twice as long.
+const RESTLESS: f64 = 3.0;
 /// Nothing moves for so long: the car stands.
 const STANDSTILL_S: f64 = 3.0;
 /// Rounding of the wheel angle, rad, that is no movement.
@@ -86,7 +88,10 @@ pub(super) fn stretches(
     if !options.stretches.is_empty() {
         let asked = |k: usize| {
             let t = log.time_s(k);
-            options.stretches.iter().any(|&(from, to)| (from..=to).contains(&t))
+            options
+                .stretches
+                .iter()
+                .any(|&(from, to)| (from..=to).contains(&t))
         };
         for k in (0..n).filter(|&k| !asked(k)) {
             mark(k..k + 1, Reason::Asked);
@@ -200,7 +205,18 @@ fn standstill(log: &DriveLog, noise: [LaneNoise; 2], rows: usize) -> Vec<Range<u
         .collect()
 }
 
+/// Hands are off where the torque is quiet near zero although there was something to steer, or for long in a drive whose
+/// driver is not that quiet.
 fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
+    let mut usual: Vec<f64> = log
+        .driver_torque_nm
+        .chunks_exact(rows.max(1))
+        .map(|c| c.iter().fold(f64::MIN, |a, &b| a.max(b)) - c.iter().fold(f64::MAX, |a, &b| a.min(b)))
+        .collect();
+    usual.sort_by(f64::total_cmp);
+    let restless = usual
+        .get(usual.len() / 2)
+        .is_some_and(|&u| u > RESTLESS * HANDS_OFF_NM);
     let mut still = quiet(&log.driver_torque_nm, HANDS_OFF_NM, rows);
     for (still, torque) in still.iter_mut().zip(&log.driver_torque_nm) {
         *still &= torque.abs() <= HANDS_OFF_OFFSET_NM;
@@ -212,12 +228,13 @@ fn hands_off(log: &DriveLog, rows: usize) -> Vec<Range<usize>> {
             let asked: f64 = r
                 .clone()
                 .map(|k| {
-                    let visual = super::USUAL_GAINS[1] * log.e_theta_rad[k] + super::USUAL_GAINS[0] * log.e_y_m[k]
+                    let visual = super::USUAL_GAINS[1] * log.e_theta_rad[k]
+                        + super::USUAL_GAINS[0] * log.e_y_m[k]
                         - log.wheel_angle_rad[k];
                     visual * visual
                 })
                 .sum::<f64>();
-            (asked / r.len() as f64).sqrt() > ASKED_NM
+            (asked / r.len() as f64).sqrt() > ASKED_NM || (restless && r.len() >= 2 * rows)
         })
         .collect()
 }

@@ -45,6 +45,52 @@ struct Cell {
     curvature_slope_1pm2: f64,
 }
 
+/// A point in the frame of a place on the centreline.
+struct Near {
+    /// Heading of the place against the cell's middle, rad.
+    theta: f64,
+    /// Curvature there, 1/m.
+    curvature: f64,
+    /// How far ahead of the place the point lies, m.
+    distance_to_foot: f64,
+    /// How far to its left, m.
+    offset_m: f64,
+}
+
+impl Cell {
+    /// The point `(x_m, y_m)` as the place at `sigma` behind the cell's middle sees it.
+    #[inline]
+    fn near(&self, sigma: f64, x_m: f64, y_m: f64) -> Near {
+        let (k0, k1) = (self.curvature_1pm, self.curvature_slope_1pm2);
+        let [tx, ty] = self.tangent;
+        let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
+        if k0 == 0.0 && k1 == 0.0 {
+            // A straight: the expansion below without the terms that vanish, to the same bits. What is left of them
+            // keeps the signs of zeros and lets nothing pass that is not a number.
+            let (ahead, left) = (dx * tx + dy * ty - sigma, dy * tx - dx * ty);
+            return Near {
+                theta: sigma * 0.0,
+                curvature: 0.0,
+                distance_to_foot: ahead,
+                offset_m: left - ahead * 0.0,
+            };
+        }
+        // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
+        let theta = sigma * (k0 + 0.5 * k1 * sigma);
+        let sigma2 = sigma * sigma;
+        let along = sigma - sigma2 * sigma * (k0 * k0 / 6.0 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
+        let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - k0 * k0 * k0 * sigma2 / 24.0);
+        let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
+        let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
+        Near {
+            theta,
+            curvature: k0 + k1 * sigma,
+            distance_to_foot: ahead * cos + left * sin,
+            offset_m: left * cos - ahead * sin,
+        }
+    }
+}
+
 /// What the surface is like in a cell: values at its middle and their change with arc length, per m.
 #[derive(Debug, Clone, Copy)]
 struct Ground {
@@ -279,21 +325,12 @@ impl Centreline {
                 index -= 1;
                 cell = &self.cells[index];
             }
-            let sigma = s - cell.s_m;
-            let (k0, k1) = (cell.curvature_1pm, cell.curvature_slope_1pm2);
-            // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
-            let theta = sigma * (k0 + 0.5 * k1 * sigma);
-            let sigma2 = sigma * sigma;
-            let along =
-                sigma - sigma2 * sigma * (k0 * k0 / 6.0 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
-            let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - k0 * k0 * k0 * sigma2 / 24.0);
-            let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
-            let [tx, ty] = cell.tangent;
-            let (dx, dy) = (x_m - cell.x_m, y_m - cell.y_m);
-            let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
-            let distance_to_foot = ahead * cos + left * sin;
-            let offset_m = left * cos - ahead * sin;
-            let curvature = k0 + k1 * sigma;
+            let Near {
+                theta,
+                curvature,
+                distance_to_foot,
+                offset_m,
+            } = cell.near(s - cell.s_m, x_m, y_m);
             let determinant = 1.0 - curvature * offset_m;
             if determinant.is_nan() || determinant < MIN_DETERMINANT {
                 return None;

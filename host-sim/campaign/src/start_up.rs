@@ -1,4 +1,4 @@
-//! How the ECU of a row comes up: its parameters, the memory that they lie in, and what it remembers of resets.
+//! How the ECU of a row starts up: its parameters, the memory that they lie in, and what it remembers of resets.
 
 use haptic_core::ecu::Boot;
 use haptic_core::params::Params;
@@ -12,11 +12,11 @@ use super::injection::Start;
 use haptic_sim::scenario::Scenario;
 
 /// The parameters and the start of a row's ECU.
-pub(super) fn come_up(
+pub(super) fn start_up(
     start: Start,
     scenario: &Scenario,
     now: Instant,
-    dice: &mut Xoshiro256PlusPlus,
+    rng: &mut Xoshiro256PlusPlus,
 ) -> (Params, haptic_lockstep::Start) {
     let params = match start {
         Start::Absurd => absurd(),
@@ -29,7 +29,7 @@ pub(super) fn come_up(
     let state = match start {
         Start::Engaged | Start::Absurd | Start::HeadingWraps => StartState::Engaged,
         Start::Boot => StartState::Boot(boot(0)),
-        Start::NoParameters | Start::HalfWritten if finds_previous(start, dice) => StartState::Boot(boot(0)),
+        Start::NoParameters | Start::HalfWritten if finds_previous(start, rng) => StartState::Boot(boot(0)),
         Start::NoParameters | Start::HalfWritten => StartState::WithoutParameters(boot(0)),
         Start::ThirdReset => StartState::Boot(boot(3)),
     };
@@ -56,7 +56,7 @@ fn absurd() -> Params {
 }
 
 /// Whether a boot finds the set in use before in the memory of the parameters.
-fn finds_previous(start: Start, dice: &mut Xoshiro256PlusPlus) -> bool {
+fn finds_previous(start: Start, rng: &mut Xoshiro256PlusPlus) -> bool {
     let previous = Params::PAPER;
     let other = Params {
         torque_limit_nm: 3.0,
@@ -65,11 +65,11 @@ fn finds_previous(start: Start, dice: &mut Xoshiro256PlusPlus) -> bool {
     let [mut older, mut newer] = [save(&other, 1), save(&previous, 2)];
     if start == Start::HalfWritten {
         // The older copy makes way for the third set.
-        let written = dice.random_range(0..BYTES);
+        let written = rng.random_range(0..BYTES);
         older[..written].copy_from_slice(&save(&other, 3)[..written]);
     } else {
         for copy in [&mut older, &mut newer] {
-            copy[dice.random_range(0..BYTES)] ^= 1 << dice.random_range(0..8);
+            copy[rng.random_range(0..BYTES)] ^= 1 << rng.random_range(0..8);
         }
     }
     load([&older, &newer]).is_some_and(|found| found.params == previous)

@@ -11,12 +11,12 @@ use super::qemu::Qemu;
 use super::{Channel, PilError};
 
 /// Longest wait for the next bytes of a target that owes an answer. Starting takes a tenth of a second.
-const SILENCE: Duration = Duration::from_secs(20);
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(20);
 /// Longest wait for a target to quit after its run.
 const EXIT: Duration = Duration::from_secs(5);
 
 /// The answers of a machine, which ends with them, or of a board, which stays.
-pub(super) struct Answers {
+pub(super) struct ResponseStream {
     /// None: a board.
     qemu: Option<Qemu>,
     bytes: Receiver<Vec<u8>>,
@@ -26,7 +26,7 @@ pub(super) struct Answers {
     pub(super) steps: u64,
 }
 
-impl Answers {
+impl ResponseStream {
     pub(super) fn new(qemu: Option<Qemu>, output: impl Read + Send + 'static, channel_kind: Channel) -> Self {
         Self {
             qemu,
@@ -47,10 +47,10 @@ impl Answers {
                     Err(what) => return Err(self.gone(&format!("answered with {what}"))),
                 }
             }
-            self.pending = match self.bytes.recv_timeout(SILENCE) {
+            self.pending = match self.bytes.recv_timeout(RESPONSE_TIMEOUT) {
                 Ok(bytes) => bytes.into_iter(),
                 Err(RecvTimeoutError::Timeout) => {
-                    return Err(self.gone(&format!("was silent for {} s", SILENCE.as_secs())));
+                    return Err(self.gone(&format!("was silent for {} s", RESPONSE_TIMEOUT.as_secs())));
                 }
                 Err(RecvTimeoutError::Disconnected) => return Err(self.gone("quit")),
             };
@@ -87,7 +87,7 @@ impl Answers {
         }
     }
 
-    /// The run went well: nobody will ask for its log.
+    /// The run went well: its log is not needed.
     pub(super) fn discard_log(&self) {
         if let Some(qemu) = &self.qemu {
             qemu.discard_log();

@@ -9,8 +9,8 @@ use haptic_core::quantity::Instant;
 use haptic_lockstep::{StackUse, StepCost};
 use serde::Serialize;
 
-use super::answers::Answers;
 use super::qemu::instructions;
+use super::responses::ResponseStream;
 use super::{Channel, PilError, Report};
 
 /// Most frames of one answer: guidance, a warning, a line of the fault history, telemetry.
@@ -116,16 +116,16 @@ pub(super) enum Counter {
     Cycles,
 }
 
-pub(super) struct Judge {
-    answers: Answers,
+pub(super) struct Comparator {
+    responses: ResponseStream,
     counter: Counter,
     report: Report,
 }
 
-impl Judge {
-    pub(super) fn new(answers: Answers, channel: Channel, counter: Counter) -> Self {
+impl Comparator {
+    pub(super) fn new(responses: ResponseStream, channel: Channel, counter: Counter) -> Self {
         Self {
-            answers,
+            responses,
             counter,
             report: Report {
                 channel,
@@ -155,7 +155,7 @@ impl Judge {
                 *total += u64::from(spent);
             }
             self.report.steps += 1;
-            self.answers.steps = self.report.steps;
+            self.responses.steps = self.report.steps;
             self.report.steps_per_second = self.report.steps as f64 / start.elapsed().as_secs_f64();
         }
         drop(answering);
@@ -163,9 +163,9 @@ impl Judge {
         if let Some(spent) = spent {
             [spent.mean, spent.mean_background] = total.map(|total| total as f64 / self.report.steps as f64);
         }
-        self.answers.end()?;
+        self.responses.end()?;
         if self.report.mismatches == 0 {
-            self.answers.discard_log();
+            self.responses.discard_log();
         }
         Ok(self.report)
     }
@@ -174,7 +174,7 @@ impl Judge {
     fn step(&mut self, expected: &Expected) -> Result<[u32; 2], PilError> {
         let mut host = expected.answer.iter().flatten().copied();
         let cost = loop {
-            let frame = self.answers.frame()?;
+            let frame = self.responses.frame()?;
             if let Some(StackUse { bytes }) = StackUse::decode(&frame) {
                 self.report.stack_bytes = bytes;
                 continue;

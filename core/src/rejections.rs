@@ -1,0 +1,67 @@
+//! Frames that were not used, counted by message and reason: what an installer with a wrong data ID, or somebody who
+//! forges frames, leaves behind. [`Rejection`] tells them on the bus, one pair after the other.
+//!
+//! Outside the torque path, and not kept twice: it moves nothing. Fixed arrays, so that a flipped bit spoils a count.
+
+use crate::bus::Reject;
+use crate::bus::messages::{MESSAGES, Rejection};
+
+const REASONS: usize = Reject::ALL.len();
+const PAIRS: usize = MESSAGES.len() * REASONS;
+
+/// The counts since the start.
+#[derive(Debug, Clone)]
+pub struct Rejections {
+    counts: [u16; PAIRS],
+    /// The pair to look at next.
+    next: usize,
+}
+
+impl Default for Rejections {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Rejections {
+    /// Nothing was rejected.
+    pub const NONE: Self = Self {
+        counts: [0; PAIRS],
+        next: 0,
+    };
+
+    /// Counts one. An identifier that is none of the bus's is not counted: nobody rejects it.
+    pub fn count(&mut self, id: u16, reason: Reject) {
+        let message = MESSAGES.iter().position(|message| message.id == id);
+        let place = message.map(|message| message.saturating_mul(REASONS).saturating_add(reason as usize));
+        if let Some(count) = place.and_then(|place| self.counts.get_mut(place)) {
+            *count = count.saturating_add(1);
+        }
+    }
+
+    /// Of all messages, for all reasons, saturating.
+    #[must_use]
+    pub fn total(&self) -> u32 {
+        let counts = self.counts.iter().map(|count| u32::from(*count));
+        counts.fold(0, u32::saturating_add)
+    }
+
+    /// The next pair that there is, round and round.
+    pub fn line(&mut self) -> Option<Rejection> {
+        for _ in 0..PAIRS {
+            let place = self.next % PAIRS;
+            self.next = place.wrapping_add(1);
+            let message = MESSAGES.get(place / REASONS)?;
+            let reason = Reject::ALL.get(place % REASONS)?;
+            let count = self.counts.get(place).copied().unwrap_or(0);
+            if count > 0 {
+                return Some(Rejection {
+                    id: message.id,
+                    reason: *reason,
+                    count,
+                });
+            }
+        }
+        None
+    }
+}

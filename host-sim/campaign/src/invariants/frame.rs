@@ -1,0 +1,58 @@
+//! The rules that one frame shows, and the bound that leaves the driver in charge.
+
+use haptic_core::bus::Frame;
+
+use super::{LIMIT_NM, MEMORY_FAULT, OVERRIDE_FROM_NM, OVERRIDE_SLOPE};
+use crate::bytes::{self, FAULT, HANDOVER, LOCKED, Status};
+
+/// Bits of the faults of class B, of class C, and of class Locked.
+const CLASSES: [u64; 3] = [0x00FF, 0x1F00, 0x6000];
+
+/// The classes that a guidance frame must name with these faults.
+fn classes_of(faults: u64) -> u64 {
+    let present = CLASSES.map(|mask| u64::from(faults & mask != 0));
+    present[0] | present[1] << 1 | present[2] << 2
+}
+
+pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Result<(), String> {
+    if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
+        return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
+    }
+    if status.limit > 7
+        || status.mode > LOCKED
+        || status.reset > 6
+        || status.spare != 0
+        || status.classes != classes_of(status.faults)
+    {
+        return Err(format!("frame: a code that does not exist in {status:?}"));
+    }
+    match before {
+        // An ECU that lost its memory counts anew.
+        Some(before)
+            if status.counter != (before.counter + 1) % 16
+                && (status.faults & !before.faults) & MEMORY_FAULT == 0 =>
+        {
+            Err(format!(
+                "frame: counter {} after {}",
+                status.counter, before.counter
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
+    if status.warning != matches!(status.mode, HANDOVER | FAULT | LOCKED) {
+        return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
+    }
+    if status.warning && !before && !others.iter().any(|frame| frame.id() == bytes::WARNING) {
+        return Err("no warning frame in the cycle of the reaction".into());
+    }
+    Ok(())
+}
+
+/// Least and largest torque that leave the driver in charge.
+pub(super) fn override_bounds(driver_nm: f64) -> (f64, f64) {
+    let bound = |toward: f64| (LIMIT_NM + OVERRIDE_SLOPE * (toward + OVERRIDE_FROM_NM)).clamp(0.0, LIMIT_NM);
+    (-bound(-driver_nm), bound(driver_nm))
+}
