@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, boards, gate};
+use crate::{bench, boards, gate, trace};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -92,6 +92,7 @@ pub(crate) fn run_all() -> Result<()> {
             run(cargo().args(package).args(target))
         }),
         ("documentation", &documentation),
+        ("requirements", &|| trace::run(false)),
         ("gate", &gate::run),
         // Compares every frame of a whole run on each of QEMU's boards on the way.
         ("boards", &|| boards::check(false)),

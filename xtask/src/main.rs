@@ -18,6 +18,7 @@ mod seal;
 mod size;
 mod speed;
 mod tool;
+mod trace;
 mod wheel;
 
 use std::path::PathBuf;
@@ -87,6 +88,12 @@ enum Command {
     },
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
     Wheel(wheel::Options),
+    /// Requirements (docs/requirements.toml): exit code 1 if evidence is missing, or something has no requirement.
+    Trace {
+        /// Write docs/requirements.md.
+        #[arg(long)]
+        bless: bool,
+    },
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim pil` left behind.
@@ -136,6 +143,7 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Command::Trace { bless } => trace::run(bless),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };
