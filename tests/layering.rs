@@ -20,7 +20,7 @@ const CORE: Arrows = &[
     ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity", "redundant"]),
     ("config", &["envelope", "estimator", "law", "monitor", "params", "plausibility", "probe", "quantity", "redundant"]),
     ("controller", &["config", "envelope", "faults", "injection", "law", "modes", "plausibility", "probe", "quantity", "ramp", "redundant"]),
-    ("download", &["bus", "config", "modes", "params", "stored"]),
+    ("download", &["bus", "config", "faults", "modes", "params", "stored"]),
     ("ecu", &["actuator", "background", "bus", "config", "controller", "envelope", "estimator", "faults", "injection", "law", "modes", "monitor", "plausibility", "quantity", "redundant"]),
     ("envelope", &["quantity", "redundant"]),
     ("estimator", &["quantity", "sine"]),
@@ -34,6 +34,7 @@ const CORE: Arrows = &[
     ("probe", &["quantity", "redundant", "sine"]),
     ("quantity", &["redundant"]),
     ("ramp", &["quantity", "redundant"]),
+    ("rejections", &["bus"]),
     ("stored", &["config", "params"]),
 ];
 
@@ -227,6 +228,10 @@ fn only_the_campaign_asks_for_fault_injection() {
 #[test]
 fn the_simulator_has_no_file_no_thread_and_no_clock() {
     for path in sources(&root().join("host-sim/sim/src")) {
+        // Tests run on a host, and compare with documents.
+        if path.ends_with("tests.rs") {
+            continue;
+        }
         let tokens = tokens(&std::fs::read_to_string(&path).unwrap());
         for three in tokens.windows(3) {
             let hit = three[0] == "std" && three[1] == "::" && NOT_IN_SIM.contains(&three[2].as_str());
@@ -297,6 +302,8 @@ const LONGEST: usize = 350;
 /// Files of the libraries that are longer, and why each stays whole.
 #[rustfmt::skip]
 const LONGER: &[(&str, &str)] = &[
+    ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
+    ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
     ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),
     ("firmware/src/boards/sam_e54_xpro.rs", "one file for each board"),
@@ -304,12 +311,18 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/analysis/src/identify/log/mod.rs", "every refusal of a log beside the others"),
     ("host-sim/analysis/src/identify/noise_model/mod.rs", "one model: its states, their sensitivities, their tests"),
     ("host-sim/analysis/src/identify/noise_model/report.rs", "everything that a fit is reported by"),
+    ("host-sim/analysis/src/identify/options.rs", "one document: the options and their ranges"),
     ("host-sim/analysis/src/identify/paper.rs", "one published method, as it stands in the paper"),
     ("host-sim/analysis/src/identify/result.rs", "one document: the fields of a result"),
     ("host-sim/analysis/src/identify/search.rs", "one algorithm with its tests"),
+    ("host-sim/batch/src/experiment/spoiled.rs", "one study of one kind of spoiled log after the other"),
     ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/experiment.rs", "one report, section by section"),
+    ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
+    ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
+    ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),
+    ("host-sim/sim/src/models/road/opendrive/geometry.rs", "one kind of reference line after the other"),
     ("host-sim/sim/src/scenario/mod.rs", "one document: the fields of a scenario and their meaning"),
     ("host-sim/sim/src/simulation.rs", "one loop with its tests, which look into it"),
 ];

@@ -9,8 +9,8 @@
 //! A board takes the machine's place ([`Target::Board`]): its lock-step image on a real bus behind an adapter, the
 //! same frames, the same comparison.
 //!
-//! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - [`adapter`]: the way to a board.
-//! - [`link`]: frames as bytes.
+//! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - `adapter`: the way to a board.
+//! - `link`: frames as bytes.
 //! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
 //!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
 //!
