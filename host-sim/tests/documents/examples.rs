@@ -153,8 +153,9 @@ fn exists(line: &str, at: &str) {
                 .map_or("haptic-guidance", |k| rest[k + 1]);
             let folder = package_folder(package, &at);
             for k in (0..rest.len()).filter(|k| rest[*k] == "--test") {
-                let file = folder.join("tests").join(rest[k + 1]).with_extension("rs");
-                assert!(file.exists(), "{at}: {} is not there", file.display());
+                let test = folder.join("tests").join(rest[k + 1]);
+                let is_there = test.with_extension("rs").exists() || test.join("main.rs").exists();
+                assert!(is_there, "{at}: {} is not there", test.display());
             }
         }
         ["cargo", "run", "--release", ..] => {}

@@ -233,7 +233,7 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
         sections.push(claims_section(results));
     }
     sections.push(Section {
-        heading: "EvaluationResults".into(),
+        heading: "Results".into(),
         blocks: vec![Block::Table(table(results))],
     });
     sections.push(Section {
