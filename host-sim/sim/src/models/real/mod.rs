@@ -24,7 +24,7 @@ use super::plant::{Plant, PlantInput, PlantState};
 use super::vehicle::VehicleParameters;
 
 /// Acceleration of gravity, m/s^2.
-pub const GRAVITY_MPS2: f64 = 9.81;
+pub const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Ripples of the motor in a turn of the wheel.
 const RIPPLES: f64 = 24.0;
 
@@ -48,7 +48,7 @@ pub struct RealPlant<V = SingleTrack, C = SteeringColumn> {
 
 /// What is held during a step.
 struct Held {
-    v_mps: f64,
+    v_m_per_s: f64,
     gains: ArmGains,
     input: PlantInput,
     surroundings: Surroundings,
@@ -79,14 +79,14 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
     pub fn step(
         &mut self,
         plant: &mut Plant,
-        v_mps: f64,
+        v_m_per_s: f64,
         gains: ArmGains,
         input: &PlantInput,
         bank_rad: f64,
     ) {
         let [force_n, moment_nm] = self.wind.step();
         let held = Held {
-            v_mps,
+            v_m_per_s,
             gains,
             input: *input,
             surroundings: Surroundings {
@@ -98,7 +98,7 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         };
         let before = plant.state();
         let x = [
-            v_mps * before.sideslip_rad.tan(),
+            v_m_per_s * before.sideslip_rad.tan(),
             before.yaw_rate_rad_s,
             before.wheel_rad,
             before.wheel_rate_rad_s,
@@ -122,14 +122,14 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         };
         plant.set_state(
             PlantState {
-                sideslip_rad: next[0].atan2(v_mps),
+                sideslip_rad: next[0].atan2(v_m_per_s),
                 yaw_rate_rad_s: next[1],
                 wheel_rad: next[2],
                 wheel_rate_rad_s: next[3],
                 arm_nm: next[5],
                 yaw_rad: next[7],
             },
-            next[0].hypot(v_mps) * STEP_S,
+            next[0].hypot(v_m_per_s) * STEP_S,
         );
     }
 
@@ -140,7 +140,7 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
 
     fn rates(&self, x: &State, held: &Held, share: f64) -> State {
         let [
-            lateral_mps,
+            lateral_m_per_s,
             yaw_rate,
             wheel,
             wheel_rate,
@@ -150,7 +150,10 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
             _,
         ] = *x;
         let Held {
-            v_mps, gains, input, ..
+            v_m_per_s,
+            gains,
+            input,
+            ..
         } = held;
         let world = &self.world;
         let lagging = world.motor_lag > 0.0;
@@ -163,11 +166,11 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         let ripple = world.motor_ripple * (RIPPLES * wheel).sin();
         let acting = torque * (1.0 + world.motor_error) + ripple;
 
-        let response = self
-            .vehicle
-            .respond(*v_mps, [lateral_mps, yaw_rate], wheel, &held.surroundings);
+        let response =
+            self.vehicle
+                .respond(*v_m_per_s, [lateral_m_per_s, yaw_rate], wheel, &held.surroundings);
         let hands = arm + input.remnant_nm;
-        let assist = world.assist_nm(hands, *v_mps);
+        let assist = world.assist_nm(hands, *v_m_per_s);
         let torque = hands + acting + assist + response.aligning_nm;
         let [wheel_acceleration, deflection_rate] = self.column.respond(wheel_rate, deflection, torque);
 

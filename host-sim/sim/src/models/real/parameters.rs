@@ -124,10 +124,10 @@ impl WorldParameters {
 
     /// Torque of the power assist, N.m: with the square of the driver's torque up to 3 N.m, as most boost curves
     /// bend, constant beyond, and falling with speed.
-    pub(super) fn assist_nm(&self, hands_nm: f64, v_mps: f64) -> f64 {
+    pub(super) fn assist_nm(&self, hands_nm: f64, v_m_per_s: f64) -> f64 {
         const FULL_AT_NM: f64 = 3.0;
         let share = (hands_nm.abs() / FULL_AT_NM).min(1.0);
-        let slowness = self.assist_speed / (self.assist_speed + 3.6 * v_mps);
+        let slowness = self.assist_speed / (self.assist_speed + 3.6 * v_m_per_s);
         self.assist * slowness * share * share * hands_nm.signum()
     }
 }

@@ -1,6 +1,6 @@
 //! A vehicle as a single track: linear tyres, or tyres whose force saturates and whose trail falls with slip.
 
-use super::{GRAVITY_MPS2, Tyres};
+use super::{GRAVITY_M_PER_S2, Tyres};
 use crate::models::vehicle::VehicleParameters;
 
 /// Shape factor of the trail; passenger cars' lie about here.
@@ -31,7 +31,7 @@ pub struct Response {
 /// Something that is steered.
 pub trait Vehicle {
     /// The rates and the torque on the column at a speed, for lateral velocity and yaw rate and a wheel angle.
-    fn respond(&self, v_mps: f64, motion: [f64; 2], wheel_rad: f64, around: &Surroundings) -> Response;
+    fn respond(&self, v_m_per_s: f64, motion: [f64; 2], wheel_rad: f64, around: &Surroundings) -> Response;
 }
 
 /// Equations (1) to (4), with tyres that may saturate.
@@ -51,7 +51,7 @@ impl SingleTrack {
     /// With stiffnesses of table 9's kind, per tyre.
     pub fn new(vehicle: &VehicleParameters, tyres: Tyres, castor_share: f64) -> Self {
         let VehicleParameters { m, l_f, l_r, k_f, .. } = *vehicle;
-        let weight = m * GRAVITY_MPS2 / (l_f + l_r);
+        let weight = m * GRAVITY_M_PER_S2 / (l_f + l_r);
         Self {
             vehicle: *vehicle,
             tyres,
@@ -83,8 +83,8 @@ impl SingleTrack {
 impl Vehicle for SingleTrack {
     fn respond(
         &self,
-        v_mps: f64,
-        [lateral_mps, yaw_rate]: [f64; 2],
+        v_m_per_s: f64,
+        [lateral_m_per_s, yaw_rate]: [f64; 2],
         wheel_rad: f64,
         around: &Surroundings,
     ) -> Response {
@@ -99,20 +99,20 @@ impl Vehicle for SingleTrack {
             ..
         } = self.vehicle;
         let slip = |lever: f64, steered: f64| {
-            let across = lateral_mps + lever * yaw_rate;
+            let across = lateral_m_per_s + lever * yaw_rate;
             let angle = match self.tyres {
-                Tyres::Linear => across / v_mps,
-                Tyres::Saturating => across.atan2(v_mps),
+                Tyres::Linear => across / v_m_per_s,
+                Tyres::Saturating => across.atan2(v_m_per_s),
             };
             steered - angle
         };
         let [front, trail] = self.axle(2.0 * k_f, self.load_n[0], around.mu, slip(l_f, k_t * wheel_rad));
         let [rear, _] = self.axle(2.0 * k_r, self.load_n[1], around.mu, slip(-l_r, 0.0));
-        let gravity = -GRAVITY_MPS2 * around.bank_rad.sin();
+        let gravity = -GRAVITY_M_PER_S2 * around.bank_rad.sin();
         let lever = self.lever * (self.castor_share + (1.0 - self.castor_share) * trail);
         Response {
             rates: [
-                (front + rear + around.force_n) / m + gravity - v_mps * yaw_rate,
+                (front + rear + around.force_n) / m + gravity - v_m_per_s * yaw_rate,
                 (l_f * front - l_r * rear + around.moment_nm) / i,
             ],
             aligning_nm: -lever * front,

@@ -61,11 +61,11 @@ fn saturating_tyres_are_within_1_percent_of_linear_ones_at_half_a_metre_per_seco
 
 /// The state after 20 s with the wheel held by hand at the angle that the linear vehicle needs for a lateral
 /// acceleration.
-fn steady(world: WorldParameters, lateral_mps2: f64, v: f64, gains: ArmGains, bank: f64) -> PlantState {
+fn steady(world: WorldParameters, lateral_m_per_s2: f64, v: f64, gains: ArmGains, bank: f64) -> PlantState {
     let (vehicle, driver) = (VehicleParameters::default(), DriverParameters::default());
     let (l, p) = (vehicle.l_f + vehicle.l_r, &vehicle);
     let stability = p.m * (p.l_r * p.k_r - p.l_f * p.k_f) / (2.0 * l * l * p.k_f * p.k_r);
-    let wheel_rad = lateral_mps2 * l * (1.0 + stability * v * v) / (v * v) / p.k_t;
+    let wheel_rad = lateral_m_per_s2 * l * (1.0 + stability * v * v) / (v * v) / p.k_t;
     let mut real = RealPlant::new(world, &vehicle, &driver, 1);
     let mut plant = Plant::default();
     for _ in 0..20_000 {
@@ -193,7 +193,7 @@ fn the_vehicle_is_that_of_commonroad() {
             let rows: Vec<&Vec<f64>> = rows.iter().filter(|r| r.0 == manoeuvre).map(|r| &r.1).collect();
             assert_eq!(rows.len(), 300);
             let (mut motion, mut worst, mut peak) = ([0.0; 2], [0.0_f64; 2], [0.0_f64; 2]);
-            let mut lateral_mps2 = 0.0_f64;
+            let mut lateral_m_per_s2 = 0.0_f64;
             for pair in rows.windows(2) {
                 let [_, v, wheel, yaw_rate, sideslip] = pair[0][..] else {
                     panic!("five numbers")
@@ -203,7 +203,7 @@ fn the_vehicle_is_that_of_commonroad() {
                     worst[i] = worst[i].max((ours[i] - theirs).abs());
                     peak[i] = peak[i].max(theirs.abs());
                 }
-                lateral_mps2 = lateral_mps2.max(v * yaw_rate);
+                lateral_m_per_s2 = lateral_m_per_s2.max(v * yaw_rate);
                 // 20 ms between rows, the angle straight between them.
                 for step in 0..20 {
                     let at = |motion: [f64; 2], share: f64| {
@@ -216,7 +216,7 @@ fn the_vehicle_is_that_of_commonroad() {
                     motion = plus(k2, STEP_S);
                 }
             }
-            assert!(lateral_mps2 > 2.4, "{manoeuvre}: {lateral_mps2}");
+            assert!(lateral_m_per_s2 > 2.4, "{manoeuvre}: {lateral_m_per_s2}");
             for i in 0..2 {
                 let share = worst[i] / peak[i];
                 assert!(share < 0.02, "{tyres:?} {manoeuvre} {i}: {share}");
