@@ -189,6 +189,15 @@ impl Scenario {
         dict(py, &fields)
     }
 
+    /// Every value as the text of a scenario file that needs no other file.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    fn to_toml(&self) -> String {
+        self.inner.to_toml()
+    }
+
     /// Constant speed, km/h.
     #[getter]
     fn speed_kmh(&self) -> f64 {
@@ -198,7 +207,7 @@ impl Scenario {
     /// Constant speed, m/s.
     #[getter]
     fn speed_m_per_s(&self) -> f64 {
-        self.inner.speed_mps()
+        self.inner.speed_m_per_s()
     }
 
     /// How the driver drives: ``"manual"``, ``"high"``, ``"mid"``, ``"low"`` or ``"custom"``.

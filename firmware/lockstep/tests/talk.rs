@@ -152,7 +152,7 @@ fn the_page_shows_the_programs_as_they_are() {
     for program in ["talk_to_the_ecu.py", "lockstep_client.py"] {
         let text = std::fs::read_to_string(root().join("examples").join(program)).unwrap();
         assert!(
-            page.contains(&format!("```python\n{text}```")),
+            page.contains(&format!("```python file=examples/{program}\n{text}```")),
             "{program} differs from the page"
         );
     }

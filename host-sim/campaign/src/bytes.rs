@@ -131,6 +131,7 @@ pub(super) struct Status {
     /// Whether some fault of class B, of class C, of class Locked is present, one bit each.
     pub(super) classes: u64,
     pub(super) reset: u64,
+    /// Bits of the fault word that no fault has.
     pub(super) spare: u64,
 }
 
@@ -145,7 +146,7 @@ impl Status {
             faults: unsigned(frame, 37, 21),
             classes: unsigned(frame, 58, 3),
             reset: unsigned(frame, 61, 3),
-            spare: unsigned(frame, 52, 6),
+            spare: unsigned(frame, 55, 3),
         }
     }
 }

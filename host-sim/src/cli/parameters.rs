@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::params::{PARAMETERS, Parameter, Params};
+use haptic_report::document::{Cell, Table};
 use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
 
-use super::table::text;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -84,23 +84,24 @@ fn shortest(value: f64) -> f64 {
 }
 
 fn listing(params: &Params) -> String {
-    let head = ["parameter", "value", "unit", "range", "meaning"].map(String::from);
-    let mut lines = vec![head.to_vec()];
-    lines.extend(
-        PARAMETERS
-            .iter()
-            .zip(params.to_values())
-            .map(|(parameter, value)| {
-                vec![
-                    parameter.name.to_owned(),
-                    shortest(value).to_string(),
-                    parameter.unit.to_owned(),
-                    format!("{} to {}", parameter.min, parameter.max),
-                    parameter.meaning.trim().to_owned(),
-                ]
-            }),
-    );
-    text(&lines)
+    let row = |(parameter, value): (&Parameter, f64)| {
+        let cells = [
+            parameter.name.to_owned(),
+            shortest(value).to_string(),
+            parameter.unit.to_owned(),
+            format!("{} to {}", parameter.min, parameter.max),
+            parameter.meaning.trim().to_owned(),
+        ];
+        cells.map(Cell::Text).to_vec()
+    };
+    let table = Table {
+        caption: String::new(),
+        columns: ["parameter", "value", "unit", "range", "meaning"]
+            .map(String::from)
+            .to_vec(),
+        rows: PARAMETERS.iter().zip(params.to_values()).map(row).collect(),
+    };
+    table.to_text()
 }
 
 #[cfg(test)]

@@ -5,8 +5,9 @@ use haptic_core::bus::Frame;
 use super::{LIMIT_NM, MEMORY_FAULT, OVERRIDE_FROM_NM, OVERRIDE_SLOPE};
 use crate::bytes::{self, FAULT, HANDOVER, LOCKED, Status};
 
-/// Bits of the faults of class B, of class C, and of class Locked.
-const CLASSES: [u64; 3] = [0x00FF, 0x1F00, 0x6000];
+/// Bits of the faults of class B, of class C, and of class Locked. A copy of the core's list on purpose: a test compares
+/// them, so that a new fault is classed here by a person too.
+const CLASSES: [u64; 3] = [0x3_80FF, 0x1F00, 0x6000];
 
 /// The classes that a guidance frame must name with these faults.
 fn classes_of(faults: u64) -> u64 {
@@ -55,4 +56,36 @@ pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<
 pub(super) fn override_bounds(driver_nm: f64) -> (f64, f64) {
     let bound = |toward: f64| (LIMIT_NM + OVERRIDE_SLOPE * (toward + OVERRIDE_FROM_NM)).clamp(0.0, LIMIT_NM);
     (-bound(-driver_nm), bound(driver_nm))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptic_core::faults::{Class, Fault};
+
+    /// Bits of the fault word in a guidance frame.
+    const FAULT_BITS: i64 = 21;
+
+    #[test]
+    fn every_fault_of_the_core_has_its_class_here_and_every_other_bit_has_none() {
+        for code in 0..FAULT_BITS {
+            let expected = match Fault::from_code(code).map(Fault::class) {
+                Some(Class::B) => 1,
+                Some(Class::C) => 2,
+                Some(Class::Locked) => 4,
+                _ => 0,
+            };
+            assert_eq!(classes_of(1 << code), expected, "bit {code}");
+        }
+    }
+
+    #[test]
+    fn spare_are_the_bits_without_a_fault() {
+        for code in 0..FAULT_BITS {
+            let word = 1_u64 << (37 + code);
+            let frame = Frame::new(bytes::GUIDANCE, &word.to_le_bytes()).unwrap();
+            let is_spare = Status::of(&frame).spare != 0;
+            assert_eq!(is_spare, Fault::from_code(code).is_none(), "bit {code}");
+        }
+    }
 }
