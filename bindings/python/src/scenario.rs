@@ -52,7 +52,9 @@ impl Scenario {
         let text = fields.to_string();
         let open = |named: &str, lane: &LaneChoice| match &course {
             // Another file's road, or this one as it stands in the fields.
-            Some((name, text)) if text.trim_start().starts_with('<') => Course::from_opendrive(name, text, lane),
+            Some((name, text)) if text.trim_start().starts_with('<') => {
+                Course::from_opendrive(name, text, lane)
+            }
             Some((name, text)) => Course::from_toml(name, text),
             None => Err(InputError::new(named, "no such course")),
         };
