@@ -50,7 +50,11 @@ pub(crate) struct Scenario {
 impl Scenario {
     fn make(py: Python<'_>, name: &str, fields: Table, course: Option<(String, String)>) -> PyResult<Self> {
         let text = fields.to_string();
-        let open = |named: &str, _: &LaneChoice| match &course {
+        let open = |named: &str, lane: &LaneChoice| match &course {
+            // Another file's road, or this one as it stands in the fields.
+            Some((name, text)) if text.trim_start().starts_with('<') => {
+                Course::from_opendrive(name, text, lane)
+            }
             Some((name, text)) => Course::from_toml(name, text),
             None => Err(InputError::new(named, "no such course")),
         };
@@ -89,7 +93,10 @@ impl Scenario {
                     Some(Value::String(name)) => name,
                     _ => "course".to_owned(),
                 };
-                let text = course.to_string();
+                let text = match course.remove("opendrive") {
+                    Some(Value::String(road)) => road,
+                    _ => course.to_string(),
+                };
                 fields.insert("course".into(), Value::String(name.clone()));
                 Some((name, text))
             }

@@ -40,16 +40,12 @@ pub fn load_course(path: &Path) -> Result<Course, InputError> {
 /// Reads and checks a course file: a lane of an OpenDRIVE file if its name ends with `.xodr`, else TOML.
 ///
 /// # Errors
-/// An unreadable file; as [`Course::from_opendrive`] and [`Course::from_toml`].
+/// An unreadable file; as [`Course::from_text`].
 pub fn load_lane(path: &Path, lane: &LaneChoice) -> Result<Course, InputError> {
     let name = path.display().to_string();
-    if path.extension().is_some_and(|x| x.eq_ignore_ascii_case("xodr")) {
-        let bytes = std::fs::read(path).map_err(|e| InputError::new(&name, e))?;
-        // Names in other encodings than UTF-8 do not matter to the road.
-        return Course::from_opendrive(&name, &String::from_utf8_lossy(&bytes), lane);
-    }
-    lane.check_none(&name)?;
-    Course::from_toml(&name, &read(path)?)
+    let bytes = std::fs::read(path).map_err(|e| InputError::new(&name, e))?;
+    // Names in other encodings than UTF-8 do not matter to the road.
+    Course::from_text(&name, &String::from_utf8_lossy(&bytes), lane)
 }
 
 /// Names the file and what the system says of it.

@@ -197,6 +197,18 @@ impl Course {
         Ok(course)
     }
 
+    /// A course file's text: a lane of OpenDRIVE if the file's name ends with `.xodr`, else TOML.
+    ///
+    /// # Errors
+    /// As [`Course::from_opendrive`] and [`Course::from_toml`]; a lane chosen of a file that has none.
+    pub fn from_text(name: &str, text: &str, lane: &LaneChoice) -> Result<Self, InputError> {
+        if name.to_ascii_lowercase().ends_with(".xodr") {
+            return Self::from_opendrive(name, text, lane);
+        }
+        lane.check_none(name)?;
+        Self::from_toml(name, text)
+    }
+
     /// A lane of an OpenDRIVE file's text; `name` stands for the file in errors and results.
     ///
     /// # Errors

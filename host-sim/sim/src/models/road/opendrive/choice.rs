@@ -1,5 +1,7 @@
 //! Where a course begins in an OpenDRIVE file: the road and the lane that a person chose, or sensible ones.
 
+use std::collections::HashSet;
+
 use super::network::{Leg, Network, Next};
 use super::road::{Lane, Road};
 use crate::input::InputError;
@@ -80,20 +82,29 @@ pub(super) fn start(
 
 /// The legs from which all roads of the file can be driven in one go, those along the road's s first.
 fn chain_ends(network: &Network) -> Result<Vec<Leg>, String> {
-    let mut ends = Vec::new();
-    for along in [true, false] {
-        for index in 0..network.roads.len() {
-            let (legs, _) = network.chain((index, along))?;
-            if legs.len() == network.roads.len() {
-                ends.push((index, along));
-            }
+    let legs = [true, false].map(|along| (0..network.roads.len()).map(move |index| (index, along)));
+    let legs: Vec<Leg> = legs.into_iter().flatten().collect();
+    let mut followers = HashSet::new();
+    for leg in &legs {
+        if let Next::Road(next) | Next::Connection(next, _) = network.next(*leg, None)? {
+            followers.insert(next);
         }
     }
-    if ends.is_empty() {
+    // A chain begins where nothing leads to; a ring begins with the first road of the file, either way.
+    let mut ends: Vec<Leg> = legs.into_iter().filter(|leg| !followers.contains(leg)).collect();
+    ends.extend([(0, true), (0, false)]);
+    let mut whole = Vec::new();
+    for end in ends {
+        let (legs, _) = network.chain(end)?;
+        if legs.len() == network.roads.len() && !whole.contains(&end) {
+            whole.push(end);
+        }
+    }
+    if whole.is_empty() {
         let (legs, stuck) = network.chain((0, true))?;
         return Err(not_one_chain(network, &legs, stuck));
     }
-    Ok(ends)
+    Ok(whole)
 }
 
 fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> String {

@@ -1,6 +1,7 @@
 //! A lane of an OpenDRIVE file (ASAM, 1.4 to 1.8) as a course, and a course as an OpenDRIVE file.
 //!
-//! `xml` looks into elements, `profile` holds cubic polynomials along a road, `geometry` is the reference line,
+//! `xml` looks into elements, `profile` holds cubic polynomials along a road, `geometry` and
+//! `polynomial` are the reference line,
 //! `road` the lanes, `lane_centre` the curve that is driven; `network` knows which road follows which, `choice`
 //! where the course begins, and this file follows it from there. `write` is the way back.
 //!
@@ -14,6 +15,7 @@ mod choice;
 mod geometry;
 mod lane_centre;
 mod network;
+mod polynomial;
 mod profile;
 mod road;
 mod segments;

@@ -1,6 +1,6 @@
 //! Which road follows which: links between roads, and the ways through junctions.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use roxmltree::Node;
 
@@ -170,13 +170,11 @@ impl<'a> Network<'a> {
 
     /// The legs from one on, for as long as there is one way only; a ring ends where it began.
     pub(super) fn chain(&self, start: Leg) -> Result<(Vec<Leg>, Option<Next<'a>>), String> {
-        let mut legs = vec![start];
+        let (mut legs, mut seen) = (vec![start], HashSet::from([start.0]));
         loop {
             let next = self.next(legs[legs.len() - 1], None)?;
             match next {
-                Next::Road(leg) | Next::Connection(leg, _) if legs.iter().all(|(road, _)| *road != leg.0) => {
-                    legs.push(leg);
-                }
+                Next::Road(leg) | Next::Connection(leg, _) if seen.insert(leg.0) => legs.push(leg),
                 Next::Junction(..) => return Ok((legs, Some(next))),
                 Next::End | Next::Road(_) | Next::Connection(..) => return Ok((legs, None)),
             }
