@@ -20,6 +20,7 @@
 //! ended ([`report`]).
 
 mod evidence;
+mod judge;
 mod report;
 
 use std::ops::Range;

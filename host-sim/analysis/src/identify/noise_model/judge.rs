@@ -1,0 +1,161 @@
+//! The evidence of [`super::evidence`] and of the sensors held against the model: wider standard errors where they are
+//! due, and a verdict taken back where an assumption is refuted.
+//!
+//! What counts as refuted is said in [`crate::identify::verdict`].
+
+use nalgebra::DMatrix;
+
+use super::evidence::Alternative;
+use super::{CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_P};
+use crate::identify::options::Options;
+use crate::identify::result::{Identification, STANDARD_NORMAL_95};
+use crate::identify::search::{Bounds, Optimum, minimise};
+use crate::identify::verdict::{self, Refutation};
+
+/// Largest factor by which the scatter of the scores may widen a standard error: more is no noise.
+const WIDEST: f64 = 3.0;
+/// 95 % point of a chi-square with one degree of freedom.
+const PROFILE_95: f64 = 3.841;
+/// Share of what counts as right (10 %, 15 ms, 0.05) that another assumption has to move a parameter by to matter.
+const MATTERS: f64 = 0.3;
+/// Twice the log likelihood ratio that the driver model has to gain over no driver at all.
+const LEAST_GAIN: f64 = 60.0;
+/// Guidance beyond this, N.m, is no offset of a sensor.
+const GUIDED_NM: f64 = 0.03;
+
+impl Problem<'_> {
+    /// Standard errors that hold where the prediction errors are not quite white, and where the likelihood of the
+    /// delay is flatter than its curvature at the optimum says.
+    pub(super) fn widen(
+        &self,
+        errors: &mut DMatrix<f64>,
+        p: &[f64],
+        hessian: &DMatrix<f64>,
+        free: &[usize],
+        profile: &[[f64; 2]],
+    ) {
+        let scattered = self.scattered(p, hessian, free);
+        let mut wider: Vec<f64> = (0..errors.nrows())
+            .map(|i| {
+                let (usual, other) = (errors[(i, i)], scattered[(i, i)]);
+                if usual > 0.0 && usual.is_finite() && other.is_finite() {
+                    (other / usual).sqrt().clamp(1.0, WIDEST)
+                } else {
+                    1.0
+                }
+            })
+            .collect();
+        let near: Vec<f64> = profile
+            .iter()
+            .filter(|x| x[1] <= PROFILE_95)
+            .map(|x| x[0])
+            .collect();
+        if let (Some(first), Some(last)) = (near.first(), near.last()) {
+            let usual = errors[(T_P, T_P)].sqrt();
+            let half = (p[T_P] - first).max(last - p[T_P]) / STANDARD_NORMAL_95;
+            if usual > 0.0 && usual.is_finite() {
+                wider[T_P] = wider[T_P].max(half / usual);
+            }
+        }
+        for i in 0..errors.nrows() {
+            for j in 0..errors.nrows() {
+                errors[(i, j)] *= wider[i] * wider[j];
+            }
+        }
+    }
+
+    /// Holds all evidence against the model and takes back what does not stand.
+    pub(super) fn judge(
+        &self,
+        found: &mut Identification,
+        options: &Options,
+        optimum: &Optimum,
+        alternatives: &[Alternative],
+        errors: &DMatrix<f64>,
+    ) {
+        let mut refuted: Vec<Refutation> = Vec::new();
+        if options.manual && self.log.guidance_torque_nm.iter().any(|t| t.abs() > GUIDED_NM) {
+            // All else that is wrong follows from it.
+            found.balance = None;
+            refuted.push(Refutation {
+                assumption: "the drive was a manual one",
+                evidence: "guidance_torque_nm is not zero".to_owned(),
+                cause: "--manual was given for a guided drive".to_owned(),
+                cure: "leave --manual out".to_owned(),
+            });
+        }
+        refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
+        refuted.extend(verdict::of_residuals(
+            found.fit_percent,
+            &found.whiteness,
+            &found.input_correlation,
+        ));
+        refuted.extend(self.beside_nothing(optimum));
+        let p = &optimum.point;
+        let tolerance = |i: usize| match i {
+            T_P => 0.015,
+            K_HG => 0.05,
+            _ => 0.1 * p[i].abs(),
+        };
+        let matters = |a: &Alternative| {
+            (0..=T_P).any(|i| {
+                self.is_free(i) && a.moved[i].abs() > errors[(i, i)].sqrt().max(MATTERS * tolerance(i))
+            })
+        };
+        let likeliest = alternatives
+            .iter()
+            .filter(|a| a.z.abs() > verdict::CERTAIN && matters(a))
+            .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
+        if let Some(a) = likeliest {
+            let name = NAMES[a.place].unwrap_or_default();
+            let (assumed, drawn) = (p[a.place], p[a.place] + a.step);
+            refuted.push(Refutation {
+                assumption: "muscle and sensors are as given (k_nms, t_nms, t_h_late, t_d_late)",
+                evidence: format!(
+                    "freed, {name} would move from {assumed:.3} by {:.1} standard errors",
+                    a.z
+                ),
+                cause: format!("{name} is near {drawn:.3}, not {assumed:.3}"),
+                cure: format!("--estimate {name}, or --fix {name}=VALUE if it is known"),
+            });
+        }
+        if !refuted.is_empty() {
+            found.parameters.take_back();
+        }
+        found.refuted = refuted;
+        found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
+        if !self.is_free(T_NMS) {
+            found.assumed.push(format!("t_nms is {} s", p[T_NMS]));
+        }
+        if !self.is_free(K_NMS) {
+            found.assumed.push(format!("K_nms is {} N.m/rad", p[K_NMS]));
+        }
+    }
+
+    /// Whether the driver model predicts the torque better than a disturbance without any driver would.
+    fn beside_nothing(&self, optimum: &Optimum) -> Option<Refutation> {
+        if (0..=T_P).all(|i| !self.is_free(i)) {
+            return None;
+        }
+        let mut point = optimum.point.clone();
+        point[..=K_HG].fill(0.0);
+        point[K_NMS] = 0.0;
+        let mut bounds = self.bounds.clone();
+        for i in (0..=T_P).chain([K_NMS, T_NMS, H_LATE, D_LATE]) {
+            bounds[i] = Bounds::new(point[i], point[i]);
+        }
+        let nothing = minimise(&point, &bounds, 1e-6, |p| self.sums::<CORE>(p));
+        let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
+        let gain =
+            2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
+        (gain < LEAST_GAIN).then(|| Refutation {
+            assumption: "driver_torque_nm is a driver's answer to the inputs",
+            evidence: format!(
+                "the driver model predicts it no better than a disturbance alone (log likelihood ratio {:.1})",
+                0.5 * gain
+            ),
+            cause: "driver_torque_nm is noise, of another drive, or of nobody's hands".to_owned(),
+            cure: "check the sensor and the column of the log".to_owned(),
+        })
+    }
+}
