@@ -11,6 +11,7 @@ mod callgrind;
 mod ci;
 mod code;
 mod evidence;
+mod fmu;
 mod gate;
 mod golden;
 mod identify;
@@ -86,6 +87,8 @@ enum Command {
     /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++, and runs
     /// its example natively and in QEMU.
     C,
+    /// Builds the FMU of the controller (FMI 2.0 co-simulation) into target/dist, and has FMPy check it.
+    Fmu,
     /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
     BindingsAgree,
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
@@ -134,6 +137,7 @@ fn main() -> ExitCode {
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
         Command::C => c_library::check(),
+        Command::Fmu => fmu::check(),
         Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {

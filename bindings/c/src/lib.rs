@@ -1,6 +1,6 @@
 //! The shipping ECU for C: `include/haptic_guidance.h` says what each function does.
 //!
-//! The one place with `unsafe` outside the firmware: pointers come from C. Each function checks them for null and for
+//! With `unsafe`, because pointers come from C. Each function checks them for null and for
 //! alignment, reads what it needs, and leaves everything as it was when it refuses. Not here: any decision.
 
 #![cfg_attr(target_os = "none", no_std)]

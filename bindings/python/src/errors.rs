@@ -60,7 +60,15 @@ pub(crate) fn scenario(py: Python<'_>, error: &ScenarioError) -> PyErr {
 
 /// Refuses NaN and infinity, which a bus cannot carry and a sensor does not give.
 pub(crate) fn finite(py: Python<'_>, field: &str, value: f64, unit: &'static str) -> PyResult<f64> {
-    within(py, field, value, [f64::MIN, f64::MAX], unit)
+    if value.is_finite() {
+        return Ok(value);
+    }
+    let message = format!("{field} = {value} {unit} is no finite number");
+    Err(raise(
+        py,
+        "RangeError",
+        (message, field, value, f64::MIN, f64::MAX, unit),
+    ))
 }
 
 /// Refuses a value outside `min` to `max`, and NaN.

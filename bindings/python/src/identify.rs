@@ -15,15 +15,25 @@ use crate::run::python;
 
 /// Findings of an identification, for `haptic_guidance.identify`.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub(crate) fn identify<'py>(
     py: Python<'py>,
     path: Option<PathBuf>,
     columns: Option<&Bound<'py, PyDict>>,
     manual: bool,
     fix: Vec<String>,
+    estimate: Vec<String>,
+    between: Vec<[f64; 2]>,
     as_published: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let options = Options::given(manual, &fix).map_err(|error| errors::input(py, error))?;
+    let mut options = Options::given(manual, &fix).map_err(|error| errors::input(py, error))?;
+    for what in &estimate {
+        options.estimate(what).map_err(|error| errors::input(py, error))?;
+    }
+    let (from, to): (Vec<f64>, Vec<f64>) = between.into_iter().map(|[from, to]| (from, to)).unzip();
+    options
+        .between(&from, &to)
+        .map_err(|error| errors::input(py, error))?;
     let (name, (log, note)) = match (path, columns) {
         (Some(path), _) => {
             let opened = open_recording(&path, None, manual).map_err(|error| errors::input(py, error))?;

@@ -1,10 +1,11 @@
 //! A scenario in Python: the fields of a scenario file as keywords, checked by the simulator itself.
 
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use haptic_sim::input::InputError;
-use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
+use haptic_batch::files::load_lane;
+use haptic_sim::input::{InputError, parse_toml};
+use haptic_sim::models::road::{DEFAULT_LANE_WIDTH_M, LaneChoice};
 use haptic_sim::scenario::ScenarioBuilder;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
@@ -21,6 +22,7 @@ use crate::errors;
 /// ----------
 /// course : str, path or mapping, optional
 ///     ``"paper-course"``, a course file, or its content: ``{"lane_width": 3.6, "segment": [{"length": 100.0}]}``.
+///     An OpenDRIVE file (.xodr) is one too; ``road`` and ``lane`` choose from it.
 /// speed : float, optional
 ///     Constant speed, km/h, 20 to 250.
 /// condition : {"manual", "high", "mid", "low"}, optional
@@ -29,7 +31,7 @@ use crate::errors;
 ///     What the controller sees.
 /// seed : int, optional
 ///     Root of all random numbers.
-/// driver, vehicle, guidance, failure, driver_change : mapping, optional
+/// driver, vehicle, guidance, failure, driver_change, world, sensor_errors : mapping, optional
 ///     The tables of the file, such as ``driver={"t_p": 0.3}``.
 ///
 /// Raises
@@ -41,41 +43,59 @@ use crate::errors;
 #[pyclass(frozen, module = "haptic_guidance")]
 pub(crate) struct Scenario {
     pub(crate) inner: haptic_sim::Scenario,
-    /// As given; a course from outside is in `course`.
+    /// As given.
     fields: Table,
-    /// Name and text of a course that is not the built-in one.
-    course: Option<(String, String)>,
+    /// Where a course file is looked for.
+    folder: PathBuf,
 }
 
 impl Scenario {
-    fn make(py: Python<'_>, name: &str, fields: Table, course: Option<(String, String)>) -> PyResult<Self> {
-        let text = fields.to_string();
-        let open = |named: &str, lane: &LaneChoice| match &course {
-            // Another file's road, or this one as it stands in the fields.
-            Some((name, text)) if text.trim_start().starts_with('<') => {
-                Course::from_opendrive(name, text, lane)
-            }
-            Some((name, text)) => Course::from_toml(name, text),
-            None => Err(InputError::new(named, "no such course")),
-        };
+    /// From the text of a file, which says the same as `fields`.
+    fn make(py: Python<'_>, name: &str, text: &str, fields: Table, folder: &Path) -> PyResult<Self> {
+        let open = |named: &str, lane: &LaneChoice| load_lane(&folder.join(named), lane);
         let builder =
-            ScenarioBuilder::from_toml(name, &text, open).map_err(|error| errors::input(py, error))?;
+            ScenarioBuilder::from_toml(name, text, open).map_err(|error| errors::input(py, error))?;
         let inner = builder.build().map_err(|error| errors::scenario(py, &error))?;
         Ok(Self {
             inner,
             fields,
-            course,
+            folder: folder.into(),
         })
     }
 
-    /// The text of the course file that `fields` name, looked for in `folder`.
-    fn read_course(py: Python<'_>, fields: &Table, folder: &Path) -> PyResult<Option<(String, String)>> {
-        match fields.get("course") {
-            Some(Value::String(name)) if name != PAPER_COURSE => {
-                let path = folder.join(name);
-                Ok(Some((path.display().to_string(), read(py, &path)?)))
+    fn of_fields(py: Python<'_>, mut fields: Table, folder: &Path) -> PyResult<Self> {
+        if let Some(Value::Table(course)) = fields.get_mut("course") {
+            complete(course);
+        }
+        let text = fields.to_string();
+        Self::make(py, "scenario", &text, fields, folder)
+    }
+}
+
+/// Writes out what a course file may leave out, and a course in a scenario may not.
+fn complete(course: &mut Table) {
+    course
+        .entry("name")
+        .or_insert_with(|| Value::String("course".into()));
+    if course.contains_key("opendrive") {
+        return;
+    }
+    course
+        .entry("lane_width")
+        .or_insert(Value::Float(DEFAULT_LANE_WIDTH_M));
+    let Some(Value::Array(segments)) = course.get_mut("segment") else {
+        return;
+    };
+    for segment in segments.iter_mut().filter_map(Value::as_table_mut) {
+        for quantity in ["curvature", "bank", "grade"] {
+            let ends = ["start", "end"].map(|end| format!("{quantity}_{end}"));
+            if ends.iter().any(|end| segment.contains_key(end)) {
+                continue;
             }
-            _ => Ok(None),
+            let constant = segment.remove(quantity).unwrap_or(Value::Float(0.0));
+            for end in ends {
+                segment.insert(end, constant.clone());
+            }
         }
     }
 }
@@ -85,24 +105,8 @@ impl Scenario {
     #[new]
     #[pyo3(signature = (**fields))]
     fn new(py: Python<'_>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut fields = fields.map_or_else(|| Ok(Table::new()), |given| table(given, ""))?;
-        let course = match fields.get("course") {
-            Some(Value::Table(course)) => {
-                let mut course = course.clone();
-                let name = match course.remove("name") {
-                    Some(Value::String(name)) => name,
-                    _ => "course".to_owned(),
-                };
-                let text = match course.remove("opendrive") {
-                    Some(Value::String(road)) => road,
-                    _ => course.to_string(),
-                };
-                fields.insert("course".into(), Value::String(name.clone()));
-                Some((name, text))
-            }
-            _ => Self::read_course(py, &fields, Path::new(""))?,
-        };
-        Self::make(py, "scenario", fields, course)
+        let fields = fields.map_or_else(|| Ok(Table::new()), |given| table(given, ""))?;
+        Self::of_fields(py, fields, Path::new(""))
     }
 
     /// A scenario from a mapping of the same fields as the keywords.
@@ -132,7 +136,8 @@ impl Scenario {
     /// Scenario
     #[staticmethod]
     fn from_toml(py: Python<'_>, text: &str) -> PyResult<Self> {
-        Self::parse(py, "scenario", text, Path::new(""))
+        let fields = parse_toml("scenario", text).map_err(|error| errors::input(py, error))?;
+        Self::make(py, "scenario", text, fields, Path::new(""))
     }
 
     /// Reads a scenario file.
@@ -146,9 +151,13 @@ impl Scenario {
     /// -------
     /// Scenario
     #[staticmethod]
-    fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::parse(py, &path.display().to_string(), &read(py, &path)?, folder)
+        let name = path.display().to_string();
+        let text =
+            std::fs::read_to_string(&path).map_err(|e| errors::input(py, InputError::new(&name, e)))?;
+        let fields = parse_toml(&name, &text).map_err(|error| errors::input(py, error))?;
+        Self::make(py, &name, &text, fields, folder)
     }
 
     /// The same scenario with some fields changed; a table is changed field by field.
@@ -163,35 +172,34 @@ impl Scenario {
     /// Scenario
     #[pyo3(signature = (**fields))]
     fn replace(&self, py: Python<'_>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let Some(fields) = fields else {
-            return Self::make(py, "scenario", self.fields.clone(), self.course.clone());
-        };
-        if fields.contains("course")? {
-            let merged = self.to_dict(py)?;
-            for (key, value) in fields {
-                merged.set_item(key, value)?;
-            }
-            return Self::new(py, Some(&merged));
-        }
+        let changes = fields.map_or_else(|| Ok(Table::new()), |given| table(given, ""))?;
         let mut merged = self.fields.clone();
-        for (name, value) in table(fields, "")? {
+        // A new course is looked for where the caller is, the old one where it was found.
+        let folder = match changes.get("course") {
+            Some(_) => Path::new(""),
+            None => &self.folder,
+        };
+        for (name, value) in changes {
             match (merged.get_mut(&name), value) {
-                (Some(Value::Table(old)), Value::Table(new)) => old.extend(new),
+                (Some(Value::Table(old)), Value::Table(new)) if name != "course" => old.extend(new),
                 (_, value) => {
                     merged.insert(name, value);
                 }
             }
         }
-        Self::make(py, "scenario", merged, self.course.clone())
+        Self::of_fields(py, merged, folder)
     }
 
     /// The fields that were given, as a mapping that `from_dict` takes.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let mut fields = self.fields.clone();
-        if let Some((name, text)) = &self.course {
-            let mut course: Table = toml::from_str(text).map_err(|error| errors::input(py, error))?;
-            course.insert("name".into(), Value::String(name.clone()));
-            fields.insert("course".into(), Value::Table(course));
+        // A course file may not be there where the mapping is read.
+        let whole: Table = toml::from_str(&self.inner.to_toml()).map_err(|error| errors::input(py, error))?;
+        if let Some(course @ Value::Table(_)) = whole.get("course") {
+            fields.insert("course".into(), course.clone());
+            // These chose it from its file.
+            fields.remove("road");
+            fields.remove("lane");
         }
         dict(py, &fields)
     }
@@ -299,22 +307,6 @@ impl Scenario {
     }
 }
 
-impl Scenario {
-    fn parse(py: Python<'_>, name: &str, text: &str, folder: &Path) -> PyResult<Self> {
-        let fields: Table = haptic_sim::input::parse_toml(name, text).map_err(|e| errors::input(py, e))?;
-        let course = Self::read_course(py, &fields, folder)?;
-        // Once on the text itself, whose errors name lines.
-        let open = |_: &str, _: &LaneChoice| Ok(Course::paper());
-        let parsed = ScenarioBuilder::from_toml(name, text, open).map(drop);
-        parsed.map_err(|error| errors::input(py, error))?;
-        Self::make(py, name, fields, course)
-    }
-}
-
-fn read(py: Python<'_>, path: &Path) -> PyResult<String> {
-    std::fs::read_to_string(path).map_err(|e| errors::input(py, InputError::new(path.display(), e)))
-}
-
 /// A mapping as TOML; `place` names it in errors.
 fn table(fields: &Bound<'_, PyDict>, place: &str) -> PyResult<Table> {
     let mut made = Table::new();
@@ -355,7 +347,7 @@ fn toml_value(value: &Bound<'_, PyAny>, place: &str) -> PyResult<Value> {
     if let Ok(number) = value.extract::<f64>() {
         return Ok(Value::Float(number));
     }
-    if let Ok(path) = value.extract::<std::path::PathBuf>() {
+    if let Ok(path) = value.extract::<PathBuf>() {
         return Ok(Value::String(path.display().to_string()));
     }
     let kind = value.get_type().name()?;

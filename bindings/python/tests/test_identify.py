@@ -69,6 +69,16 @@ def test_columns_that_are_no_drive_are_refused(change, says):
         hg.identify(columns)
 
 
+def test_a_stretch_and_more_parameters_can_be_asked_for():
+    run = probed_run()
+    half = hg.identify(run, between_s=[(0.0, 100.0)], estimate={"t_nms": (0.06, 0.2)})
+    assert half.results["rows"] < 0.6 * len(run)
+    with pytest.raises(hg.InputError, match="a_1"):
+        hg.identify(run, estimate={"a_1": None})
+    with pytest.raises(hg.InputError, match="not after"):
+        hg.identify(run, between_s=[(10.0, 5.0)])
+
+
 def test_what_cannot_be_fixed_is_refused():
     with pytest.raises(hg.InputError, match="k_x"):
         hg.identify(LOGS / "manual.csv", fix={"k_x": 1.0})

@@ -106,3 +106,12 @@ def test_everything_public_is_documented():
         for member in vars(thing) if isinstance(thing, type) else ():
             if not member.startswith("_") and callable(getattr(thing, member)):
                 assert getattr(thing, member).__doc__, f"{name}.{member}"
+
+
+def test_a_course_may_leave_out_what_a_course_file_may():
+    short = {"segment": [{"length": 300.0}, {"length": 100.0, "curvature": 0.001}]}
+    long = {"name": "course", "lane_width": 3.6, "segment": [
+        {"length": 300.0, "curvature_start": 0.0, "curvature_end": 0.0},
+        {"length": 100.0, "curvature_start": 0.001, "curvature_end": 0.001},
+    ]}  # fmt: skip
+    assert hg.Scenario(course=short) == hg.Scenario(course=long)

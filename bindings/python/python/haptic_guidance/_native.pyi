@@ -18,6 +18,7 @@ class Scenario:
         guidance: Mapping[str, Union[float, bool]] = ...,
         failure: Mapping[str, Union[float, str]] = ...,
         driver_change: Optional[Mapping[str, float]] = ...,
+        **fields: Any,
     ) -> None: ...
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> Scenario: ...
@@ -170,5 +171,7 @@ def identify(
     columns: Optional[dict[str, np.ndarray]],
     manual: bool,
     fix: list[str],
+    estimate: list[str],
+    between: list[list[float]],
     as_published: bool,
 ) -> dict[str, Any]: ...

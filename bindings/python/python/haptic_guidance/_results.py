@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Optional, Union
 
@@ -240,6 +240,8 @@ def identify(
     *,
     manual: bool = False,
     fix: Optional[Mapping[str, float]] = None,
+    estimate: Optional[Mapping[str, Optional[tuple[float, float]]]] = None,
+    between_s: Sequence[tuple[float, float]] = (),
     as_published: bool = False,
 ) -> Fit:
     """Identify the driver of a recorded drive.
@@ -254,6 +256,10 @@ def identify(
         A drive without guidance: K_hg is no part of the model.
     fix : mapping of str to float, optional
         Parameters that are known, such as ``{"k_nms": 1.0}``.
+    estimate : mapping of str to (float, float) or None, optional
+        What else to estimate, with its range or None for the widest: ``k_nms``, ``t_nms``, ``t_h_late``, ``t_d_late``.
+    between_s : sequence of (float, float), optional
+        Stretches of the drive to use, s; all of it if not given.
     as_published : bool, optional
         The paper's method instead of prediction errors with a noise model.
 
@@ -267,12 +273,14 @@ def identify(
         A column that is missing, uneven in time, in a wrong unit or too short; a parameter that cannot be fixed.
     """
     fixed = [f"{name}={float(value)!r}" for name, value in (fix or {}).items()]
+    wanted = [name if ends is None else f"{name}={ends[0]!r}..{ends[1]!r}" for name, ends in (estimate or {}).items()]
+    options = (manual, fixed, wanted, [list(stretch) for stretch in between_s], as_published)
     if isinstance(drive, (str, os.PathLike)):
-        made = _native.identify(os.fspath(drive), None, manual, fixed, as_published)
+        made = _native.identify(os.fspath(drive), None, *options)
     else:
         table = drive.columns if isinstance(drive, Run) else drive
         columns = {str(name): _column(name, table[name]) for name in table.keys()}
-        made = _native.identify(None, {n: c for n, c in columns.items() if c is not None}, manual, fixed, as_published)
+        made = _native.identify(None, {n: c for n, c in columns.items() if c is not None}, *options)
     parameters = {}
     for name, unit in made["units"].items():
         found = dict(made["results"]["parameters"][name])

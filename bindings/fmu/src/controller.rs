@@ -1,0 +1,271 @@
+//! `HapticController`: the shipping ECU with its sensors' frames inside, SI values outside.
+
+use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::config::Setup;
+use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::params::{PARAMETERS, ParamError, Params};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+
+/// What a variable is to FMI.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Set by others at every step.
+    Input,
+    /// Read after it.
+    Output,
+    /// Set before the start.
+    Parameter,
+}
+
+/// The type of a variable; all are kept as numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A quantity.
+    Real,
+    /// A code or a word of bits.
+    Integer,
+    /// 0 or 1.
+    Boolean,
+}
+
+/// One variable; its value reference is its place in [`VARIABLES`].
+#[derive(Debug, Clone, Copy)]
+pub struct Variable {
+    /// Name, with its unit.
+    pub name: &'static str,
+    /// Type.
+    pub kind: Kind,
+    /// Role.
+    pub role: Role,
+    /// SI unit, empty if it has none.
+    pub unit: &'static str,
+    /// Value at the start.
+    pub start: f64,
+    /// Least and largest value, if there are such.
+    pub range: Option<[f64; 2]>,
+    /// What it is.
+    pub meaning: &'static str,
+}
+
+const fn variable(
+    name: &'static str,
+    kind: Kind,
+    role: Role,
+    unit: &'static str,
+    meaning: &'static str,
+) -> Variable {
+    Variable {
+        name,
+        kind,
+        role,
+        unit,
+        start: 0.0,
+        range: None,
+        meaning,
+    }
+}
+
+/// Variables that are no parameters of the controller.
+const OWN: usize = 15;
+use Kind::{Boolean, Integer, Real};
+use Role::{Input, Output, Parameter};
+
+/// Every variable, the controller's own parameters last.
+pub const VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
+    let own = [
+        variable(
+            "e_y_m",
+            Real,
+            Input,
+            "m",
+            "Lateral error at the near point, positive: the target is to the left",
+        ),
+        variable("e_theta_rad", Real, Input, "rad", "Yaw error at the far point"),
+        variable(
+            "driver_torque_nm",
+            Real,
+            Input,
+            "N.m",
+            "Torque of the driver on the column",
+        ),
+        variable(
+            "wheel_angle_rad",
+            Real,
+            Input,
+            "rad",
+            "Angle of the steering wheel",
+        ),
+        variable(
+            "motor_torque_nm",
+            Real,
+            Input,
+            "N.m",
+            "Torque that the motor delivers",
+        ),
+        variable("speed_m_per_s", Real, Input, "m/s", "Speed of the vehicle"),
+        variable(
+            "authority",
+            Real,
+            Input,
+            "",
+            "Share of the guidance torque that is allowed, 0 to 1",
+        ),
+        variable(
+            "engage",
+            Boolean,
+            Input,
+            "",
+            "Guidance is wanted; the ECU takes a rise of it",
+        ),
+        variable("probe", Boolean, Input, "", "The probe is wanted"),
+        variable(
+            "engaged_at_start",
+            Boolean,
+            Parameter,
+            "",
+            "Guiding from the start, every sender trusted",
+        ),
+        variable("torque_nm", Real, Output, "N.m", "Guidance torque to apply"),
+        variable("mode", Integer, Output, "", "Mode, as in core/haptic.dbc"),
+        variable(
+            "limit",
+            Integer,
+            Output,
+            "",
+            "Limit that acted, as in core/haptic.dbc",
+        ),
+        variable("faults", Integer, Output, "", "Fault word, as in core/haptic.dbc"),
+        variable("warning", Boolean, Output, "", "The driver has to take over"),
+    ];
+    let mut all = [own[0]; OWN + PARAMETERS.len()];
+    let mut i = 0;
+    while i < all.len() {
+        if i < OWN {
+            all[i] = own[i];
+        } else {
+            let parameter = PARAMETERS[i - OWN];
+            all[i] = Variable {
+                start: parameter.default,
+                range: Some([parameter.min, parameter.max]),
+                ..variable(parameter.name, Real, Parameter, parameter.unit, parameter.meaning)
+            };
+        }
+        i += 1;
+    }
+    // Nobody holds the guidance back unless told to.
+    all[AUTHORITY].start = 1.0;
+    all[AUTHORITY].range = Some([0.0, 1.0]);
+    all
+};
+const AUTHORITY: usize = 6;
+const ENGAGED: usize = 9;
+const TORQUE: usize = 10;
+
+/// The unit under way.
+#[derive(Debug, Clone)]
+pub struct Controller {
+    /// Values of [`VARIABLES`].
+    pub values: [f64; VARIABLES.len()],
+    ecu: Ecu,
+    /// Steps so far, 1 ms each: time is a whole number here, whatever a master adds up.
+    steps: u64,
+    /// Frames that the camera has sent; column and host send on a grid of whole steps.
+    pictures: u64,
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self {
+            values: VARIABLES.map(|variable| variable.start),
+            ecu: Ecu::new(Some(&Setup::PAPER), Boot::default(), Instant::from_us(0)),
+            steps: 0,
+            pictures: 0,
+        }
+    }
+}
+
+impl Controller {
+    /// Begins with the parameters that were set.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    pub fn begin(&mut self) -> Result<(), ParamError> {
+        let parameters = std::array::from_fn(|i| self.values[OWN + i]);
+        let setup = Setup::new(&Params::from_values(&parameters))?;
+        let start = Instant::from_us(0);
+        self.ecu = if self.values[ENGAGED] != 0.0 {
+            Ecu::engaged(&setup, start)
+        } else {
+            Ecu::new(Some(&setup), Boot::default(), start)
+        };
+        (self.steps, self.pictures) = (0, 0);
+        Ok(())
+    }
+
+    /// One step of 1 ms: the sensors send what is due, the ECU decides.
+    pub fn step(&mut self) {
+        let [
+            e_y,
+            e_theta,
+            driver,
+            wheel,
+            motor,
+            speed,
+            authority,
+            engage,
+            probe,
+            ..,
+        ] = self.values;
+        let step = self.steps;
+        // The ECU's clock wraps.
+        let now = Instant::from_us(step.wrapping_mul(1000) as u32);
+        let mut hear = |frame| {
+            // The ECU judges by itself, and reports what it misses.
+            let _ = self.ecu.receive(&frame, now);
+        };
+        if step as f64 >= self.pictures as f64 * LanePreview::INFO.period_ms {
+            let preview = LanePreview {
+                e_y: Metres::from_m(e_y),
+                e_theta: Radians::from_rad(e_theta),
+                age: Micros::from_us(0),
+                valid: true,
+            };
+            hear(preview.encode(self.pictures as u8));
+            self.pictures += 1;
+        }
+        if step.is_multiple_of(2) {
+            let column = Column {
+                driver_torque: Torque::from_nm(driver),
+                wheel_angle: Radians::from_rad(wheel),
+                motor_torque: Torque::from_nm(motor),
+            };
+            hear(column.encode((step / 2) as u8));
+        }
+        if step.is_multiple_of(10) {
+            let counter = (step / 10) as u8;
+            let speeds = [Speed::from_m_per_s(speed); 2];
+            hear(Vehicle { speeds }.encode(counter));
+            let demand = Demand {
+                engage: engage != 0.0,
+                authority: Ratio::from_si(authority),
+                probe: probe != 0.0,
+            };
+            hear(demand.encode(counter));
+        }
+        let command = self.ecu.step(now).command;
+        let _ = self.ecu.background_step();
+        self.values[TORQUE..TORQUE + 5].copy_from_slice(&[
+            command.torque.nm(),
+            f64::from(command.mode as u8),
+            f64::from(command.limit as u8),
+            f64::from(command.faults.bits()),
+            f64::from(u8::from(command.warning)),
+        ]);
+        self.steps += 1;
+    }
+
+    /// Time that was simulated, s.
+    pub fn time_s(&self) -> f64 {
+        self.steps as f64 * 1e-3
+    }
+}
