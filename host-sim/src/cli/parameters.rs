@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_core::params::{PARAMETERS, Params};
+use haptic_report::document::{Cell, Table};
 use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
 
-use super::table::text;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -84,23 +84,30 @@ fn shortest(value: f64) -> f64 {
 }
 
 fn listing(params: &Params) -> String {
-    let head = ["parameter", "value", "unit", "range", "meaning"].map(String::from);
-    let mut lines = vec![head.to_vec()];
-    lines.extend(
-        PARAMETERS
-            .iter()
-            .zip(params.to_values())
-            .map(|(parameter, value)| {
-                vec![
-                    parameter.name.to_owned(),
-                    shortest(value).to_string(),
-                    parameter.unit.to_owned(),
-                    format!("{} to {}", parameter.min, parameter.max),
-                    parameter.meaning.trim().to_owned(),
-                ]
-            }),
-    );
-    text(&lines)
+    let rows = PARAMETERS
+        .iter()
+        .zip(params.to_values())
+        .map(|(parameter, value)| {
+            let range = format!("{} to {}", parameter.min, parameter.max);
+            let value = shortest(value).to_string();
+            [
+                parameter.name,
+                &value,
+                parameter.unit,
+                &range,
+                parameter.meaning.trim(),
+            ]
+            .map(|cell| Cell::Text(cell.to_owned()))
+            .to_vec()
+        });
+    let table = Table {
+        caption: String::new(),
+        columns: ["Parameter", "Value", "Unit", "Range", "Meaning"]
+            .map(String::from)
+            .to_vec(),
+        rows: rows.collect(),
+    };
+    table.to_text()
 }
 
 #[cfg(test)]
