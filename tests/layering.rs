@@ -50,6 +50,7 @@ const PACKAGES: Arrows = &[
     ("host-sim/target", &["haptic-core", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
+    ("bindings/c", &["haptic-core"]),
     // The parts that Python hands out; no injector, no serial port, no charts.
     ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
 ];

@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, boards, gate, trace};
+use crate::{bench, bindings_agree, boards, c_library, gate, trace, wheel};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -71,8 +71,11 @@ pub(crate) fn run_all() -> Result<()> {
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+        ("g++", "g++"),
         // For the examples of the documents.
         ("python3", "python3"),
+        ("python3", "python3-venv"),
     ])?;
     let target_features = format!("{BOARD},gate,broken,bench");
     let failed = check_all(&[
@@ -97,6 +100,9 @@ pub(crate) fn run_all() -> Result<()> {
         // Compares every frame of a whole run on each of QEMU's boards on the way.
         ("boards", &|| boards::check(false)),
         ("instructions on the host", &|| bench::run(false)),
+        ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
+        ("C library", &c_library::check),
+        ("bindings agree", &bindings_agree::check),
     ]);
     if !failed.is_empty() {
         eprintln!("== failed: {}; the tests follow", failed.join(", "));

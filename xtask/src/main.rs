@@ -3,8 +3,10 @@
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
 mod bench;
+mod bindings_agree;
 mod boards;
 mod by_hand;
+mod c_library;
 mod callgrind;
 mod ci;
 mod code;
@@ -81,13 +83,18 @@ enum Command {
     Run(boards::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
+    /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++, and runs
+    /// its example natively and in QEMU.
+    C,
+    /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
+    BindingsAgree,
+    /// Builds the Python wheel into target/dist, and says what it weighs and links.
+    Wheel(wheel::Options),
     /// Writes an image's CRC-32 into its ELF, which the product looks for at every start. `flash` and `run` do it too.
     Seal {
         /// The ELF of steering-ecu, changed in place.
         elf: PathBuf,
     },
-    /// Builds the Python wheel into target/dist, and says what it weighs and links.
-    Wheel(wheel::Options),
     /// Requirements (docs/requirements.toml): exit code 1 if evidence is missing, or something has no requirement.
     Trace {
         /// Write docs/requirements.md.
@@ -126,6 +133,8 @@ fn main() -> ExitCode {
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
+        Command::C => c_library::check(),
+        Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed),

@@ -18,6 +18,16 @@ pub(crate) struct Options {
     bench: bool,
 }
 
+impl Options {
+    /// The wheel, built and tested.
+    pub(crate) const fn tested() -> Self {
+        Self {
+            test: true,
+            bench: false,
+        }
+    }
+}
+
 /// What a wheel must not link: the fault injector, serial ports, charts, the command line.
 const NOT_IN_A_WHEEL: [&str; 8] = [
     "haptic-campaign",
@@ -55,6 +65,11 @@ pub(crate) fn build(options: &Options) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The interpreter of an environment that has the wheel, built anew.
+pub(crate) fn python() -> Result<PathBuf> {
+    install(&make()?)
 }
 
 fn make() -> Result<PathBuf> {

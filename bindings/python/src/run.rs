@@ -2,7 +2,7 @@
 
 use haptic_analysis::metrics::{DEFINITIONS, Window};
 use haptic_core::bus::Frame;
-use haptic_log::trace::Sample;
+use haptic_log::trace::CHANNELS;
 use haptic_sim::simulation::Run;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -13,49 +13,12 @@ use crate::errors;
 use crate::interrupt::interruptible;
 use crate::scenario::Scenario;
 
-/// Declares the columns: the fields of a sample, all of them, or this does not compile.
-macro_rules! channels {
-    ($($name:ident),*) => {
-        const NAMES: [&str; [$(stringify!($name)),*].len()] = [$(stringify!($name)),*];
-
-        /// A sample by the names of its fields; a limit that acts is 1.
-        pub(crate) fn channels(sample: &Sample) -> [(&'static str, f64); NAMES.len()] {
-            let Sample { $($name),* } = *sample;
-            [$((stringify!($name), f64::from($name))),*]
-        }
-    };
-}
-
-channels!(
-    time_s,
-    s_m,
-    lateral_error_m,
-    heading_error_rad,
-    curvature_1pm,
-    e_y_m,
-    e_theta_rad,
-    guidance_e_y_m,
-    guidance_e_theta_rad,
-    wheel_angle_rad,
-    wheel_rate_rad_s,
-    yaw_rate_rad_s,
-    sideslip_rad,
-    driver_torque_nm,
-    guidance_torque_nm,
-    guidance_limited
-);
-
 /// The columns as arrays, which own what they show.
 fn columns<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
-    let mut columns = NAMES.map(|_| Vec::with_capacity(run.trace.samples.len()));
-    for sample in &run.trace.samples {
-        for (column, (_, value)) in columns.iter_mut().zip(channels(sample)) {
-            column.push(value);
-        }
-    }
     let made = PyDict::new(py);
-    for (name, column) in NAMES.into_iter().zip(columns) {
-        made.set_item(name, PyArray1::from_vec(py, column))?;
+    for channel in &CHANNELS {
+        let column = run.trace.samples.iter().map(channel.value).collect();
+        made.set_item(channel.name, PyArray1::from_vec(py, column))?;
     }
     Ok(made)
 }

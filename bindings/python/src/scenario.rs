@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use haptic_sim::input::InputError;
-use haptic_sim::models::road::{Course, PAPER_COURSE};
+use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::scenario::ScenarioBuilder;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
@@ -50,7 +50,7 @@ pub(crate) struct Scenario {
 impl Scenario {
     fn make(py: Python<'_>, name: &str, fields: Table, course: Option<(String, String)>) -> PyResult<Self> {
         let text = fields.to_string();
-        let open = |named: &str| match &course {
+        let open = |named: &str, _: &LaneChoice| match &course {
             Some((name, text)) => Course::from_toml(name, text),
             None => Err(InputError::new(named, "no such course")),
         };
@@ -189,6 +189,15 @@ impl Scenario {
         dict(py, &fields)
     }
 
+    /// Every value as the text of a scenario file that needs no other file.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    fn to_toml(&self) -> String {
+        self.inner.to_toml()
+    }
+
     /// Constant speed, km/h.
     #[getter]
     fn speed_kmh(&self) -> f64 {
@@ -198,7 +207,7 @@ impl Scenario {
     /// Constant speed, m/s.
     #[getter]
     fn speed_m_per_s(&self) -> f64 {
-        self.inner.speed_mps()
+        self.inner.speed_m_per_s()
     }
 
     /// How the driver drives: ``"manual"``, ``"high"``, ``"mid"``, ``"low"`` or ``"custom"``.
@@ -288,7 +297,7 @@ impl Scenario {
         let fields: Table = haptic_sim::input::parse_toml(name, text).map_err(|e| errors::input(py, e))?;
         let course = Self::read_course(py, &fields, folder)?;
         // Once on the text itself, whose errors name lines.
-        let open = |_: &str| Ok(Course::paper());
+        let open = |_: &str, _: &LaneChoice| Ok(Course::paper());
         let parsed = ScenarioBuilder::from_toml(name, text, open).map(drop);
         parsed.map_err(|error| errors::input(py, error))?;
         Self::make(py, name, fields, course)

@@ -1,5 +1,6 @@
 //! The closed loop step by step.
 
+use haptic_log::trace::CHANNELS;
 use haptic_sim::action::WorldFaults;
 use haptic_sim::simulation::Ending;
 use pyo3::exceptions::PyValueError;
@@ -131,8 +132,8 @@ fn outcome(py: Python<'_>, from: &haptic_sim::Outcome<'_>) -> PyResult<Outcome> 
     };
     let sample = from.sample.as_ref().map(|sample| {
         let values = PyDict::new(py);
-        for (name, value) in crate::run::channels(sample) {
-            values.set_item(name, value)?;
+        for channel in &CHANNELS {
+            values.set_item(channel.name, (channel.value)(sample))?;
         }
         Ok::<_, PyErr>(values.unbind())
     });

@@ -23,13 +23,17 @@ def test_a_path_and_its_columns_give_the_same_driver():
     by_path, by_columns = hg.identify(path), hg.identify(table(path))
     assert by_path.results["parameters"] == by_columns.results["parameters"]
     truth = json.loads(path.with_suffix(".json").read_text())
-    print(truth, by_path.parameters)
-    k_hg = by_path["k_hg"]
-    assert k_hg.identified and k_hg.interval_95[0] <= k_hg.estimate <= k_hg.interval_95[1]
+    assert abs(by_path["k_hg"].optimum - truth["K_hg"]) < 0.02
+    assert abs(by_path["t_p"].optimum - truth["t_p"]) < 0.02
+
+
+def probed_run():
+    driver = {"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}
+    return hg.simulate(hg.Scenario(driver=driver, guidance={"probe": True}))
 
 
 def test_the_covariance_has_the_variances_on_its_diagonal():
-    fit = hg.identify(LOGS / "guided-probe.csv")
+    fit = hg.identify(probed_run())
     names, covariance = fit.covariance
     assert np.allclose(covariance, covariance.T, equal_nan=True)
     for i, name in enumerate(names):
@@ -39,12 +43,12 @@ def test_the_covariance_has_the_variances_on_its_diagonal():
 
 
 def test_a_simulated_run_is_a_drive():
-    scenario = hg.Scenario(
-        driver={"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}, guidance={"probe": True}
-    )
-    fit = hg.identify(hg.simulate(scenario), fix={"k_nms": 1.0, "t_nms": 0.1})
-    assert abs(fit["t_p"].estimate - 0.2) < 0.02
-    assert abs(fit["k_hg"].estimate - 0.4) < 3 * fit["k_hg"].standard_error + 0.02
+    fit = hg.identify(probed_run(), fix={"k_nms": 1.0, "t_nms": 0.1})
+    assert fit.refuted == [] and fit["k_hg"].identified
+    low, high = fit["k_hg"].interval_95
+    assert low <= fit["k_hg"].estimate <= high
+    assert abs(fit["t_p"].estimate - 0.2) < 3 * fit["t_p"].standard_error
+    assert abs(fit["k_hg"].estimate - 0.4) < 3 * fit["k_hg"].standard_error
 
 
 @pytest.mark.parametrize(

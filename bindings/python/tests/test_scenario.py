@@ -47,10 +47,15 @@ def test_a_pickle_is_the_same_scenario(scenario):
     assert copy.deepcopy(scenario) == scenario
 
 
+def test_the_text_of_a_scenario_is_the_scenario():
+    scenario = hg.Scenario(course=COURSE, condition="low", driver={"t_p": 0.1234567890123456}, seed=3)
+    assert hg.Scenario.from_toml(scenario.to_toml()) == scenario
+
+
 def test_replace_changes_one_field_of_a_table():
-    scenario = hg.Scenario(driver={"t_p": 0.3, "a1": 0.2}, course=COURSE)
+    scenario = hg.Scenario(driver={"t_p": 0.3, "a_1": 0.2}, course=COURSE)
     changed = scenario.replace(driver={"t_p": 0.5})
-    assert changed == hg.Scenario(driver={"t_p": 0.5, "a1": 0.2}, course=COURSE)
+    assert changed == hg.Scenario(driver={"t_p": 0.5, "a_1": 0.2}, course=COURSE)
     assert scenario.t_p_s == 0.3
     assert scenario.replace(course="paper-course").course_length_m == 3350.0
 

@@ -262,7 +262,7 @@ impl<G: Guidance> Simulation<G> {
             }
             Some(real) => {
                 let bank_rad = self.road.surface(&self.body).bank_rad;
-                let v = self.plan.speed_mps;
+                let v = self.plan.speed_m_per_s;
                 real.step(&mut self.plant, v, transition.gains(), &input, bank_rad);
                 real.motor_torque_nm()
             }
@@ -402,7 +402,7 @@ impl Sensing {
             lane: seen,
             driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias,
             wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias.to_radians(),
-            speed_mps: self.errors.speed_gain * truth.speed_mps,
+            speed_m_per_s: self.errors.speed_gain * truth.speed_m_per_s,
             ..*truth
         }
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::params::{PARAMETERS, Parameter, Params};
 use haptic_report::document::{Cell, Table};
 use haptic_target::PilError;
 use haptic_target::parameters::Product;
@@ -84,28 +84,22 @@ fn shortest(value: f64) -> f64 {
 }
 
 fn listing(params: &Params) -> String {
-    let rows = PARAMETERS
-        .iter()
-        .zip(params.to_values())
-        .map(|(parameter, value)| {
-            let range = format!("{} to {}", parameter.min, parameter.max);
-            let value = shortest(value).to_string();
-            [
-                parameter.name,
-                &value,
-                parameter.unit,
-                &range,
-                parameter.meaning.trim(),
-            ]
-            .map(|cell| Cell::Text(cell.to_owned()))
-            .to_vec()
-        });
+    let row = |(parameter, value): (&Parameter, f64)| {
+        let cells = [
+            parameter.name.to_owned(),
+            shortest(value).to_string(),
+            parameter.unit.to_owned(),
+            format!("{} to {}", parameter.min, parameter.max),
+            parameter.meaning.trim().to_owned(),
+        ];
+        cells.map(Cell::Text).to_vec()
+    };
     let table = Table {
         caption: String::new(),
-        columns: ["Parameter", "Value", "Unit", "Range", "Meaning"]
+        columns: ["parameter", "value", "unit", "range", "meaning"]
             .map(String::from)
             .to_vec(),
-        rows: rows.collect(),
+        rows: PARAMETERS.iter().zip(params.to_values()).map(row).collect(),
     };
     table.to_text()
 }

@@ -45,7 +45,8 @@ fn a_term_is_defined_before_its_use() {
     let headings = anchors(&glossary);
     let mut wrong = Vec::new();
     for (name, text) in documents() {
-        if ["docs/glossary.md", "CHANGELOG.md"]
+        // The second and the third: one line a change, and a table made by a tool.
+        if ["docs/glossary.md", "CHANGELOG.md", "docs/requirements.md"]
             .iter()
             .any(|own| name == Path::new(own))
         {

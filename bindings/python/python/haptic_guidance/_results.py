@@ -217,6 +217,11 @@ class Fit:
         return self.results["notes"]
 
     @property
+    def refuted(self) -> list[Any]:
+        """Assumptions that the record refutes: with any, nothing is identified."""
+        return self.results["refuted"]
+
+    @property
     def residuals_are_white(self) -> bool:
         """Whether the residuals are white, as they must be for the standard errors to hold."""
         return self.results["whiteness"]["white"]

@@ -6,7 +6,7 @@
 //! beside it show what was given up.
 
 use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model};
-use rand::rngs::StdRng;
+use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
@@ -183,8 +183,9 @@ pub fn spoiled(plan: &Plan, seeds: u32, only: &str, done: impl Fn() + Sync) -> R
                     }
                 }
                 let drive = driven_by(&plan, number, &truth, driver)?;
-                let mut random =
-                    StdRng::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)));
+                let mut random = Xoshiro256PlusPlus::seed_from_u64(
+                    plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)),
+                );
                 let mut log = drive.log;
                 for way in *ways {
                     spoil(&mut log, *way, &mut random);
@@ -312,7 +313,7 @@ impl Spoiled {
 /// Rows at either end that are never spoiled by what happens once: 8 s.
 const MARGIN: usize = 1000;
 
-fn spoil(log: &mut DriveLog, way: Spoiling, random: &mut StdRng) {
+fn spoil(log: &mut DriveLog, way: Spoiling, random: &mut Xoshiro256PlusPlus) {
     let n = log.len();
     let rows = |s: f64| (s / log.dt_s).round() as usize;
     match way {
@@ -379,7 +380,7 @@ fn spoil(log: &mut DriveLog, way: Spoiling, random: &mut StdRng) {
     }
 }
 
-fn noise(signal: &mut [f64], sd: f64, hold: usize, random: &mut StdRng) {
+fn noise(signal: &mut [f64], sd: f64, hold: usize, random: &mut Xoshiro256PlusPlus) {
     let Ok(normal) = Normal::new(0.0, sd) else { return };
     let mut held = 0.0;
     for (k, x) in signal.iter_mut().enumerate() {

@@ -81,11 +81,13 @@ fn plan(survey: &Survey) -> Figure {
         x: Axis {
             label: "x (m)".into(),
             limits: around(left, right, height * PANEL_ASPECT),
+            ..Axis::default()
         },
         panels: vec![Panel {
             y: Axis {
                 label: "y (m)".into(),
                 limits: around(low, high, height),
+                ..Axis::default()
             },
             series: vec![Series::line("", 1, points)],
             ..Panel::default()

@@ -13,7 +13,7 @@ use crate::input::{InputError, RangeError, in_range};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::real::WorldParameters;
-use crate::models::road::Course;
+use crate::models::road::{Course, LaneChoice};
 use crate::models::vehicle::VehicleParameters;
 
 /// Chooses the values of a [`Scenario`]; each has a default.
@@ -100,7 +100,7 @@ impl ScenarioBuilder {
     pub fn from_toml(
         name: &str,
         text: &str,
-        course: impl FnOnce(&str) -> Result<Course, InputError>,
+        course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
         file::parse(name, text, course)
     }

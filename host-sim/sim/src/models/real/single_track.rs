@@ -3,8 +3,7 @@
 use super::{GRAVITY_MPS2, Tyres};
 use crate::models::vehicle::VehicleParameters;
 
-/// Shape factors of side force and trail; passenger cars' lie about here.
-const FORCE_SHAPE: f64 = 1.4;
+/// Shape factor of the trail; passenger cars' lie about here.
 const TRAIL_SHAPE: f64 = 1.2;
 
 /// What a vehicle drives in.
@@ -64,8 +63,10 @@ impl SingleTrack {
 
     /// Force of an axle, N, and the share of its pneumatic trail that is left, for a slip angle.
     ///
-    /// The sine and cosine of an arc tangent after Pacejka (Tyre and Vehicle Dynamics, chapter 4), without curvature
-    /// factors: the force has its stiffness at no slip and mu*load at its peak, the trail falls to nothing behind it.
+    /// The force has its stiffness at no slip and nears mu*load where the tyre slides; in between it keeps to the
+    /// stiffness for long, as a curve of the fourth order does, so that the stiffness given is that of driving. The
+    /// trail falls earlier and to nothing, as a cosine of an arc tangent (Pacejka, Tyre and Vehicle Dynamics,
+    /// chapter 4).
     fn axle(&self, stiffness: f64, load_n: f64, mu: f64, slip_rad: f64) -> [f64; 2] {
         if self.tyres == Tyres::Linear {
             return [stiffness * slip_rad, 1.0];
@@ -73,7 +74,7 @@ impl SingleTrack {
         let most = mu * load_n;
         let slip = stiffness * slip_rad / most;
         [
-            most * (FORCE_SHAPE * (slip / FORCE_SHAPE).atan()).sin(),
+            most * slip / (1.0 + slip.powi(4)).sqrt().sqrt(),
             (TRAIL_SHAPE * slip.atan()).cos().max(0.0),
         ]
     }

@@ -99,11 +99,12 @@ fn a_tyre_gives_no_more_than_the_road_and_its_trail_falls() {
         let force_n = response.rates[0] * 1100.0;
         [force_n / most_n, -response.aligning_nm / (lever * force_n)]
     };
-    // sin(1.4*atan(x/1.4)) is 1 where the arc tangent is pi/2.8: x = 1.4*tan(1.121997) = 2.91; by a calculator.
-    let [force, trail] = at(2.907_09);
-    assert!((force - 1.0).abs() < 1e-9, "{force}");
-    // cos(1.2*atan(2.907)) = cos(1.488) = 0.0826
-    assert!((trail - (0.4 + 0.6 * 0.0826)).abs() < 1e-3, "{trail}");
+    // 1/2^(1/4) = 0.840896; cos(1.2*pi/4) = cos(0.942478) = 0.587785.
+    let [force, trail] = at(1.0);
+    assert!((force - 0.840_896).abs() < 1e-6, "{force}");
+    assert!((trail - (0.4 + 0.6 * 0.587_785)).abs() < 1e-6, "{trail}");
+    // 3/82^(1/4) = 3/3.009218
+    assert!((at(3.0)[0] - 0.996_937).abs() < 1e-5);
     for tenths in 0..200 {
         assert!(at(0.1 + f64::from(tenths) / 10.0)[0] <= 1.0);
     }
@@ -151,4 +152,75 @@ fn a_bank_pushes_to_the_lower_side_and_wind_to_where_it_blows() {
     };
     let blown = steady(windy, 0.0, V, gains, 0.0);
     assert!(blown.yaw_rate_rad_s > 1e-3, "{blown:?}");
+}
+
+/// CommonRoad's single-track vehicle (tests/tools/commonroad_single_track.py) in a lane change and in a curve of
+/// 2.5 m/s^2: yaw rate and side-slip angle within 2 % of their peaks.
+#[test]
+fn the_vehicle_is_that_of_commonroad() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/data/commonroad_single_track.csv"
+    );
+    let text = std::fs::read_to_string(path).unwrap();
+    let rows: Vec<(&str, Vec<f64>)> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split_once(',').unwrap())
+        .map(|(name, values)| (name, values.split(',').map(|v| v.parse().unwrap()).collect()))
+        .collect();
+    // Parameter set 2, a BMW 320i: its tyres give 21.92 times the load per radian on both axles, so it is neutral.
+    let (m, l_f, l_r, gravity) = (1_093.295_233_467_404_6, 1.156_195_706_4, 1.422_717_093_6, 9.81);
+    let stiffness = |other: f64| 0.5 * 21.92 * m * gravity * other / (l_f + l_r);
+    let vehicle = VehicleParameters {
+        m,
+        i: 1_791.599_530_012_285_6,
+        l_f,
+        l_r,
+        k_f: stiffness(l_r),
+        k_r: stiffness(l_f),
+        ..VehicleParameters::default()
+    };
+    let around = Surroundings {
+        mu: 1.0489,
+        bank_rad: 0.0,
+        force_n: 0.0,
+        moment_nm: 0.0,
+    };
+    for tyres in [Tyres::Linear, Tyres::Saturating] {
+        let tyre = SingleTrack::new(&vehicle, tyres, 0.4);
+        for manoeuvre in ["lane_change", "curve"] {
+            let rows: Vec<&Vec<f64>> = rows.iter().filter(|r| r.0 == manoeuvre).map(|r| &r.1).collect();
+            assert_eq!(rows.len(), 300);
+            let (mut motion, mut worst, mut peak) = ([0.0; 2], [0.0_f64; 2], [0.0_f64; 2]);
+            let mut lateral_mps2 = 0.0_f64;
+            for pair in rows.windows(2) {
+                let [_, v, wheel, yaw_rate, sideslip] = pair[0][..] else {
+                    panic!("five numbers")
+                };
+                let ours = [motion[1], f64::atan2(motion[0], v)];
+                for (i, theirs) in [yaw_rate, sideslip].into_iter().enumerate() {
+                    worst[i] = worst[i].max((ours[i] - theirs).abs());
+                    peak[i] = peak[i].max(theirs.abs());
+                }
+                lateral_mps2 = lateral_mps2.max(v * yaw_rate);
+                // 20 ms between rows, the angle straight between them.
+                for step in 0..20 {
+                    let at = |motion: [f64; 2], share: f64| {
+                        let angle = wheel + (pair[1][2] - wheel) * (f64::from(step) + share) / 20.0;
+                        tyre.respond(v, motion, angle / vehicle.k_t, &around).rates
+                    };
+                    let plus = |k: [f64; 2], h: f64| [motion[0] + h * k[0], motion[1] + h * k[1]];
+                    let k1 = at(motion, 0.0);
+                    let k2 = at(plus(k1, 0.5 * STEP_S), 0.5);
+                    motion = plus(k2, STEP_S);
+                }
+            }
+            assert!(lateral_mps2 > 2.4, "{manoeuvre}: {lateral_mps2}");
+            for i in 0..2 {
+                let share = worst[i] / peak[i];
+                assert!(share < 0.02, "{tyres:?} {manoeuvre} {i}: {share}");
+            }
+        }
+    }
 }
