@@ -186,14 +186,17 @@ def main():
 
     database = cantools.database.load_file(arguments.dbc)
     clock = (InLockStep if arguments.lockstep else OnTheWall)(arguments.channel)
-    run = Run(clock, database)
+    with clock.bus:
+        drive(Run(clock, database), arguments.seconds)
 
+
+def drive(run, seconds):
     # Valid inputs first: the ECU wants 500 ms of them, and then a request that rises.
     run.until("Standby", 5)
     run.hold("Standby", 0.7)
     run.vehicle.engage = True
     run.until("Active", 1)
-    run.hold("Active", arguments.seconds)
+    run.hold("Active", seconds)
 
     # The camera fails: after 30 ms the ECU hands over, warns, and takes two seconds to bring the torque to zero.
     run.vehicle.camera_works = False
@@ -209,7 +212,7 @@ def main():
     run.until("Standby", 0.3)
     if run.ecu.torque != 0:
         run.fail("torque in Standby")
-    print(f"Active for {arguments.seconds:g} s, a handover, and back to Standby")
+    print(f"Active for {seconds:g} s, a handover, and back to Standby")
 
 
 if __name__ == "__main__":

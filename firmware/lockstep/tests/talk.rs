@@ -184,7 +184,7 @@ fn the_program_of_the_page_drives_the_image_in_qemu() {
     }
     std::thread::spawn(move || std::io::copy(&mut log, &mut std::io::sink()));
     let channel = format!("socket://127.0.0.1:{port}");
-    let said = run("talk_to_the_ecu.py", &[&channel, "--lockstep", "--seconds", "10"]);
+    let said = run("talk_to_the_ecu.py", &[&channel, "--lockstep", "--seconds", "4"]);
     assert!(said.contains("back to Standby"), "{said}");
     // The channel is closed, and with it the image ends.
     assert!(qemu.wait().unwrap().success());
