@@ -50,6 +50,9 @@ const PACKAGES: Arrows = &[
     ("host-sim/target", &["haptic-core", "haptic-lockstep"]),
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
+    ("bindings/c", &["haptic-core"]),
+    // The parts that Python hands out; no injector, no serial port, no charts.
+    ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
 ];
 
 /// What the simulator may not touch: it runs in a browser and in somebody else's process.
@@ -286,4 +289,50 @@ fn imports_are_read_in_every_form() {
     // In `trace.rs`, `super` is the root.
     assert_eq!(at(1, "use super::metrics;"), ["metrics"]);
     assert_eq!(at(1, "use supercrate::metrics; use std::fs;"), [""; 0]);
+}
+
+/// Lines of a file that a reader still takes in.
+const LONGEST: usize = 350;
+
+/// Files of the libraries that are longer, and why each stays whole.
+#[rustfmt::skip]
+const LONGER: &[(&str, &str)] = &[
+    ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
+    ("firmware/src/boards/mps2.rs", "one file for each board"),
+    ("firmware/src/boards/sam_e54_xpro.rs", "one file for each board"),
+    ("firmware/src/reset.rs", "the record that crosses a reset, with what writes, reads and repairs it"),
+    ("host-sim/analysis/src/identify/log/mod.rs", "every refusal of a log beside the others"),
+    ("host-sim/analysis/src/identify/noise_model/mod.rs", "one model: its states, their sensitivities, their tests"),
+    ("host-sim/analysis/src/identify/noise_model/report.rs", "everything that a fit is reported by"),
+    ("host-sim/analysis/src/identify/paper.rs", "one published method, as it stands in the paper"),
+    ("host-sim/analysis/src/identify/result.rs", "one document: the fields of a result"),
+    ("host-sim/analysis/src/identify/search.rs", "one algorithm with its tests"),
+    ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
+    ("host-sim/report/src/studies/experiment.rs", "one report, section by section"),
+    ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
+    ("host-sim/sim/src/scenario/mod.rs", "one document: the fields of a scenario and their meaning"),
+    ("host-sim/sim/src/simulation.rs", "one loop with its tests, which look into it"),
+];
+
+#[test]
+fn no_file_of_a_library_is_longer_than_a_reader_takes_in_without_a_reason() {
+    let mut longer = BTreeMap::new();
+    for (package, _) in PACKAGES {
+        for path in sources(&root().join(package).join("src")) {
+            let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+            if lines > LONGEST {
+                longer.insert(path.strip_prefix(root()).unwrap().display().to_string(), lines);
+            }
+        }
+    }
+    for (path, why) in LONGER {
+        assert!(
+            longer.remove(*path).is_some(),
+            "{path} is short enough: strike it, and its reason ({why})"
+        );
+    }
+    assert!(
+        longer.is_empty(),
+        "longer than {LONGEST} lines: split, or a reason in LONGER: {longer:#?}"
+    );
 }

@@ -60,7 +60,7 @@ impl Background {
                 *none = Some(self.estimator.start());
                 is_free = false;
             }
-            // What a driver did before is no evidence of what he does now.
+            // What a driver did before is no evidence of what the driver does now.
             (state, None) => *state = None,
         }
         let steps = self.steps;

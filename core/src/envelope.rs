@@ -83,7 +83,7 @@ words! {
     }
 }
 
-/// What the envelope judges a wish against.
+/// What the envelope holds a wanted torque against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Situation {
     /// The torque really applied until now.

@@ -89,7 +89,7 @@ impl Case {
         }
     }
 
-    /// The bound itself, from a wish far beyond it, checked against `expected` and then at L-1, L, L+1.
+    /// The bound itself, from a wanted torque far beyond it, checked against `expected` and then at L-1, L, L+1.
     fn check_rate(&self, envelope: &Envelope, expected: f64, outward: f64, reason: LimitReason) {
         let far = if reason == LimitReason::Reduction {
             0.0

@@ -1,4 +1,4 @@
-//! Every bit of the vital memory flipped, one at a time, in each mode with a torque and in Standby: Fault and no
+//! Every bit of the redundant memory flipped, one at a time, in each mode with a torque and in Standby: Fault and no
 //! torque in the next step. And the guard itself, on a value of its own.
 
 mod rig;

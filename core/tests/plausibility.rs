@@ -54,7 +54,7 @@ struct Drive {
 }
 
 /// Lateral acceleration that the course asks for, m/s2, and where the driver wants to be beside the line, m.
-fn wish(course: Course, t: f64) -> (f64, f64) {
+fn wanted(course: Course, t: f64) -> (f64, f64) {
     match course {
         Course::Curve(entry_s) => {
             let ramp = |t: f64| {
@@ -93,7 +93,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
     };
     for k in 0..12_000_u32 {
         let t = f64::from(k) * DT;
-        let curvature = |ahead_s: f64| side * wish(course, t + ahead_s).0 / (speed * speed);
+        let curvature = |ahead_s: f64| side * wanted(course, t + ahead_s).0 / (speed * speed);
         // Heading and offset of the line ahead, by its curvature in ten pieces.
         let line = |ahead_s: f64| {
             let ds = speed * ahead_s / 10.0;
@@ -108,7 +108,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
             (offset - y - speed * near_s * chi, line(far_s).0 - chi)
         };
         // The driver: preview, at most 1 m/s to the side.
-        let target = side * wish(course, t + 0.5).1;
+        let target = side * wanted(course, t + 0.5).1;
         let (d_y, d_theta) = errors(0.3, 1.0);
         let asked = 0.15 * (d_y + target) + 3.0 * d_theta * 20.0 / speed.max(10.0);
         // Column: a stiff arm; the driver's torque is what the equation of the column leaves over.

@@ -1,25 +1,86 @@
 //! Everything that CI checks. The tests come last, so that a log ends with their results; what failed before
-//! them is named before they start.
+//! them is named before they start. The quick tier is for daily work: what needs no QEMU, no valgrind and no C compiler.
 
 use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, boards, gate};
+use crate::{bench, bindings_agree, boards, c_library, gate, trace, wheel};
 
+/// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
+pub(crate) fn run_quick() -> Result<()> {
+    let mut failed = check_all(&[
+        ("format", &format),
+        ("clippy", &clippy),
+        ("documentation", &documentation),
+    ]);
+    for (name, arguments) in [
+        ("tests of the libraries", "--workspace --exclude xtask --lib"),
+        (
+            "tests of the core and the log",
+            "-p haptic-core -p haptic-log --tests",
+        ),
+        ("doctests", "--workspace --exclude xtask --doc"),
+    ] {
+        let arguments = arguments.split(' ').chain(["--no-fail-fast"]);
+        let test = || run(cargo().arg("test").args(arguments.clone()));
+        failed.extend(check_all(&[(name, &test)]));
+    }
+    finish(&failed)
+}
+
+fn format() -> Result<()> {
+    run(cargo().args(["fmt", "--all", "--check"]))
+}
+
+fn clippy() -> Result<()> {
+    run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+}
+
+/// A link that leads nowhere is an error.
+fn documentation() -> Result<()> {
+    run(cargo()
+        .args(["doc", "--workspace", "--no-deps"])
+        .env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+/// Runs checks one after the other; the names of those that failed.
+fn check_all<'a>(checks: &[(&'a str, &dyn Fn() -> Result<()>)]) -> Vec<&'a str> {
+    let mut failed = Vec::new();
+    for (name, check) in checks {
+        println!("== {name}");
+        if let Err(error) = check() {
+            eprintln!("error: {name}: {error:#}");
+            failed.push(*name);
+        }
+    }
+    failed
+}
+
+fn finish(failed: &[&str]) -> Result<()> {
+    if !failed.is_empty() {
+        bail!("failed: {}", failed.join(", "));
+    }
+    Ok(())
+}
+
+/// Everything.
 pub(crate) fn run_all() -> Result<()> {
     ensure(&[
         ("qemu-system-arm", "qemu-system-arm"),
         ("valgrind", "valgrind"),
         ("gcc", "gcc"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+        ("g++", "g++"),
+        // For the examples of the documents.
+        ("python3", "python3"),
+        ("python3", "python3-venv"),
     ])?;
     let target_features = format!("{BOARD},gate,broken,bench");
-    let checks: [(&str, &dyn Fn() -> Result<()>); 6] = [
-        ("format", &|| run(cargo().args(["fmt", "--all", "--check"]))),
-        ("clippy", &|| {
-            run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
-        }),
+    let failed = check_all(&[
+        ("format", &format),
+        ("clippy", &clippy),
         ("clippy of the images", &|| {
             let package = ["clippy", "--release", "-p", "haptic-firmware", "--bins", "--lib"];
             let target = [
@@ -33,19 +94,16 @@ pub(crate) fn run_all() -> Result<()> {
             ];
             run(cargo().args(package).args(target))
         }),
+        ("documentation", &documentation),
+        ("requirements", &|| trace::run(false)),
         ("gate", &gate::run),
         // Compares every frame of a whole run on each of QEMU's boards on the way.
         ("boards", &|| boards::check(false)),
         ("instructions on the host", &|| bench::run(false)),
-    ];
-    let mut failed = Vec::new();
-    for (name, check) in checks {
-        println!("== {name}");
-        if let Err(error) = check() {
-            eprintln!("error: {name}: {error:#}");
-            failed.push(name);
-        }
-    }
+        ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
+        ("C library", &c_library::check),
+        ("bindings agree", &bindings_agree::check),
+    ]);
     if !failed.is_empty() {
         eprintln!("== failed: {}; the tests follow", failed.join(", "));
     }
@@ -57,11 +115,9 @@ pub(crate) fn run_all() -> Result<()> {
     println!("== tests");
     // Apart, because the log decoder switches on features of serde_json that host-sim does not ship with.
     let of_xtask = run(cargo().args(["test", "-p", "xtask"]));
+    // With the doctests of every library.
     run(cargo().args(["test", "--workspace", "--exclude", "xtask", "--no-fail-fast"]))?;
     of_xtask?;
     fuzz?;
-    if !failed.is_empty() {
-        bail!("failed: {}", failed.join(", "));
-    }
-    Ok(())
+    finish(&failed)
 }

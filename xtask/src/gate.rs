@@ -7,8 +7,12 @@
 //!    panic is reachable. Its symbols are searched once more for the panic machinery.
 //! 2. No float: built for a core without floating-point hardware, a float operation would be a call of a
 //!    library function, and its symbol is searched for.
-//! 3. Both bite: with a panic behind the step the image must not link, with a float operation the search must
+//! 3. No wrap: overflow checks are on in this image, so that a `+` or `*` that may wrap is a panic. (Not in a board's
+//!    image: there it would only be code that never runs.)
+//! 4. All bite: with a panic or a wrap behind the step the image must not link, with a float operation the search must
 //!    find it. A gate that cannot fail proves nothing.
+//!
+//! Where it fails it says where: the same image with a panic handler that links is followed from the step to the panic.
 
 use std::path::Path;
 
@@ -25,7 +29,7 @@ pub(crate) fn run() -> Result<()> {
     for target in [M4F, M3] {
         let elf = match elf_of(&mut gate("gate", target)) {
             Ok(elf) => elf,
-            Err(error) => bail!("{error}: is a panic reachable from the controller's step?"),
+            Err(error) => bail!("{error}: {}", whence(target)),
         };
         let symbols = symbols(&elf)?;
         ensure!(symbols.len() > 20, "{target}: the gate image has hardly a symbol");
@@ -42,20 +46,22 @@ pub(crate) fn run() -> Result<()> {
             );
         }
     }
-    println!("gate: no panic and no float is reachable from the controller's step");
+    println!("gate: no panic, no wrap and no float is reachable from the controller's step");
 
-    let output = gate("gate-with-panic", M4F).output()?;
-    let text = String::from_utf8_lossy(&output.stderr);
-    ensure!(
-        !output.status.success() && text.contains(UNDEFINED),
-        "the gate does not see a panic that is there:\n{text}"
-    );
+    for seed in ["gate-with-panic", "gate-with-wrap"] {
+        let output = gate(seed, M4F).output()?;
+        let text = String::from_utf8_lossy(&output.stderr);
+        ensure!(
+            !output.status.success() && text.contains(UNDEFINED),
+            "{seed}: the gate does not see what was put there:\n{text}"
+        );
+    }
     let symbols = symbols(&elf_of(&mut gate("gate-with-float", M3))?)?;
     ensure!(
         symbols.iter().any(|name| is_soft_float(name)),
         "the gate does not see a float operation that is there"
     );
-    println!("gate: it finds a panic and a float operation that were put there");
+    println!("gate: it finds a panic, a wrap and a float operation that were put there");
     injection_leaves_nothing()
 }
 
@@ -86,7 +92,22 @@ fn injection_leaves_nothing() -> Result<()> {
 }
 
 fn gate(feature: &str, target: &str) -> std::process::Command {
-    build_command("gate", target, &format!("{BOARD},{feature}"))
+    let mut command = build_command("gate", target, &format!("{BOARD},{feature}"));
+    command.args(["--config", "profile.release.overflow-checks=true"]);
+    command
+}
+
+/// The calls from the step to a panic, in the image whose panic handler links.
+fn whence(target: &str) -> String {
+    let path = elf_of(&mut gate("gate-that-links", target))
+        .and_then(|elf| Code::of(&elf))
+        .and_then(|code| code.torque_path(CONTROLLER));
+    match path {
+        Err(error) => format!("{error:#}"),
+        Ok(_) => {
+            "no call from the controller's step leads to a panic; what else does the image hold?".to_owned()
+        }
+    }
 }
 
 fn symbols(elf: &Path) -> Result<Vec<String>> {

@@ -3,8 +3,10 @@
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
 mod bench;
+mod bindings_agree;
 mod boards;
 mod by_hand;
+mod c_library;
 mod callgrind;
 mod ci;
 mod code;
@@ -18,6 +20,8 @@ mod seal;
 mod size;
 mod speed;
 mod tool;
+mod trace;
+mod wheel;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,7 +39,11 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Everything that CI checks, the tests last. Installs the tools it needs where it may.
-    Ci,
+    Ci {
+        /// Format, clippy, documentation, tests of the libraries and doctests alone, for daily work: no QEMU, no valgrind.
+        #[arg(long)]
+        quick: bool,
+    },
     /// Proves on the linked image that the controller has no panic path and no float.
     Gate,
     /// Instructions of a control step: on the host, against xtask/golden.json; in QEMU; or cycles, on a board.
@@ -75,10 +83,23 @@ enum Command {
     Run(boards::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
+    /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++, and runs
+    /// its example natively and in QEMU.
+    C,
+    /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
+    BindingsAgree,
+    /// Builds the Python wheel into target/dist, and says what it weighs and links.
+    Wheel(wheel::Options),
     /// Writes an image's CRC-32 into its ELF, which the product looks for at every start. `flash` and `run` do it too.
     Seal {
         /// The ELF of steering-ecu, changed in place.
         elf: PathBuf,
+    },
+    /// Requirements (docs/requirements.toml): exit code 1 if evidence is missing, or something has no requirement.
+    Trace {
+        /// Write docs/requirements.md.
+        #[arg(long)]
+        bless: bool,
     },
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
@@ -102,7 +123,8 @@ enum Bench {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Ci => ci::run_all(),
+        Command::Ci { quick: true } => ci::run_quick(),
+        Command::Ci { quick: false } => ci::run_all(),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
         Command::Mutants { by_hand: true, .. } => by_hand::run(),
@@ -111,6 +133,9 @@ fn main() -> ExitCode {
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
+        Command::C => c_library::check(),
+        Command::BindingsAgree => bindings_agree::check(),
+        Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed),
             ..
@@ -127,6 +152,7 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
+        Command::Trace { bless } => trace::run(bless),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };

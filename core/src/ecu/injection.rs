@@ -139,6 +139,10 @@ impl Ecu {
 }
 
 /// Flips a bit of a region if it lies here, `words` words into it, and counts the words.
+#[expect(
+    clippy::as_conversions,
+    reason = "only the place within a word counts, modulo 32"
+)]
 fn flip<T: Words>(guarded: &mut Redundant<T>, bit: usize, words: &mut usize) {
     guarded.change_copies(&mut |word| {
         let mask = if bit / 32 == *words {

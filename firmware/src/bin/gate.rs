@@ -4,7 +4,7 @@
 //! and looks.
 //!
 //! The inputs come from volatile memory, so that the compiler can assume nothing about them. The features
-//! `gate-with-panic` and `gate-with-float` put a violation behind the step: the gate must find it.
+//! `gate-with-panic`, `gate-with-wrap` and `gate-with-float` put a violation behind the step: the gate must find it.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -47,6 +47,10 @@ mod target {
             {
                 output[0] = output[usize::from(output[1])];
             }
+            #[cfg(feature = "gate-with-wrap")]
+            {
+                output[0] += output[1];
+            }
             #[cfg(feature = "gate-with-float")]
             {
                 output[0] = (step.command.torque.nm() * f64::from(output[1])) as u8;
@@ -56,6 +60,15 @@ mod target {
         }
     }
 
+    #[cfg(feature = "gate-that-links")]
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo) -> ! {
+        loop {
+            cortex_m::asm::nop();
+        }
+    }
+
+    #[cfg(not(feature = "gate-that-links"))]
     #[panic_handler]
     fn panic(_: &core::panic::PanicInfo) -> ! {
         unsafe extern "C" {

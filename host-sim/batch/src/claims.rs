@@ -100,103 +100,131 @@ pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
 }
 
 pub(super) fn check(results: &EvaluationResults) -> Vec<Claim> {
-    let mut claims = vec![numbers(results)];
-    let peak = |t_p, condition, failure| {
-        let record = results.record(t_p, condition, failure);
+    let claims = Claims(results);
+    let mut all = vec![numbers(results)];
+    all.extend(claims.without_failure());
+    all.push(claims.with_loss_of_torque());
+    all.push(claims.with_failed_input());
+    all
+}
+
+fn claim(claim: &str, holds: bool, evidence: String) -> Claim {
+    Claim {
+        claim: claim.into(),
+        holds,
+        evidence,
+    }
+}
+
+/// The orderings of sections 5.1 and 5.2 in the results of an evaluation.
+struct Claims<'a>(&'a EvaluationResults);
+
+impl Claims<'_> {
+    fn peak(&self, t_p: f64, condition: Condition, failure: FailureKind) -> f64 {
+        let record = self.0.record(t_p, condition, failure);
         record
             .and_then(|r| r.metrics.peak_lateral_error_m)
             .unwrap_or(f64::NAN)
-    };
-    let nominal = |t_p, condition| peak(t_p, condition, FailureKind::None);
-    let failed = |t_p, condition| peak(t_p, condition, FailureKind::Torque);
-    let gain = |t_p| 1.0 - nominal(t_p, High) / nominal(t_p, Manual);
-    let [first, second, third] = DRIVERS_T_P;
-    let mut claim = |claim: &str, holds: bool, evidence: String| {
-        claims.push(Claim {
-            claim: claim.into(),
-            holds,
-            evidence,
-        });
-    };
+    }
 
-    let peaks = Condition::ALL.map(|condition| nominal(first, condition));
-    let (low, high) = (
-        peaks.iter().copied().fold(f64::MAX, f64::min),
-        peaks.iter().copied().fold(0.0, f64::max),
-    );
-    claim(
-        "driver 1: no evident difference between conditions (peaks within 10 %)",
-        high <= 1.1 * low,
-        format!("{low:.3} to {high:.3} m"),
-    );
-    let [manual, relying, mid, light] = Condition::ALL.map(|condition| nominal(third, condition));
-    claim(
-        "driver 3: guidance helps greatly (high reliance saves a quarter of the peak), the more the higher the \
-         reliance",
-        relying < 0.75 * manual && relying < mid && mid < light && light < manual,
-        format!("high {relying:.3}, mid {mid:.3}, low {light:.3}, manual {manual:.3} m"),
-    );
-    claim(
-        "driver 2 lies between drivers 1 and 3 in what guidance saves",
-        gain(first) <= gain(second) && gain(second) <= gain(third),
-        DRIVERS_T_P
-            .map(|t_p| format!("{:.1} %", 100.0 * gain(t_p)))
-            .join(", "),
-    );
-    let distance = |t_p, condition| (nominal(t_p, condition) - nominal(t_p, Manual)).abs();
-    claim(
-        "low reliance is close to manual: closer than high reliance (drivers 2 and 3), within 15 %",
-        [second, third]
-            .iter()
-            .all(|&t_p| distance(t_p, Low) < distance(t_p, High))
-            && DRIVERS_T_P
-                .iter()
-                .all(|&t_p| distance(t_p, Low) <= 0.15 * nominal(t_p, Manual)),
-        DRIVERS_T_P
-            .map(|t_p| format!("{:.1} mm", 1e3 * distance(t_p, Low)))
-            .join(", "),
-    );
-    let mean = |t_p, condition, failure| {
-        let record = results.record(t_p, condition, failure);
+    fn mean(&self, t_p: f64, condition: Condition, failure: FailureKind) -> f64 {
+        let record = self.0.record(t_p, condition, failure);
         record
             .and_then(|r| r.metrics.mean_abs_lateral_error_m)
             .unwrap_or(f64::NAN)
-    };
-    let raised =
-        |t_p, condition| mean(t_p, condition, FailureKind::Torque) > mean(t_p, condition, FailureKind::None);
-    claim(
-        "a failure raises the (mean) error of all three drivers, and the peak the more the higher the reliance",
-        DRIVERS_T_P.iter().all(|&t_p| {
-            [High, Mid, Low].iter().all(|&condition| raised(t_p, condition))
-                && failed(t_p, High) > failed(t_p, Mid)
-                && failed(t_p, Mid) > failed(t_p, Low)
-        }),
-        DRIVERS_T_P
-            .map(|t_p| {
-                [High, Mid, Low]
-                    .map(|c| format!("{:.3}", failed(t_p, c)))
-                    .join(" > ")
-            })
-            .join(" m, ")
-            + " m",
-    );
-    let handed = |t_p, condition| peak(t_p, condition, FailureKind::Input);
-    let worst = |t_p, condition| handed(t_p, condition) / nominal(t_p, condition).max(nominal(t_p, Manual));
-    claim(
-        "a failed input that the ECU survives costs at most 1.25 times the larger of the no-failure and the \
-         manual peak",
-        DRIVERS_T_P
-            .iter()
-            .all(|&t_p| [High, Mid, Low].iter().all(|&c| worst(t_p, c) <= 1.25)),
-        DRIVERS_T_P
-            .map(|t_p| {
-                [High, Mid, Low]
-                    .map(|c| format!("{:.2}", worst(t_p, c)))
-                    .join(", ")
-            })
-            .join("; "),
-    );
-    claims
+    }
+
+    fn nominal(&self, t_p: f64, condition: Condition) -> f64 {
+        self.peak(t_p, condition, FailureKind::None)
+    }
+
+    fn without_failure(&self) -> [Claim; 4] {
+        let nominal = |t_p, condition| self.nominal(t_p, condition);
+        let gain = |t_p| 1.0 - nominal(t_p, High) / nominal(t_p, Manual);
+        let [first, second, third] = DRIVERS_T_P;
+        let peaks = Condition::ALL.map(|condition| nominal(first, condition));
+        let (low, high) = (
+            peaks.iter().copied().fold(f64::MAX, f64::min),
+            peaks.iter().copied().fold(0.0, f64::max),
+        );
+        let alike = claim(
+            "driver 1: no evident difference between conditions (peaks within 10 %)",
+            high <= 1.1 * low,
+            format!("{low:.3} to {high:.3} m"),
+        );
+        let [manual, relying, mid, light] = Condition::ALL.map(|condition| nominal(third, condition));
+        let helped = claim(
+            "driver 3: guidance helps greatly (high reliance saves a quarter of the peak), the more the higher the \
+             reliance",
+            relying < 0.75 * manual && relying < mid && mid < light && light < manual,
+            format!("high {relying:.3}, mid {mid:.3}, low {light:.3}, manual {manual:.3} m"),
+        );
+        let between = claim(
+            "driver 2 lies between drivers 1 and 3 in what guidance saves",
+            gain(first) <= gain(second) && gain(second) <= gain(third),
+            DRIVERS_T_P
+                .map(|t_p| format!("{:.1} %", 100.0 * gain(t_p)))
+                .join(", "),
+        );
+        let distance = |t_p, condition| (nominal(t_p, condition) - nominal(t_p, Manual)).abs();
+        let light_is_manual = claim(
+            "low reliance is close to manual: closer than high reliance (drivers 2 and 3), within 15 %",
+            [second, third]
+                .iter()
+                .all(|&t_p| distance(t_p, Low) < distance(t_p, High))
+                && DRIVERS_T_P
+                    .iter()
+                    .all(|&t_p| distance(t_p, Low) <= 0.15 * nominal(t_p, Manual)),
+            DRIVERS_T_P
+                .map(|t_p| format!("{:.1} mm", 1e3 * distance(t_p, Low)))
+                .join(", "),
+        );
+        [alike, helped, between, light_is_manual]
+    }
+
+    fn with_loss_of_torque(&self) -> Claim {
+        let failed = |t_p, condition| self.peak(t_p, condition, FailureKind::Torque);
+        let raised = |t_p, condition| {
+            self.mean(t_p, condition, FailureKind::Torque) > self.mean(t_p, condition, FailureKind::None)
+        };
+        claim(
+            "a failure raises the (mean) error of all three drivers, and the peak the more the higher the reliance",
+            DRIVERS_T_P.iter().all(|&t_p| {
+                [High, Mid, Low].iter().all(|&condition| raised(t_p, condition))
+                    && failed(t_p, High) > failed(t_p, Mid)
+                    && failed(t_p, Mid) > failed(t_p, Low)
+            }),
+            DRIVERS_T_P
+                .map(|t_p| {
+                    [High, Mid, Low]
+                        .map(|c| format!("{:.3}", failed(t_p, c)))
+                        .join(" > ")
+                })
+                .join(" m, ")
+                + " m",
+        )
+    }
+
+    fn with_failed_input(&self) -> Claim {
+        let handed = |t_p, condition| self.peak(t_p, condition, FailureKind::Input);
+        let worst = |t_p, condition| {
+            handed(t_p, condition) / self.nominal(t_p, condition).max(self.nominal(t_p, Manual))
+        };
+        claim(
+            "a failed input that the ECU survives costs at most 1.25 times the larger of the no-failure and the \
+             manual peak",
+            DRIVERS_T_P
+                .iter()
+                .all(|&t_p| [High, Mid, Low].iter().all(|&c| worst(t_p, c) <= 1.25)),
+            DRIVERS_T_P
+                .map(|t_p| {
+                    [High, Mid, Low]
+                        .map(|c| format!("{:.2}", worst(t_p, c)))
+                        .join(", ")
+                })
+                .join("; "),
+        )
+    }
 }
 
 fn numbers(results: &EvaluationResults) -> Claim {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use haptic_sim::input::InputError;
-use haptic_sim::models::road::{Course, PAPER_COURSE};
+use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::scenario::Scenario;
 
 /// Reads and checks a scenario file. A course file named in it is looked for beside the scenario.
@@ -12,28 +12,44 @@ use haptic_sim::scenario::Scenario;
 /// An unreadable file; as [`Scenario::from_toml`] and [`load_course`].
 pub fn load_scenario(path: &Path) -> Result<Scenario, InputError> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    Scenario::from_toml(&path.display().to_string(), &read(path)?, |course| {
-        load_course(&folder.join(course))
+    Scenario::from_toml(&path.display().to_string(), &read(path)?, |course, lane| {
+        load_lane(&folder.join(course), lane)
     })
 }
 
-/// The built-in course if `path` is its name, else as [`load_course`].
+/// The built-in course if `path` is its name, else as [`load_lane`].
 ///
 /// # Errors
-/// As [`load_course`].
-pub fn open_course(path: &Path) -> Result<Course, InputError> {
+/// As [`load_lane`].
+pub fn open_course(path: &Path, lane: &LaneChoice) -> Result<Course, InputError> {
     if path == Path::new(PAPER_COURSE) {
+        lane.check_none(PAPER_COURSE)?;
         return Ok(Course::paper());
     }
-    load_course(path)
+    load_lane(path, lane)
 }
 
-/// Reads and checks a course file.
+/// Reads and checks a course file, in the lane that is sensible if it is one of OpenDRIVE.
 ///
 /// # Errors
-/// An unreadable file; as [`Course::from_toml`].
+/// As [`load_lane`].
 pub fn load_course(path: &Path) -> Result<Course, InputError> {
-    Course::from_toml(&path.display().to_string(), &read(path)?)
+    load_lane(path, &LaneChoice::default())
+}
+
+/// Reads and checks a course file: a lane of an OpenDRIVE file if its name ends with `.xodr`, else TOML.
+///
+/// # Errors
+/// An unreadable file; as [`Course::from_opendrive`] and [`Course::from_toml`].
+pub fn load_lane(path: &Path, lane: &LaneChoice) -> Result<Course, InputError> {
+    let name = path.display().to_string();
+    if path.extension().is_some_and(|x| x.eq_ignore_ascii_case("xodr")) {
+        let bytes = std::fs::read(path).map_err(|e| InputError::new(&name, e))?;
+        // Names in other encodings than UTF-8 do not matter to the road.
+        return Course::from_opendrive(&name, &String::from_utf8_lossy(&bytes), lane);
+    }
+    lane.check_none(&name)?;
+    Course::from_toml(&name, &read(path)?)
 }
 
 /// Names the file and what the system says of it.

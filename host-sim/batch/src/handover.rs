@@ -8,7 +8,7 @@
 //! A row is *judged* for high and mid reliance, and where the manual driver is stable: the driver has to be able to
 //! take over. Stable means that the manual driver's error dies down on the last straight, 24 s long: its largest
 //! value in the second half is at most 0.9 times that of the whole. Low reliance is shown, not judged: this driver
-//! drives nearly as manually, works against the guidance until he notices, and has least to lose by its absence.
+//! drives nearly as manually, works against the guidance until the failure is noticed, and has least to lose by its absence.
 
 use rayon::prelude::*;
 use serde::Serialize;

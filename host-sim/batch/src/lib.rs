@@ -1,18 +1,36 @@
 //! Studies: what to simulate, and what to make of it.
 //!
+//! A study takes scenarios of `haptic-sim`, drives them on every core, measures them with `haptic-analysis`, and gives
+//! one value that is a result: serialisable, without a file or a word for people.
+//!
 //! - [`evaluate`]: section 5 of the paper, three drivers under four conditions, with and without failure.
 //! - [`claims`]: what that evaluation must show.
 //! - [`experiment`]: sections 3 and 4, the participants driven, identified and driven again.
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
+//!
+//! ```
+//! use haptic_sim::Scenario;
+//! use haptic_sim::scenario::Condition;
+//!
+//! let peak_m = |condition| {
+//!     let scenario = Scenario::builder().condition(condition).build().unwrap();
+//!     let single = haptic_batch::run::run(scenario, false).unwrap();
+//!     single.results.record.metrics.peak_lateral_error_m.unwrap()
+//! };
+//! // Without guidance the paper's quickest driver is as good as with it (section 5.1).
+//! assert!((peak_m(Condition::Manual) / peak_m(Condition::Mid) - 1.0).abs() < 0.1);
+//! ```
 //!
 //! Not here: options and exit codes (the command line), how a metric is computed, which files are left and how they look.
 
 pub mod bus_load;
 pub mod claims;
+pub mod course;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;

@@ -14,6 +14,14 @@ pub(super) const COLUMN: u16 = 0x110;
 pub(super) const VEHICLE: u16 = 0x120;
 pub(super) const DEMAND: u16 = 0x130;
 
+/// Codes of the modes.
+pub(super) const STANDBY: u64 = 1;
+pub(super) const ACTIVE: u64 = 2;
+pub(super) const FADE: u64 = 3;
+pub(super) const HANDOVER: u64 = 4;
+pub(super) const FAULT: u64 = 5;
+pub(super) const LOCKED: u64 = 6;
+
 const DATA_IDS: [u8; 16] = [
     0xD9, 0xAD, 0xC1, 0x0B, 0x75, 0xF8, 0xE0, 0x7C, 0x7A, 0xE6, 0xAE, 0x92, 0x9B, 0x3E, 0xEA, 0x5E,
 ];
@@ -123,6 +131,7 @@ pub(super) struct Status {
     /// Whether some fault of class B, of class C, of class Locked is present, one bit each.
     pub(super) classes: u64,
     pub(super) reset: u64,
+    /// Bits of the fault word that no fault has.
     pub(super) spare: u64,
 }
 
@@ -137,7 +146,7 @@ impl Status {
             faults: unsigned(frame, 37, 21),
             classes: unsigned(frame, 58, 3),
             reset: unsigned(frame, 61, 3),
-            spare: unsigned(frame, 52, 6),
+            spare: unsigned(frame, 55, 3),
         }
     }
 }

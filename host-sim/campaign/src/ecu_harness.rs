@@ -1,69 +1,34 @@
 //! The harness of the ECU in the loop, with everything that can be wrong around it: senders, bus, clock, the ECU,
 //! the motor, a hand on the wheel, and the invariant checker that watches every cycle.
 
+mod injected;
+
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::ResetCause;
 use haptic_core::config::Setup;
 use haptic_core::ecu::injection::InjectedEcu;
-use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::params::Params;
-use haptic_core::quantity::{Instant, Torque};
+use haptic_core::quantity::Instant;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::bytes::Status;
-use super::injection::{Clock, Hand, Injection, Inside, Motor};
-use super::invariants::{ACTIVE, FAULT, InvariantChecker, Violation};
+use super::bytes::{ACTIVE, FAULT};
+use super::injection::{Clock, Injection, Inside};
+use super::invariants::InvariantChecker;
 use super::residual::{Residual, Seen};
 use super::senders::{Senders, SensorReadings};
 use super::start_up::{is_engaged, start_up};
 use super::table::FaultCase;
+use super::trial_record::{EcuTrace, Tick, TrialRecord};
 use super::wire::{Arrival, Bus};
-use haptic_sim::ecu_events::EcuEvents;
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
 use haptic_sim::models::sensors;
 use haptic_sim::scenario::Scenario;
 
 /// Code of the limit that acts for the driver's sake.
 const DRIVER_OVERRIDE: u64 = 5;
-/// A new random law every so many ms.
-const LAW_HELD_MS: i64 = 200;
-/// A hand taps five times a second, 40 ms each.
-const TAP_EVERY_MS: i64 = 200;
-const TAP_MS: i64 = 40;
 
-/// What a run leaves for the verdict. Steps are of the world, 1 ms.
-#[derive(Debug, Clone, Default)]
-pub(super) struct TrialRecord {
-    /// Every mode with the step in which it began.
-    pub(super) modes: Vec<(u32, u64)>,
-    /// When the fault could first be seen.
-    pub(super) seen_at: Option<u32>,
-    /// Largest share of the margin used, up to the first change of mode after the onset.
-    pub(super) used: f64,
-    /// The same of the margins that a contradiction uses, whatever the row looks at.
-    pub(super) contradicted: f64,
-    /// First step from the onset on with no torque in Active.
-    pub(super) yielded_at: Option<u32>,
-    /// Whether a limit acted for the driver's sake from the onset on.
-    pub(super) overridden: bool,
-    /// Largest torque from the onset on, N.m.
-    pub(super) peak_nm: f64,
-    /// Tampered frames that the ECU rejected.
-    pub(super) rejected: u32,
-    /// The first that it accepted.
-    pub(super) accepted_bad_at: Option<u32>,
-    /// Cause of the last reset, as the status frame has it.
-    pub(super) reset: u64,
-    pub(super) cycles: u64,
-    /// Last step.
-    pub(super) steps: u32,
-    pub(super) violation: Option<Violation>,
-    /// What the ECU said.
-    pub(super) ecu: EcuEvents,
-}
-
-/// The harness.
+/// The ECU with everything around it, in the place of the guidance.
 #[derive(Debug)]
 pub(super) struct EcuHarness<'a> {
     row: &'a FaultCase,
@@ -90,27 +55,6 @@ pub(super) struct EcuHarness<'a> {
     record: TrialRecord,
     start: (Params, haptic_lockstep::Start),
     trace: Option<EcuTrace>,
-}
-
-/// Everything that went into an ECU and came out of it, so that another can be put in its place.
-#[derive(Debug, Clone)]
-pub(super) struct EcuTrace {
-    pub(super) params: Params,
-    pub(super) start: haptic_lockstep::Start,
-    pub(super) ticks: Vec<Tick>,
-}
-
-/// One run of the ECU.
-#[derive(Debug, Clone)]
-pub(super) struct Tick {
-    /// In the world, ms.
-    pub(super) step: u32,
-    /// On the ECU's clock.
-    pub(super) now: Instant,
-    /// What it received before, and whether it accepted it.
-    pub(super) frames: Vec<(Frame, bool)>,
-    /// What it sent: guidance first.
-    pub(super) answer: Vec<Frame>,
 }
 
 impl<'a> EcuHarness<'a> {
@@ -310,47 +254,6 @@ impl<'a> EcuHarness<'a> {
         };
     }
 
-    fn disturb_inside(&mut self, step: u32, now_us: u32) {
-        let since = self.since(step);
-        if since < 0 {
-            return;
-        }
-        for injection in self.row.injections {
-            let Injection::Inside(inside) = injection else {
-                continue;
-            };
-            match inside {
-                Inside::Flip(region) if since == 0 => {
-                    let bit = self.rng.random_range(0..self.ecu.redundant_bits(*region));
-                    self.ecu.flip_bit(*region, bit);
-                }
-                Inside::LawForced if since == 0 => {
-                    let away = if self.commanded_nm > 0.0 { -5.0 } else { 5.0 };
-                    self.ecu.force_law(Some(Torque::from_nm(away)));
-                }
-                Inside::LawInterrupted => {
-                    let torque_nm = if since % 16 == 0 { 0.0 } else { 5.0 };
-                    self.ecu.force_law(Some(Torque::from_nm(torque_nm)));
-                }
-                Inside::LawRandom if since % LAW_HELD_MS == 0 => {
-                    let torque_nm = self.rng.random_range(-5.0..5.0);
-                    self.ecu.force_law(Some(Torque::from_nm(torque_nm)));
-                }
-                Inside::MonitorAgrees if since == 0 => self.ecu.blind_monitor(|_| true),
-                Inside::BrownOut if since == 0 => {
-                    let boot = Boot {
-                        reset: ResetCause::BrownOut,
-                        recent_resets: 1,
-                        ..Boot::default()
-                    };
-                    self.ecu = InjectedEcu::new(Ecu::new(Some(&self.setup), boot, Instant::from_us(now_us)));
-                    self.checker.reset(now_us);
-                }
-                _ => {}
-            }
-        }
-    }
-
     fn record_status(&mut self, step: u32, status: &Status) {
         let record = &mut self.record;
         if record.modes.last().is_none_or(|(_, mode)| *mode != status.mode) {
@@ -363,56 +266,6 @@ impl<'a> EcuHarness<'a> {
             if status.torque_nm == 0.0 && status.mode == ACTIVE {
                 record.yielded_at.get_or_insert(step);
             }
-        }
-    }
-
-    fn motor(&self, step: u32) -> f64 {
-        let motor = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Motor(motor) if self.acts(step) => Some(*motor),
-            _ => None,
-        });
-        match motor {
-            None => self.commanded_nm,
-            Some(Motor::Times(share)) => share * self.commanded_nm,
-            Some(Motor::Stuck) => self.stuck_nm,
-        }
-    }
-}
-
-impl EcuHarness<'_> {
-    /// Torque of a hand on the wheel, N.m, beside that of the driver's arm.
-    pub(super) fn hand_torque_nm(&self, step: u32, arm_torque_nm: f64) -> f64 {
-        let since = self.since(step);
-        let against = if self.commanded_nm == 0.0 {
-            -self.side
-        } else {
-            -self.commanded_nm.signum()
-        };
-        let hand = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Hand(hand) => Some(*hand),
-            _ => None,
-        });
-        match hand {
-            Some(Hand::Jerk {
-                peak_nm,
-                ms,
-                before_ms,
-            }) => {
-                let phase = (since + i64::from(before_ms)) as f64 / f64::from(ms);
-                if (0.0..1.0).contains(&phase) {
-                    self.side * peak_nm * (std::f64::consts::PI * phase).sin()
-                } else {
-                    0.0
-                }
-            }
-            // The hand makes the driver torque what it says, whatever the arm does.
-            Some(Hand::Opposes { torque_nm, ms }) if (0..i64::from(ms)).contains(&since) => {
-                against * torque_nm - arm_torque_nm
-            }
-            Some(Hand::Taps { torque_nm }) if since >= 0 && since % TAP_EVERY_MS < TAP_MS => {
-                against * torque_nm - arm_torque_nm
-            }
-            _ => 0.0,
         }
     }
 }

@@ -20,11 +20,14 @@
 //! | fade | never grows, falls by 4 N.m/s |
 //! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked |
 
+mod frame;
+
 use std::collections::VecDeque;
 
 use haptic_core::bus::Frame;
 
-use super::bytes::{self, Status};
+use super::bytes::{self, ACTIVE, FADE, FAULT, HANDOVER, LOCKED, STANDBY, Status};
+use frame::{override_bounds, warned, well_formed};
 
 const LIMIT_NM: f64 = 5.0;
 const WIND_UP_NM_PER_S: f64 = 4.0;
@@ -53,22 +56,6 @@ const PROBE_NM: f64 = 0.2;
 const IMPLAUSIBLE_FAULTS: u64 = 1 << 2 | 1 << 4 | 1 << 6;
 /// Bit of the fault that the two copies of a redundant state differ.
 const MEMORY_FAULT: u64 = 1 << 10;
-
-pub(super) const STANDBY: u64 = 1;
-pub(super) const ACTIVE: u64 = 2;
-pub(super) const FADE: u64 = 3;
-pub(super) const HANDOVER: u64 = 4;
-pub(super) const FAULT: u64 = 5;
-pub(super) const LOCKED: u64 = 6;
-
-/// Bits of the faults of class B, of class C, and of class Locked.
-const CLASSES: [u64; 3] = [0x00FF, 0x1F00, 0x6000];
-
-/// The classes that a guidance frame must name with these faults.
-fn classes_of(faults: u64) -> u64 {
-    let present = CLASSES.map(|mask| u64::from(faults & mask != 0));
-    present[0] | present[1] << 1 | present[2] << 2
-}
 
 /// A rule that was broken.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -357,47 +344,4 @@ impl InvariantChecker {
         }
         Ok(())
     }
-}
-
-fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Result<(), String> {
-    if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
-        return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
-    }
-    if status.limit > 7
-        || status.mode > LOCKED
-        || status.reset > 6
-        || status.spare != 0
-        || status.classes != classes_of(status.faults)
-    {
-        return Err(format!("frame: a code that does not exist in {status:?}"));
-    }
-    match before {
-        // An ECU that lost its memory counts anew.
-        Some(before)
-            if status.counter != (before.counter + 1) % 16
-                && (status.faults & !before.faults) & MEMORY_FAULT == 0 =>
-        {
-            Err(format!(
-                "frame: counter {} after {}",
-                status.counter, before.counter
-            ))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
-    if status.warning != matches!(status.mode, HANDOVER | FAULT | LOCKED) {
-        return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
-    }
-    if status.warning && !before && !others.iter().any(|frame| frame.id() == bytes::WARNING) {
-        return Err("no warning frame in the cycle of the reaction".into());
-    }
-    Ok(())
-}
-
-/// Least and largest torque that leave the driver in charge.
-fn override_bounds(driver_nm: f64) -> (f64, f64) {
-    let bound = |toward: f64| (LIMIT_NM + OVERRIDE_SLOPE * (toward + OVERRIDE_FROM_NM)).clamp(0.0, LIMIT_NM);
-    (-bound(-driver_nm), bound(driver_nm))
 }

@@ -11,6 +11,15 @@
 //!            +--- one injection ------+                   verdict: class, deadline, torque bound
 //! ```
 //!
+//! ```
+//! use haptic_campaign::{World, table};
+//!
+//! let frozen = table::rows().find(|row| row.name == "lateral-error-frozen").unwrap();
+//! let outcome = World::new().run(frozen, 3);
+//! let said: Vec<_> = outcome.reported.iter().map(|event| event.what.as_str()).collect();
+//! assert_eq!(said[..2], ["The ECU reports LaneImplausible", "The ECU goes to Handover"]);
+//! ```
+//!
 //! What is marked Q runs in QEMU as well, with the image in the place of the ECU (`target`).
 //!
 //! Not here: faults that only an image has (watchdog, stack, processor fault). They are in the table, and in
@@ -29,6 +38,7 @@ mod start_up;
 pub mod table;
 pub mod target;
 mod trial;
+mod trial_record;
 mod verdict;
 mod wire;
 

@@ -15,13 +15,14 @@ use haptic_core::bus::Frame;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
+use super::bytes::FAULT;
 use super::bytes::Status;
 use super::campaign::{self, Campaign};
-use super::ecu_harness::{EcuTrace, Tick};
 use super::injection::{Injection, Inside};
-use super::invariants::{FAULT, InvariantChecker, Violation};
+use super::invariants::{InvariantChecker, Violation};
 use super::table::{Expect, FaultCase};
 use super::trial::World;
+use super::trial_record::{EcuTrace, Tick};
 use haptic_target::PilError;
 use haptic_target::stepped::Stepped;
 

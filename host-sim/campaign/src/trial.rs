@@ -12,10 +12,11 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use super::drivers::{Driver, everyone};
-use super::ecu_harness::{EcuHarness, EcuTrace};
+use super::ecu_harness::EcuHarness;
 use super::injection::Start;
 use super::invariants::Violation;
 use super::table::FaultCase;
+use super::trial_record::EcuTrace;
 use super::verdict::judge;
 use haptic_log::Event;
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};

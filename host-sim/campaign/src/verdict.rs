@@ -1,9 +1,10 @@
 //! Whether a run did what its row asks for.
 
-use super::ecu_harness::TrialRecord;
-use super::invariants::{ACTIVE, FADE, FAULT, HANDOVER, STANDBY, Violation};
+use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER, STANDBY};
+use super::invariants::Violation;
 use super::residual::Seen;
 use super::table::{Expect, FaultCase};
+use super::trial_record::TrialRecord;
 
 /// Before a contradiction has used this share of its margin nobody may react to it.
 const TOO_EARLY: f64 = 0.8;

@@ -1,6 +1,32 @@
-//! Records of drives.
+//! Records of drives: what a run leaves behind.
+//!
+//! A [`trace::Trace`] is a table of evenly spaced [`trace::Sample`]s, one channel a field, with the unit in its name. It is the
+//! truth of the simulated world, not what a sensor saw. An [`Event`] says in words what happened when.
+//!
+//! Records are written in and read from two formats: tables ([`table`], CSV) and the bus ([`candump`]).
+//!
+//! This crate knows nothing of ours, so that what reads records (metrics, identification, reports) needs no simulator.
+//!
+//! ```
+//! use haptic_log::trace::{Sample, Trace};
+//!
+//! let sample = |k: u32| Sample {
+//!     time_s: f64::from(k) / 200.0,
+//!     lateral_error_m: 0.1,
+//!     ..Sample::default()
+//! };
+//! let trace = Trace {
+//!     sample_rate_hz: 200.0,
+//!     samples: (0..400).map(sample).collect(),
+//! };
+//! assert_eq!(trace.samples.last().unwrap().time_s, 1.995);
+//! ```
+//!
+//! Not here: what a record means (`haptic-analysis`), and how it is drawn (`haptic-report`).
 
+pub mod candump;
 mod event;
+pub mod table;
 pub mod trace;
 
 pub use event::Event;

@@ -2,44 +2,147 @@
 //!
 //! Signs and frames are ISO 8855 (y left, yaw counter-clockwise); "lateral error" is the offset of the
 //! centre of gravity from the centreline, left positive.
+//!
+//! The channels are one list, [`channels!`](self) below: one more channel is one more entry of it. From it follow the
+//! fields of [`Sample`], the table [`CHANNELS`], the columns of a CSV file, writing it and reading it back. What else wants a decision
+//! says so itself: the compiler refuses the simulator's sample until it has a value for the new field, and
+//! `tests/channels.rs` asks for its row in `docs/files.md`.
 
-use serde::Serialize;
+use std::fmt;
+use std::io::{self, Read, Write};
 
-/// One instant of a run. SI units.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Sample {
-    /// Time since the start of the run, s.
-    pub time_s: f64,
-    /// Arc length of the centre of gravity's projection on the centreline, m.
-    pub s_m: f64,
-    /// Offset of the centre of gravity from the centreline, m, left positive.
-    pub lateral_error_m: f64,
-    /// Direction of movement minus the centreline's heading at `s_m`, rad.
-    pub heading_error_rad: f64,
-    /// Curvature of the centreline at `s_m`, 1/m, left positive.
-    pub curvature_1pm: f64,
-    /// e_y at the driver's near point, m.
-    pub e_y_m: f64,
-    /// e_theta at the driver's far point, rad.
-    pub e_theta_rad: f64,
-    /// e_y' at the guidance's near point, m.
-    pub guidance_e_y_m: f64,
-    /// e_theta' at the guidance's far point, rad.
-    pub guidance_e_theta_rad: f64,
-    /// Steering wheel angle phi, rad.
-    pub wheel_angle_rad: f64,
-    /// Steering wheel rate, rad/s.
-    pub wheel_rate_rad_s: f64,
-    /// Yaw rate r, rad/s.
-    pub yaw_rate_rad_s: f64,
-    /// Side-slip angle beta, rad.
-    pub sideslip_rad: f64,
-    /// Driver torque T_d on the column (with the remnant, if any), N.m.
-    pub driver_torque_nm: f64,
-    /// Guidance torque T_h really applied, N.m.
-    pub guidance_torque_nm: f64,
-    /// Whether a limit held the guidance torque back.
-    pub guidance_limited: bool,
+use crate::table::{TableError, TableReader, TableWriter, fixed};
+
+/// What the values of a channel belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Source {
+    /// The step's number.
+    Clock,
+    /// The centreline, at the vehicle or ahead of it.
+    Road,
+    /// The vehicle, the column and the wheel.
+    Vehicle,
+    /// The driver.
+    Driver,
+    /// The guidance and its actuator.
+    Guidance,
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Clock => "clock",
+            Self::Road => "road",
+            Self::Vehicle => "vehicle",
+            Self::Driver => "driver",
+            Self::Guidance => "guidance",
+        })
+    }
+}
+
+/// One channel of a trace.
+#[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
+pub struct Channel {
+    /// The field of [`Sample`] and the column of a file; its unit is its last part.
+    pub name: &'static str,
+    /// SI unit; `1` if it has none.
+    pub unit: &'static str,
+    /// Digits after the point in a text: far below what any sensor resolves.
+    pub decimals: usize,
+    /// What it belongs to.
+    pub source: Source,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Its value in a sample; a flag is 0 or 1.
+    pub value: fn(&Sample) -> f64,
+    set: fn(&mut Sample, f64),
+}
+
+/// A quantity or a flag, as a number.
+trait Value: Copy {
+    fn number(self) -> f64;
+    fn of(number: f64) -> Self;
+}
+
+impl Value for f64 {
+    fn number(self) -> f64 {
+        self
+    }
+
+    fn of(number: f64) -> Self {
+        number
+    }
+}
+
+impl Value for bool {
+    fn number(self) -> f64 {
+        f64::from(self)
+    }
+
+    fn of(number: f64) -> Self {
+        number != 0.0
+    }
+}
+
+/// Declares the channels: `field: type, unit, digits, source;`.
+macro_rules! channels {
+    ($($(#[doc = $meaning:literal])+ $field:ident: $type:ty, $unit:literal, $decimals:literal, $source:ident;)*) => {
+        /// One instant of a run, in SI units.
+        #[derive(Debug, Clone, Copy, Default, PartialEq)]
+        pub struct Sample {
+            $($(#[doc = $meaning])+ #[doc = concat!("\n\nUnit ", $unit, ".")] pub $field: $type,)*
+        }
+
+        /// Every channel, in the order of the columns of a file.
+        pub const CHANNELS: [Channel; [$(stringify!($field)),*].len()] = [
+            $(Channel {
+                name: stringify!($field),
+                unit: $unit,
+                decimals: $decimals,
+                source: Source::$source,
+                meaning: concat!($($meaning),+),
+                value: |sample| sample.$field.number(),
+                set: |sample, number| sample.$field = Value::of(number),
+            },)*
+        ];
+    };
+}
+
+channels! {
+    /// Time since the start of the run.
+    time_s: f64, "s", 6, Clock;
+    /// e_y at the driver's near point.
+    e_y_m: f64, "m", 6, Road;
+    /// e_theta at the driver's far point.
+    e_theta_rad: f64, "rad", 7, Road;
+    /// Steering wheel angle phi.
+    wheel_angle_rad: f64, "rad", 7, Vehicle;
+    /// Guidance torque T_h really applied.
+    guidance_torque_nm: f64, "N.m", 5, Guidance;
+    /// Driver torque T_d on the column, with the remnant, if any.
+    driver_torque_nm: f64, "N.m", 5, Driver;
+    /// Offset of the centre of gravity from the centreline, left positive.
+    lateral_error_m: f64, "m", 6, Vehicle;
+    /// Arc length of the centre of gravity's projection on the centreline.
+    s_m: f64, "m", 4, Vehicle;
+    /// Direction of movement minus the centreline's heading at `s_m`.
+    heading_error_rad: f64, "rad", 7, Vehicle;
+    /// Curvature of the centreline at `s_m`, left positive.
+    curvature_1pm: f64, "1/m", 8, Road;
+    /// e_y' at the guidance's near point.
+    guidance_e_y_m: f64, "m", 6, Road;
+    /// e_theta' at the guidance's far point.
+    guidance_e_theta_rad: f64, "rad", 7, Road;
+    /// Rate of the steering wheel.
+    wheel_rate_rad_per_s: f64, "rad/s", 6, Vehicle;
+    /// Yaw rate r.
+    yaw_rate_rad_per_s: f64, "rad/s", 7, Vehicle;
+    /// Side-slip angle beta.
+    sideslip_rad: f64, "rad", 7, Vehicle;
+    /// Whether a limit held the guidance torque back: 0 or 1.
+    guidance_limited: bool, "1", 0, Guidance;
 }
 
 /// A run's samples, evenly spaced in time.
@@ -49,4 +152,98 @@ pub struct Trace {
     pub sample_rate_hz: f64,
     /// The samples in order of time; the first is at t = 0.
     pub samples: Vec<Sample>,
+}
+
+impl Trace {
+    /// Writes every sample as a row of a CSV table. A value that is not finite is an empty field.
+    ///
+    /// The first columns are those of a driver's log, so that a simulated run can be read wherever a log can.
+    ///
+    /// # Errors
+    /// What `out` says.
+    pub fn write_csv(&self, out: impl Write) -> io::Result<()> {
+        let mut table = TableWriter::new(out, CHANNELS.map(|channel| channel.name))?;
+        for sample in &self.samples {
+            table.row(CHANNELS.map(|channel| {
+                let value = (channel.value)(sample);
+                if value.is_finite() {
+                    fixed(value, channel.decimals)
+                } else {
+                    String::new()
+                }
+            }))?;
+        }
+        table.finish()
+    }
+
+    /// Reads what [`Trace::write_csv`] has written. Columns of other names are passed over; an empty field is NaN. The
+    /// sample rate is that of the first and the last time stamp.
+    ///
+    /// # Errors
+    /// What cannot be read, a column that is missing, a field that is no number.
+    ///
+    /// ```
+    /// use haptic_log::trace::{Sample, Trace};
+    /// let sample = |time_s, e_y_m| Sample { time_s, e_y_m, ..Sample::default() };
+    /// let trace = Trace { sample_rate_hz: 2.0, samples: vec![sample(0.0, 0.125), sample(0.5, -0.25)] };
+    /// let mut csv = Vec::new();
+    /// trace.write_csv(&mut csv).unwrap();
+    /// assert_eq!(Trace::read_csv(&csv[..]).unwrap(), trace);
+    /// ```
+    pub fn read_csv(source: impl Read) -> Result<Self, TableError> {
+        let mut table = TableReader::new(source)?;
+        let place = |channel: Channel| {
+            let found = table.header().iter().position(|name| *name == channel.name);
+            found.ok_or_else(|| TableError::MissingColumn(channel.name.into()))
+        };
+        let places = CHANNELS.into_iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let mut samples = Vec::new();
+        for row in table.rows() {
+            let row = row?;
+            let mut sample = Sample::default();
+            for (channel, place) in CHANNELS.iter().zip(&places) {
+                let text = row.field(*place);
+                let value = if text.is_empty() {
+                    f64::NAN
+                } else {
+                    text.parse().map_err(|_| TableError::NotANumber {
+                        line: row.line,
+                        column: channel.name.into(),
+                        text: text.into(),
+                    })?
+                };
+                (channel.set)(&mut sample, value);
+            }
+            samples.push(sample);
+        }
+        let span_s = samples
+            .last()
+            .zip(samples.first())
+            .map_or(0.0, |(b, a)| b.time_s - a.time_s);
+        Ok(Self {
+            sample_rate_hz: if span_s > 0.0 {
+                (samples.len() - 1) as f64 / span_s
+            } else {
+                0.0
+            },
+            samples,
+        })
+    }
+}
+
+/// The channels as a Markdown table, as `docs/files.md` holds it.
+#[must_use]
+pub fn table_of_channels() -> String {
+    let mut text = String::from("| column | unit | digits | of | meaning |\n|---|---|---|---|---|\n");
+    for channel in CHANNELS {
+        text.push_str(&format!(
+            "| `{}` | {} | {} | {} | {} |\n",
+            channel.name,
+            channel.unit,
+            channel.decimals,
+            channel.source,
+            channel.meaning.trim()
+        ));
+    }
+    text
 }

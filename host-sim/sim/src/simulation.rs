@@ -20,8 +20,10 @@ use haptic_log::trace::{Sample, Trace};
 
 use crate::action::{Action, Request, WorldFaults};
 use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
+use crate::models::disturbances::{ErringCamera, SensorErrors};
 use crate::models::driver::{ArmGains, Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
+use crate::models::real::RealPlant;
 use crate::models::road::{Centreline, Projection, Tracker};
 use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::{PreviewPoints, wrapped};
@@ -98,6 +100,10 @@ pub struct Simulation<G = AnyGuidance> {
     plan: Plan,
     guidance: G,
     plant: Plant,
+    /// What moves the plant where the paper's model does not do.
+    real: Option<Box<RealPlant>>,
+    /// What the sensors add, if they add anything.
+    sensing: Option<Box<Sensing>>,
     vision: Vision,
     remnant: Remnant,
     driver_points: PreviewPoints,
@@ -143,6 +149,8 @@ impl<G: Guidance> Simulation<G> {
             plan: Plan::new(scenario, &road),
             guidance,
             plant: Plant::default(),
+            real: real(scenario),
+            sensing: Sensing::of(scenario),
             vision: Vision::new(driver),
             remnant: Remnant::new(driver, Stream::Remnant.seed(scenario.seed())),
             driver_points: PreviewPoints::new(&road, v * driver.t_n, v * driver.t_f),
@@ -195,7 +203,11 @@ impl<G: Guidance> Simulation<G> {
             speed_m_per_s: self.plan.speed_m_per_s,
             request: self.plan.request(action),
         };
-        let decided = self.guidance.step(&observation);
+        let seen = match &mut self.sensing {
+            None => observation,
+            Some(sensing) => sensing.of_truth(&observation),
+        };
+        let decided = self.guidance.step(&seen);
         let applied = if faults.torque_lost {
             Actuation::default()
         } else {
@@ -223,7 +235,7 @@ impl<G: Guidance> Simulation<G> {
         }
         Some(Outcome {
             preview,
-            observation,
+            observation: seen,
             decided,
             applied_torque_nm: applied.torque_nm,
             sample,
@@ -242,10 +254,20 @@ impl<G: Guidance> Simulation<G> {
             guidance_torque_nm,
             remnant_nm,
         };
-        self.plant
-            .step(self.plan.transition(self.step, self.failed_at), &input);
+        let transition = self.plan.transition(self.step, self.failed_at);
+        self.motor_torque_nm = match &mut self.real {
+            None => {
+                self.plant.step(transition, &input);
+                guidance_torque_nm
+            }
+            Some(real) => {
+                let bank_rad = self.road.surface(&self.body).bank_rad;
+                let v = self.plan.speed_m_per_s;
+                real.step(&mut self.plant, v, transition.gains(), &input, bank_rad);
+                real.motor_torque_nm()
+            }
+        };
         self.target_now_rad = target_next_rad;
-        self.motor_torque_nm = guidance_torque_nm;
         self.step += 1;
     }
 
@@ -353,6 +375,49 @@ impl Plan {
     }
 }
 
+/// The sensors of a world that is not the paper's.
+#[derive(Debug, Clone)]
+struct Sensing {
+    errors: SensorErrors,
+    camera: ErringCamera,
+}
+
+impl Sensing {
+    fn of(scenario: &Scenario) -> Option<Box<Self>> {
+        let errors = *scenario.sensor_errors();
+        if errors == SensorErrors::default() {
+            return None;
+        }
+        let camera = ErringCamera::new(errors, Stream::Sensors.seed(scenario.seed()));
+        Some(Box::new(Self { errors, camera }))
+    }
+
+    /// What the sensors make of the truth.
+    fn of_truth(&mut self, truth: &Observation) -> Observation {
+        let seen = truth.lane.and_then(|lane| {
+            let [e_y_m, e_theta_rad] = self.camera.see(truth.step, [lane.e_y_m, lane.e_theta_rad])?;
+            Some(LaneErrors { e_y_m, e_theta_rad })
+        });
+        Observation {
+            lane: seen,
+            driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias,
+            wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias.to_radians(),
+            speed_m_per_s: self.errors.speed_gain * truth.speed_m_per_s,
+            ..*truth
+        }
+    }
+}
+
+/// The plant of a world that is not the paper's.
+fn real(scenario: &Scenario) -> Option<Box<RealPlant>> {
+    let (world, vehicle, driver) = (scenario.world(), scenario.vehicle(), scenario.driver());
+    if world.is_ideal() && scenario.course().is_level() {
+        return None;
+    }
+    let seed = Stream::World.seed(scenario.seed());
+    Some(Box::new(RealPlant::new(*world, vehicle, driver, seed)))
+}
+
 /// The step at or next to a time.
 fn step_of(time_s: f64) -> u32 {
     (time_s / STEP_S).round() as u32
@@ -376,8 +441,8 @@ fn record(
         guidance_e_y_m: camera.e_y_m,
         guidance_e_theta_rad: camera.e_theta_rad,
         wheel_angle_rad: plant.wheel_angle_rad(),
-        wheel_rate_rad_s: plant.wheel_rate_rad_s(),
-        yaw_rate_rad_s: plant.yaw_rate_rad_s(),
+        wheel_rate_rad_per_s: plant.wheel_rate_rad_per_s(),
+        yaw_rate_rad_per_s: plant.yaw_rate_rad_per_s(),
         sideslip_rad: plant.sideslip_rad(),
         driver_torque_nm: observation.driver_torque_nm,
         guidance_torque_nm: applied.torque_nm,

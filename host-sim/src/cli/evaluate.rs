@@ -12,14 +12,14 @@ use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, Failure, SPEED_KMH, Scenario, Sensors};
 
 use super::output::Output;
+use super::road::CourseArguments;
 use super::series::SeriesArgument;
 use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Course file (TOML: lane_width, [[segment]]; see docs/files.md); default: the built-in paper-course
-    #[arg(long, value_name = "FILE")]
-    course: Option<PathBuf>,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Speed, km/h (20 to 250)
     #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
     speed: f64,
@@ -51,10 +51,7 @@ enum SensorsArgument {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
-    let course = match &arguments.course {
-        Some(path) => haptic_batch::files::open_course(path)?,
-        None => Course::paper(),
-    };
+    let course = arguments.course.open()?.unwrap_or_else(Course::paper);
     let sensors = match arguments.sensors {
         SensorsArgument::Exact => Sensors::Exact,
         SensorsArgument::Paper => Sensors::Paper,
@@ -96,11 +93,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     })
 }
 
+/// What a reader of the table cannot guess.
+const LEGEND: &str = "t_p: the driver's delay. Condition: how much the driver relies on the guidance.
+Failure: none, the guidance torque lost at once, or its input lost and the torque handed over.";
+
 fn readable(evaluation: &Evaluation) -> String {
     let results = &evaluation.results;
     let [from, to] = results.window_m;
     let mut text = format!(
-        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}",
+        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}\n{LEGEND}\n",
         results.course,
         results.speed_kmh,
         from,

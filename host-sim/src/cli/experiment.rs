@@ -18,7 +18,8 @@ pub(super) struct Arguments {
     /// Participants: numbers and ranges such as 1,3..5
     #[arg(long, value_name = "LIST", default_value = "1..14")]
     participants: Participants,
-    /// Amplitude of the probe in the guided drives, N.m (0: none)
+    /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
+    /// the driver's answer to it tells K_hg
     #[arg(
         long,
         value_name = "AMPLITUDE",

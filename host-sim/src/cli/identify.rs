@@ -10,6 +10,7 @@ use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
+use super::road::CourseArguments;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -21,14 +22,15 @@ pub(super) struct Arguments {
     /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
-    /// A drive without guidance: there is no K_hg, and guidance_torque_nm may be missing
+    /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
+    /// missing
     #[arg(long)]
     manual: bool,
     /// Prediction errors with a disturbance model, or the published way
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
     /// A known parameter, such as k_d=3.2 (a_1, a_2, a_3, gain_1, gain_2, gain_3, t_p, k_d, k_hg, k_nms, t_nms; by
-    /// how much a column is late, s: t_h_late, t_d_late); may be repeated
+    /// how much a column is late, s: t_h_late, t_d_late); may be repeated. gain_i is (k_d + k_nms)*a_i; docs/glossary.md explains the others
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
     /// Estimate what is otherwise taken as known: k_nms, t_nms, t_h_late, t_d_late, in a range if one is given, such as
@@ -47,9 +49,8 @@ pub(super) struct Arguments {
     /// Use every row: hands off, standstill and lane changes are not looked for
     #[arg(long)]
     whole: bool,
-    /// Let the identified driver drive this course (TOML, or paper-course)
-    #[arg(long, value_name = "FILE")]
-    course: Option<PathBuf>,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Speed on that course, km/h (20 to 250)
     #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
     speed: f64,
@@ -80,14 +81,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::Paper => Method::Paper,
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
+    let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
     let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
     let name = arguments.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, note.map(String::from));
-    if let Some(path) = &arguments.course {
-        drive.drive_again(haptic_batch::files::open_course(path)?, arguments.speed, &options)?;
+    if let Some(course) = course {
+        drive.drive_again(course, arguments.speed, &options)?;
     }
     output.finish(|place| files::write(&drive, place))?;
     if arguments.json {

@@ -7,6 +7,7 @@
 //! One file per subcommand. Not here: anything that a study or a model decides.
 
 mod bus;
+mod course;
 mod evaluate;
 mod experiment;
 mod faults;
@@ -18,6 +19,7 @@ mod participants;
 mod pil;
 mod progress;
 mod reliance;
+mod road;
 mod run;
 mod series;
 
@@ -29,7 +31,8 @@ use serde::Serialize;
 
 /// Closed-loop workbench for the haptic-guidance steering controller.
 ///
-/// Without a subcommand: the evaluation, as `evaluate` with the same options.
+/// Without a subcommand: the evaluation, as `evaluate` with the same options. New here? The tutorial is
+/// docs/tutorials/first-evaluation.md, and docs/glossary.md explains every word and symbol.
 ///
 /// Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage, or a program that is not
 /// installed.
@@ -50,11 +53,13 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
+    Course(course::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
     Faults(faults::Arguments),
-    /// What a failed input costs when the ECU hands over, and what a sudden loss costs: 40 to 120 km/h
+    /// What a lost input costs if the ECU hands over within 2 s, and if the torque is lost at once: 40 to 120 km/h
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
@@ -62,7 +67,7 @@ enum Command {
     Parameters(parameters::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
-    /// How well the ECU reads the drivers' reliance from its probe, against the truth
+    /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
     Reliance(reliance::Arguments),
 }
 
@@ -96,6 +101,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),

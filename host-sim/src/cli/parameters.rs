@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
+use haptic_core::params::{PARAMETERS, Parameter, Params};
+use haptic_report::document::{Cell, Table};
 use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
@@ -30,12 +32,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(path) => Some(haptic_batch::files::load_scenario(path)?.controller_params()),
         None => None,
     };
-    let status = Product::on(&arguments.can).and_then(|mut product| match &params {
-        Some(params) => product.store(params),
-        None => product.status(),
+    let told = Product::on(&arguments.can).and_then(|mut product| {
+        let status = match &params {
+            Some(params) => product.store(params),
+            None => product.status(),
+        }?;
+        Ok((status, product.values()?))
     });
-    let status = match status {
-        Ok(status) => status,
+    let (status, in_use) = match told {
+        Ok(told) => told,
         Err(error @ PilError::Missing(_)) => return Err(error.into()),
         Err(error) => {
             eprintln!("error: {error}");
@@ -47,6 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             "stored": status.stored,
             "sequence": status.sequence,
             "damaged": status.damaged,
+            "parameters": values(&in_use).collect::<serde_json::Map<_, _>>(),
         }))?;
     } else {
         let set = if status.stored {
@@ -59,7 +65,62 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         } else {
             ""
         };
-        print(&format!("the ECU uses {set}{damage}"))?;
+        print(&format!("the ECU uses {set}{damage}:\n\n{}", listing(&in_use)))?;
     }
     Ok(Outcome::Good)
+}
+
+/// Names and values, in the order of the list.
+fn values(params: &Params) -> impl Iterator<Item = (String, serde_json::Value)> {
+    PARAMETERS
+        .into_iter()
+        .zip(params.to_values())
+        .map(|(parameter, value)| (parameter.name.to_owned(), shortest(value).into()))
+}
+
+/// The bus carries a binary32: of the doubles that it stands for, the one with the fewest digits.
+fn shortest(value: f64) -> f64 {
+    format!("{}", value as f32).parse().unwrap_or(value)
+}
+
+fn listing(params: &Params) -> String {
+    let row = |(parameter, value): (&Parameter, f64)| {
+        let cells = [
+            parameter.name.to_owned(),
+            shortest(value).to_string(),
+            parameter.unit.to_owned(),
+            format!("{} to {}", parameter.min, parameter.max),
+            parameter.meaning.trim().to_owned(),
+        ];
+        cells.map(Cell::Text).to_vec()
+    };
+    let table = Table {
+        caption: String::new(),
+        columns: ["parameter", "value", "unit", "range", "meaning"]
+            .map(String::from)
+            .to_vec(),
+        rows: PARAMETERS.iter().zip(params.to_values()).map(row).collect(),
+    };
+    table.to_text()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_shown_as_it_was_written_and_not_as_the_bus_rounds_it() {
+        let params = Params {
+            k_1: f64::from(0.3_f32),
+            ..Params::PAPER
+        };
+        assert_ne!(params.k_1, 0.3);
+        let listing = listing(&params);
+        let row = listing.lines().find(|line| line.starts_with("k_1 ")).unwrap();
+        assert!(
+            row.contains(" 0.3 ") && row.contains("N.m") && row.contains("0 to 4"),
+            "{row}"
+        );
+        assert_eq!(listing.lines().filter(|line| line.contains(" to ")).count(), 19);
+    }
 }

@@ -18,7 +18,7 @@ pub(super) struct Arguments {
     /// Drives of each participant, each with its own remnant
     #[arg(long, value_name = "N", default_value_t = 20)]
     seeds: u32,
-    /// Frequency of the probe, Hz
+    /// Frequency of the probe, Hz: a small sine added to the guidance torque, whose answer tells K_hg
     #[arg(long, value_name = "HZ", default_value_t = 2.5, allow_negative_numbers = true)]
     frequency: f64,
     /// Amplitude of the probe, N.m

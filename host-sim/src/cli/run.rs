@@ -8,6 +8,7 @@ use haptic_report::studies::run as files;
 use haptic_sim::input::InputError;
 
 use super::output::Output;
+use super::road::CourseArguments;
 use super::series::SeriesArgument;
 use super::{BadInput, Outcome, print, print_json, print_notes};
 
@@ -16,6 +17,8 @@ pub(super) struct Arguments {
     /// Scenario file (TOML); every field has a default (docs/files.md lists them, examples/ has some)
     #[arg(value_name = "SCENARIO.toml")]
     scenario: PathBuf,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Directory for a figure, the time series, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -32,7 +35,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let scenario = haptic_batch::files::load_scenario(&arguments.scenario)?;
+    let mut scenario = haptic_batch::files::load_scenario(&arguments.scenario)?;
+    match arguments.course.open()? {
+        Some(course) => scenario = scenario.to_builder().course(course).build()?,
+        None => print_notes(scenario.course().notes()),
+    }
     let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let single = simulate(scenario, arguments.bus_log)
         .map_err(|e| InputError::new(arguments.scenario.display(), e))?;

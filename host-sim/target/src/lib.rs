@@ -14,6 +14,18 @@
 //! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
 //!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
 //!
+//! ```
+//! use haptic_target::{Channel, PilError};
+//!
+//! // Over pipes thousands of ticks are under way at once; SLCAN is what an outside client speaks.
+//! assert_eq!("slcan".parse(), Ok(Channel::Slcan));
+//! let unknown: Result<Channel, _> = "usb".parse();
+//! assert_eq!(unknown.unwrap_err(), "channel 'usb' is neither fifo nor slcan");
+//! // What is missing says what to install or to plug in.
+//! let missing = haptic_target::parameters::Product::on("no-such-interface");
+//! assert!(matches!(missing, Err(PilError::Missing(_) | PilError::Failed(_))));
+//! ```
+//!
 //! Not here: the plant and the scenario.
 
 mod adapter;

@@ -189,53 +189,11 @@ impl<'a> Problem<'a> {
 
     fn report(&self, options: &Options, optimum: &Optimum) -> Identification {
         let p = &optimum.point;
-        let is_given = |i: usize| self.bounds[i].low == self.bounds[i].high;
         // A parameter on a bound has no standard error, and the others have theirs with it held there.
         let free: Vec<usize> = (0..COUNT).filter(|&i| !self.bounds[i].touches(p[i])).collect();
         let variance = 2.0 * optimum.quadratic.loss / (2 * self.log.len() - free.len()) as f64;
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
-        let parameter = |i: usize| {
-            let (_, low, high) = TABLE_4[i];
-            if is_given(i) {
-                Parameter::fixed(p[i])
-            } else {
-                let variance = if free.contains(&i) {
-                    errors[(i, i)]
-                } else {
-                    f64::INFINITY
-                };
-                Parameter::estimated(p[i], 0.0, variance, self.bounds[i], high - low)
-            }
-        };
-        let sum = p[K_D] + self.k_nms;
-        let gain = |i: usize| {
-            // gain = a (K_d + K_nms), to first order in the errors.
-            let variance = sum * sum * errors[(i, i)]
-                + 2.0 * sum * p[i] * errors[(i, K_D)]
-                + p[i] * p[i] * errors[(K_D, K_D)];
-            let (_, low, high) = TABLE_4[i];
-            let mut g = Parameter::estimated(sum * p[i], 0.0, variance, Bounds::FREE, 4.0 * (high - low));
-            let (a, k_d) = (parameter(i), parameter(K_D));
-            g.identified &= a.identified && k_d.identified;
-            g.estimate = g.estimate.filter(|_| g.identified);
-            g.on_bound = a.on_bound || k_d.on_bound;
-            g
-        };
-        let parameters = Parameters {
-            a_1: parameter(0),
-            a_2: parameter(1),
-            a_3: parameter(2),
-            t_p: parameter(T_P),
-            k_d: parameter(K_D),
-            k_hg: if options.manual {
-                Parameter::ABSENT
-            } else {
-                parameter(K_HG)
-            },
-            gain_1: gain(0),
-            gain_2: gain(1),
-            gain_3: gain(2),
-        };
+        let parameters = self.parameters(options, p, &free, &errors);
         let mut residual = Vec::with_capacity(self.log.len());
         let mut target = Vec::with_capacity(self.log.len());
         self.rows(p, |k, e, _| {
@@ -299,6 +257,53 @@ impl<'a> Problem<'a> {
                 simulated_nm: simulated,
                 residual_nm: residual,
             },
+        }
+    }
+
+    /// The parameters with their errors; those that were given are fixed.
+    fn parameters(&self, options: &Options, p: &[f64], free: &[usize], errors: &DMatrix<f64>) -> Parameters {
+        let is_given = |i: usize| self.bounds[i].low == self.bounds[i].high;
+        let parameter = |i: usize| {
+            let (_, low, high) = TABLE_4[i];
+            if is_given(i) {
+                Parameter::fixed(p[i])
+            } else {
+                let variance = if free.contains(&i) {
+                    errors[(i, i)]
+                } else {
+                    f64::INFINITY
+                };
+                Parameter::estimated(p[i], 0.0, variance, self.bounds[i], high - low)
+            }
+        };
+        let sum = p[K_D] + self.k_nms;
+        let gain = |i: usize| {
+            // gain = a (K_d + K_nms), to first order in the errors.
+            let variance = sum * sum * errors[(i, i)]
+                + 2.0 * sum * p[i] * errors[(i, K_D)]
+                + p[i] * p[i] * errors[(K_D, K_D)];
+            let (_, low, high) = TABLE_4[i];
+            let mut g = Parameter::estimated(sum * p[i], 0.0, variance, Bounds::FREE, 4.0 * (high - low));
+            let (a, k_d) = (parameter(i), parameter(K_D));
+            g.identified &= a.identified && k_d.identified;
+            g.estimate = g.estimate.filter(|_| g.identified);
+            g.on_bound = a.on_bound || k_d.on_bound;
+            g
+        };
+        Parameters {
+            a_1: parameter(0),
+            a_2: parameter(1),
+            a_3: parameter(2),
+            t_p: parameter(T_P),
+            k_d: parameter(K_D),
+            k_hg: if options.manual {
+                Parameter::ABSENT
+            } else {
+                parameter(K_HG)
+            },
+            gain_1: gain(0),
+            gain_2: gain(1),
+            gain_3: gain(2),
         }
     }
 }

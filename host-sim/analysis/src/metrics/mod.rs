@@ -97,7 +97,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         let placement = Placement {
             offset_m: sample.lateral_error_m,
             heading_error_rad: sample.heading_error_rad,
-            path_curvature_1pm: sample.yaw_rate_rad_s / circumstances.speed_m_s,
+            path_curvature_1pm: sample.yaw_rate_rad_per_s / circumstances.speed_m_s,
             road_curvature_1pm: sample.curvature_1pm,
         };
         times_to_crossing_s
@@ -167,7 +167,7 @@ fn is_finite(sample: &Sample) -> bool {
         sample.heading_error_rad,
         sample.curvature_1pm,
         sample.wheel_angle_rad,
-        sample.yaw_rate_rad_s,
+        sample.yaw_rate_rad_per_s,
         sample.driver_torque_nm,
         sample.guidance_torque_nm,
     ]

@@ -98,7 +98,7 @@ fn time_out_of_lane_is_beyond_the_half_room() {
 #[test]
 fn time_to_lane_crossing_of_a_turn() {
     let trace = drive(2.0, |_| Sample {
-        yaw_rate_rad_s: 0.08,
+        yaw_rate_rad_per_s: 0.08,
         ..Sample::default()
     });
     let want = 250.0 * (1.0_f64 - 0.95 / 250.0).acos() / 20.0;

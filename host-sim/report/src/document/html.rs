@@ -148,15 +148,7 @@ fn cell(cell: &Cell) -> Markup {
 pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
     match value.filter(|v| v.is_finite()) {
         None => "\u{2013}".into(),
-        Some(value) => {
-            let text = format!("{value:.decimals$}");
-            let is_zero = !text.contains(|c: char| ('1'..='9').contains(&c));
-            if is_zero {
-                text.trim_start_matches('-').into()
-            } else {
-                text
-            }
-        }
+        Some(value) => haptic_log::table::fixed(value, decimals),
     }
 }
 

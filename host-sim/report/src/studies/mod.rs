@@ -2,6 +2,7 @@
 //! once, for the report and for the terminal.
 
 pub mod bus;
+pub mod course;
 mod curves;
 pub mod evaluation;
 pub mod experiment;

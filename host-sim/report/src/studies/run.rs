@@ -12,8 +12,8 @@ use crate::document::{
 use crate::plot::{Axis, Figure, Marker, Panel, Series};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::run::{SingleResults, SingleRun};
-use haptic_log::Event;
 use haptic_log::trace::Sample;
+use haptic_log::{Event, candump};
 use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
 use haptic_sim::simulation::Ending;
 
@@ -31,11 +31,7 @@ pub fn write(single: &SingleRun, series: SeriesFormat, directory: &Path) -> Resu
     if !single.bus.is_empty() {
         write_file(&directory.join("bus.log"), |f| {
             for (ms, frame) in &single.bus {
-                write!(f, "({:.6}) can0 {:03X}#", f64::from(*ms) * 1e-3, frame.id())?;
-                for byte in frame.data() {
-                    write!(f, "{byte:02X}")?;
-                }
-                writeln!(f)?;
+                candump::write(f, f64::from(*ms) * 1e-3, frame.id(), frame.data())?;
             }
             Ok(())
         })?;

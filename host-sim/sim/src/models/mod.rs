@@ -4,8 +4,10 @@
 //! and knows nothing of the controller, of studies or of the command line. Equation and table numbers are
 //! those of Wang, Zheng, Nacpil and Nakano, DOI 10.1049/itr2.12163.
 
+pub mod disturbances;
 pub mod driver;
 pub mod plant;
+pub mod real;
 pub mod road;
 pub mod sensors;
 pub mod vehicle;

@@ -52,6 +52,24 @@ pub struct Transition {
     columns: [[f64; STATES]; COLUMNS],
     /// Distance travelled in a step, m.
     distance_m: f64,
+    gains: ArmGains,
+}
+
+/// What a plant is in, beside its place.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PlantState {
+    /// beta, rad.
+    pub sideslip_rad: f64,
+    /// r, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// phi, rad.
+    pub wheel_rad: f64,
+    /// phi', rad/s.
+    pub wheel_rate_rad_s: f64,
+    /// T_d of equation (8), N.m.
+    pub arm_nm: f64,
+    /// psi, rad.
+    pub yaw_rad: f64,
 }
 
 /// State of vehicle, column and arm. The default is straight driving at the origin.
@@ -137,7 +155,13 @@ impl Transition {
         Self {
             columns,
             distance_m: v * STEP_S,
+            gains,
         }
+    }
+
+    /// The gains of the arm that it was made for.
+    pub fn gains(&self) -> ArmGains {
+        self.gains
     }
 }
 
@@ -177,12 +201,39 @@ impl Plant {
             }
         }
         self.linear = next;
+        self.advance(before, transition.distance_m);
+    }
 
+    /// The place after a step of some length, in which the direction of movement changed.
+    #[inline]
+    fn advance(&mut self, before: f64, distance_m: f64) {
         let half_turn = 0.5 * (self.direction_rad() - before);
         let [cos, sin] = rotated(self.direction, half_turn);
-        self.x_m += transition.distance_m * cos;
-        self.y_m += transition.distance_m * sin;
+        self.x_m += distance_m * cos;
+        self.y_m += distance_m * sin;
         self.direction = rotated([cos, sin], half_turn);
+    }
+
+    /// Its state.
+    pub fn state(&self) -> PlantState {
+        let x = &self.linear;
+        PlantState {
+            sideslip_rad: x[BETA],
+            yaw_rate_rad_s: x[YAW_RATE],
+            wheel_rad: x[WHEEL],
+            wheel_rate_rad_s: x[WHEEL_RATE],
+            arm_nm: x[ARM],
+            yaw_rad: x[YAW],
+        }
+    }
+
+    /// The state after a step that another model made, in which the vehicle went so far.
+    pub fn set_state(&mut self, state: PlantState, distance_m: f64) {
+        let before = self.direction_rad();
+        let x = &mut self.linear;
+        (x[BETA], x[YAW_RATE], x[WHEEL]) = (state.sideslip_rad, state.yaw_rate_rad_s, state.wheel_rad);
+        (x[WHEEL_RATE], x[ARM], x[YAW]) = (state.wheel_rate_rad_s, state.arm_nm, state.yaw_rad);
+        self.advance(before, distance_m);
     }
 
     /// Position of the centre of gravity, m.
@@ -210,7 +261,7 @@ impl Plant {
     }
 
     /// r, rad/s.
-    pub fn yaw_rate_rad_s(&self) -> f64 {
+    pub fn yaw_rate_rad_per_s(&self) -> f64 {
         self.linear[YAW_RATE]
     }
 
@@ -220,7 +271,7 @@ impl Plant {
     }
 
     /// phi', rad/s.
-    pub fn wheel_rate_rad_s(&self) -> f64 {
+    pub fn wheel_rate_rad_per_s(&self) -> f64 {
         self.linear[WHEEL_RATE]
     }
 
@@ -359,10 +410,10 @@ mod tests {
         for _ in 0..20_000 {
             plant.step(&transition, &input);
         }
-        let ratio = plant.yaw_rate_rad_s() / (plant.wheel_angle_rad() / 17.0);
+        let ratio = plant.yaw_rate_rad_per_s() / (plant.wheel_angle_rad() / 17.0);
         let a = 1100.0 / (2.0 * 2.635 * 2.635) * (1.635 * 117_000.0 - 53_300.0) / (53_300.0 * 117_000.0);
         let textbook = V / (2.635 * (1.0 + a * V * V));
         assert!((ratio - textbook).abs() < 1e-9, "{ratio} against {textbook}");
-        assert!(plant.yaw_rate_rad_s() > 0.01, "a positive angle turns left");
+        assert!(plant.yaw_rate_rad_per_s() > 0.01, "a positive angle turns left");
     }
 }

@@ -4,13 +4,16 @@ use std::fmt;
 
 use haptic_core::config::Setup;
 
+use super::guidance_file::in_words_of_the_file;
 use super::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, SPEED_KMH, Scenario,
-    Sensors, Values, names,
+    Sensors, Values, file,
 };
-use crate::input::{RangeError, in_range};
+use crate::input::{InputError, RangeError, in_range};
+use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::Course;
+use crate::models::real::WorldParameters;
+use crate::models::road::{Course, LaneChoice};
 use crate::models::vehicle::VehicleParameters;
 
 /// Chooses the values of a [`Scenario`]; each has a default.
@@ -89,6 +92,19 @@ impl From<ScenarioError> for String {
 }
 
 impl ScenarioBuilder {
+    /// The values in the text of a scenario file, not yet checked against their ranges; `name` and `course` as in
+    /// [`Scenario::from_toml`].
+    ///
+    /// # Errors
+    /// A syntax error (with its line), an unknown field (by name); what `course` says.
+    pub fn from_toml(
+        name: &str,
+        text: &str,
+        course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
+    ) -> Result<Self, InputError> {
+        file::parse(name, text, course)
+    }
+
     /// The road.
     pub fn course(mut self, course: Course) -> Self {
         self.values.course = course;
@@ -160,6 +176,18 @@ impl ScenarioBuilder {
         self
     }
 
+    /// What is less than ideal in the world.
+    pub fn world(mut self, world: WorldParameters) -> Self {
+        self.values.world = world;
+        self
+    }
+
+    /// What the sensors add to the truth.
+    pub fn sensor_errors(mut self, errors: SensorErrors) -> Self {
+        self.values.sensor_errors = errors;
+        self
+    }
+
     /// Root of all random numbers.
     pub fn seed(mut self, seed: u64) -> Self {
         self.values.seed = seed;
@@ -181,12 +209,14 @@ impl ScenarioBuilder {
         in_range("t_n", values.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
         // The controller's range: its plausibility checks divide by it.
         in_range("t_f", values.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
-        let setup = Setup::new(&values.controller_params()).map_err(|e| names::in_words_of_the_file(&e))?;
+        let setup = Setup::new(&values.controller_params()).map_err(|e| in_words_of_the_file(&e))?;
         in_range("time", values.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
         if let Some(change) = &values.driver_change {
             in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
             check_gains(change.gains()).map_err(within("driver_change"))?;
         }
+        values.world.check().map_err(within("world"))?;
+        values.sensor_errors.check().map_err(within("sensor_errors"))?;
         let scenario = Scenario { values, setup };
         scenario.check_length()?;
         scenario.check_manual()?;

@@ -2,23 +2,22 @@
 //! `driver_change`, every field with a default, an unknown one an error. docs/files.md lists them all. Ranges
 //! are checked by the scenario itself.
 
-use haptic_core::params::Params;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, GuidanceParameters, Scenario, ScenarioBuilder,
-    Sensors,
-};
+use super::guidance_file::GuidanceFile;
+use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors};
 use crate::input::{InputError, parse_toml};
+use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::{Course, PAPER_COURSE, Segment};
+use crate::models::real::WorldParameters;
+use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario; only its course is checked.
 pub(super) fn parse(
     name: &str,
     text: &str,
-    course: impl FnOnce(&str) -> Result<Course, InputError>,
+    course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
 ) -> Result<ScenarioBuilder, InputError> {
     let file: ScenarioFile = parse_toml(name, text).map_err(|error| {
         if Course::from_toml(name, text).is_ok() {
@@ -27,10 +26,16 @@ pub(super) fn parse(
         }
         error
     })?;
+    let choice = LaneChoice {
+        road: file.road.clone(),
+        lane: file.lane,
+    };
     let course = match &file.course {
-        CourseField::Named(built_in) if built_in == PAPER_COURSE => Course::paper(),
-        CourseField::Named(path) => course(path)?,
-        CourseField::Whole(inline) => inline.checked(name)?,
+        CourseField::Named(path) if path != PAPER_COURSE => course(path, &choice)?,
+        built_in => {
+            choice.check_none(name)?;
+            built_in.own(name)?
+        }
     };
     let DriverFile {
         a_1,
@@ -50,7 +55,6 @@ pub(super) fn parse(
         k_d: k_d.unwrap_or(named.k_d),
         k_hg: k_hg.unwrap_or(named.k_hg),
     };
-    let g = file.guidance;
     Ok(Scenario::builder()
         .course(course)
         .speed_kmh(file.speed)
@@ -69,33 +73,12 @@ pub(super) fn parse(
         })
         .gains(gains)
         .vehicle(file.vehicle)
-        .guidance(GuidanceParameters {
-            controller: Params {
-                k_1: g.k_1,
-                a_1: g.a_1,
-                a_2: g.a_2,
-                a_3: g.a_3,
-                a_4: g.a_4,
-                rate_corner_hz: g.rate_corner_hz,
-                torque_limit_nm: g.torque_limit_nm,
-                wind_up_nm_per_s: g.wind_up_nm_per_s,
-                reduction_nm_per_s: g.reduction_nm_per_s,
-                least_speed_m_per_s: g.least_speed_m_per_s,
-                probe_amplitude_nm: g.probe_amplitude_nm,
-                probe_frequency_hz: g.probe_frequency_hz,
-                // What the controller takes for granted, whatever the driver is.
-                t_nms_s: Params::PAPER.t_nms_s,
-                k_nms: Params::PAPER.k_nms,
-                // Follows from the vehicle, see `Scenario::setup`.
-                vehicle: Params::PAPER.vehicle,
-            },
-            t_n: g.t_n,
-            t_f: g.t_f,
-            probe: g.probe,
-        })
+        .guidance(file.guidance.0)
         .sensors(file.sensors)
         .failure(file.failure)
         .driver_change(file.driver_change)
+        .world(file.world.unwrap_or_default())
+        .sensor_errors(file.sensor_errors.unwrap_or_default())
         .seed(file.seed))
 }
 
@@ -113,16 +96,19 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         sensors,
         failure,
         driver_change,
+        world,
+        sensor_errors,
         seed,
     } = &scenario.values;
     let built_in = *course == Course::paper();
-    let c = guidance.controller;
     toml::to_string(&ScenarioFile {
         course: if built_in {
             CourseField::Named(PAPER_COURSE.into())
         } else {
             CourseField::Whole(InlineCourse::of(course))
         },
+        road: None,
+        lane: None,
         speed: *speed_kmh,
         condition: match scenario.condition() {
             // The gains say the rest.
@@ -146,25 +132,11 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
             remnant_corner: d.remnant_corner_hz,
         },
         vehicle: *vehicle,
-        guidance: GuidanceFile {
-            k_1: c.k_1,
-            a_1: c.a_1,
-            a_2: c.a_2,
-            a_3: c.a_3,
-            a_4: c.a_4,
-            t_n: guidance.t_n,
-            t_f: guidance.t_f,
-            rate_corner_hz: c.rate_corner_hz,
-            torque_limit_nm: c.torque_limit_nm,
-            wind_up_nm_per_s: c.wind_up_nm_per_s,
-            reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_m_per_s: c.least_speed_m_per_s,
-            probe: guidance.probe,
-            probe_amplitude_nm: c.probe_amplitude_nm,
-            probe_frequency_hz: c.probe_frequency_hz,
-        },
+        guidance: GuidanceFile(*guidance),
         failure: *failure,
         driver_change: *driver_change,
+        world: (*world != WorldParameters::default()).then_some(*world),
+        sensor_errors: (*sensor_errors != SensorErrors::default()).then_some(*sensor_errors),
     })
 }
 
@@ -184,8 +156,13 @@ enum CourseField {
 #[serde(deny_unknown_fields)]
 struct InlineCourse {
     name: String,
+    #[serde(default)]
     lane_width: f64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     segment: Vec<InlineSegment>,
+    /// The text of an OpenDRIVE file in the place of the other two: a lane that is not made of segments.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    opendrive: Option<String>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -194,6 +171,14 @@ struct InlineSegment {
     length: f64,
     curvature_start: f64,
     curvature_end: f64,
+    #[serde(default)]
+    bank_start: f64,
+    #[serde(default)]
+    bank_end: f64,
+    #[serde(default)]
+    grade_start: f64,
+    #[serde(default)]
+    grade_end: f64,
 }
 
 #[derive(Serialize)]
@@ -202,22 +187,49 @@ struct CourseText<'a> {
     segment: &'a [InlineSegment],
 }
 
+impl CourseField {
+    /// The course that needs no file: the built-in one, or one that stands in the scenario.
+    fn own(&self, scenario: &str) -> Result<Course, InputError> {
+        match self {
+            Self::Named(_) => Ok(Course::paper()),
+            Self::Whole(inline) => inline.checked(scenario),
+        }
+    }
+}
+
 impl InlineCourse {
     fn of(course: &Course) -> Self {
         let segment = |s: &Segment| InlineSegment {
             length: s.length_m,
             curvature_start: s.curvature_start_1pm,
             curvature_end: s.curvature_end_1pm,
+            bank_start: s.bank_rad[0],
+            bank_end: s.bank_rad[1],
+            grade_start: s.grade[0],
+            grade_end: s.grade[1],
         };
+        if !course.is_of_segments() {
+            return Self {
+                name: course.name().into(),
+                lane_width: course.lane_width_m(),
+                segment: Vec::new(),
+                opendrive: Some(course.to_opendrive()),
+            };
+        }
         Self {
             name: course.name().into(),
             lane_width: course.lane_width_m(),
             segment: course.segments().iter().map(segment).collect(),
+            opendrive: None,
         }
     }
 
     /// The course, checked as one from a file of its own.
     fn checked(&self, file: &str) -> Result<Course, InputError> {
+        if let Some(text) = &self.opendrive {
+            return Course::from_opendrive(&self.name, text, &LaneChoice::default())
+                .map_err(|e| InputError::new(file, format!("course: {e}")));
+        }
         let text = CourseText {
             lane_width: self.lane_width,
             segment: &self.segment,
@@ -231,6 +243,10 @@ impl InlineCourse {
 #[serde(default, deny_unknown_fields)]
 struct ScenarioFile {
     course: CourseField,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    road: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lane: Option<i32>,
     speed: f64,
     condition: Condition,
     sensors: Sensors,
@@ -240,12 +256,18 @@ struct ScenarioFile {
     guidance: GuidanceFile,
     failure: Failure,
     driver_change: Option<DriverChange>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    world: Option<WorldParameters>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensor_errors: Option<SensorErrors>,
 }
 
 impl Default for ScenarioFile {
     fn default() -> Self {
         Self {
             course: CourseField::Named(PAPER_COURSE.into()),
+            road: None,
+            lane: None,
             speed: DEFAULT_SPEED_KMH,
             condition: Condition::Mid,
             sensors: Sensors::default(),
@@ -255,6 +277,8 @@ impl Default for ScenarioFile {
             guidance: GuidanceFile::default(),
             failure: Failure::default(),
             driver_change: None,
+            world: None,
+            sensor_errors: None,
         }
     }
 }
@@ -309,60 +333,6 @@ impl Default for DriverFile {
             k_hg: None,
             remnant_sd: remnant_sd_nm,
             remnant_corner: remnant_corner_hz,
-        }
-    }
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(default, deny_unknown_fields)]
-struct GuidanceFile {
-    #[serde(rename = "K_1", alias = "k_1")]
-    k_1: f64,
-    #[serde(alias = "a1")]
-    a_1: f64,
-    #[serde(alias = "a2")]
-    a_2: f64,
-    #[serde(alias = "a3")]
-    a_3: f64,
-    #[serde(alias = "a4")]
-    a_4: f64,
-    t_n: f64,
-    t_f: f64,
-    rate_corner_hz: f64,
-    torque_limit_nm: f64,
-    wind_up_nm_per_s: f64,
-    reduction_nm_per_s: f64,
-    #[serde(alias = "least_speed_mps")]
-    least_speed_m_per_s: f64,
-    probe: bool,
-    probe_amplitude_nm: f64,
-    probe_frequency_hz: f64,
-}
-
-impl Default for GuidanceFile {
-    fn default() -> Self {
-        let GuidanceParameters {
-            controller: c,
-            t_n,
-            t_f,
-            probe,
-        } = GuidanceParameters::default();
-        Self {
-            k_1: c.k_1,
-            a_1: c.a_1,
-            a_2: c.a_2,
-            a_3: c.a_3,
-            a_4: c.a_4,
-            t_n,
-            t_f,
-            rate_corner_hz: c.rate_corner_hz,
-            torque_limit_nm: c.torque_limit_nm,
-            wind_up_nm_per_s: c.wind_up_nm_per_s,
-            reduction_nm_per_s: c.reduction_nm_per_s,
-            least_speed_m_per_s: c.least_speed_m_per_s,
-            probe,
-            probe_amplitude_nm: c.probe_amplitude_nm,
-            probe_frequency_hz: c.probe_frequency_hz,
         }
     }
 }

@@ -7,7 +7,7 @@
 
 mod builder;
 mod file;
-mod names;
+mod guidance_file;
 #[cfg(test)]
 mod tests;
 
@@ -20,8 +20,10 @@ use serde::{Deserialize, Serialize};
 pub use builder::{ScenarioBuilder, ScenarioError};
 
 use crate::input::{InputError, in_range};
+use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::road::Course;
+use crate::models::real::WorldParameters;
+use crate::models::road::{Course, LaneChoice};
 use crate::models::vehicle::VehicleParameters;
 
 /// Speeds that a scenario may have, km/h. The controller guides from 5 m/s on.
@@ -213,6 +215,8 @@ struct Values {
     sensors: Sensors,
     failure: Failure,
     driver_change: Option<DriverChange>,
+    world: WorldParameters,
+    sensor_errors: SensorErrors,
     seed: u64,
 }
 
@@ -229,6 +233,8 @@ impl Default for Values {
             sensors: Sensors::default(),
             failure: Failure::default(),
             driver_change: None,
+            world: WorldParameters::default(),
+            sensor_errors: SensorErrors::default(),
             seed: 1,
         }
     }
@@ -272,9 +278,9 @@ impl Scenario {
     pub fn from_toml(
         name: &str,
         text: &str,
-        course: impl FnOnce(&str) -> Result<Course, InputError>,
+        course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
     ) -> Result<Self, InputError> {
-        let builder = file::parse(name, text, course)?;
+        let builder = ScenarioBuilder::from_toml(name, text, course)?;
         builder.build().map_err(|e| InputError::new(name, e))
     }
 
@@ -368,6 +374,16 @@ impl Scenario {
         self.values.driver_change
     }
 
+    /// What is less than ideal in the world.
+    pub fn world(&self) -> &WorldParameters {
+        &self.values.world
+    }
+
+    /// What the sensors add to the truth.
+    pub fn sensor_errors(&self) -> &SensorErrors {
+        &self.values.sensor_errors
+    }
+
     /// Root of all random numbers.
     pub fn seed(&self) -> u64 {
         self.values.seed
@@ -443,9 +459,11 @@ impl Values {
             ..
         } = self.vehicle;
         let l = l_f + l_r;
+        // The ECU knows understeering vehicles alone: a neutral or oversteering one is told as neutral.
+        let stability = m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r);
         VehicleParams {
             curvature_gain_per_m: k_t / l,
-            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
+            stability_factor_s2_per_m2: stability.max(0.0),
             aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
             column_damping_nm_s: b_s,
             far_time_s,

@@ -3,7 +3,7 @@
 use super::*;
 
 fn parse(text: &str) -> Result<Scenario, InputError> {
-    Scenario::from_toml("s.toml", text, |name| Err(InputError::new(name, "not there")))
+    Scenario::from_toml("s.toml", text, |name, _| Err(InputError::new(name, "not there")))
 }
 
 #[test]
@@ -234,10 +234,10 @@ fn a_scenario_written_and_read_again_is_the_same() {
                   [guidance]\na2 = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
                   [driver_change]\ntime = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm = 1234.5\n";
     for text in ["", "condition = 'manual'", others] {
-        let load = |name: &str| Course::from_toml(name, course);
+        let load = |name: &str, _: &LaneChoice| Course::from_toml(name, course);
         let scenario = Scenario::from_toml("s.toml", text, load).unwrap();
         let written = scenario.to_toml();
-        let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+        let none = |name: &str, _: &LaneChoice| -> Result<Course, _> { panic!("asks for {name}") };
         assert_eq!(
             Scenario::from_toml("again.toml", &written, none).unwrap(),
             scenario,
@@ -250,10 +250,47 @@ fn a_scenario_written_and_read_again_is_the_same() {
 fn a_bad_course_within_a_scenario_is_refused_like_one_in_a_file() {
     let text = "[course]\nname = 'mine'\nlane_width = 3\n\
                 [[course.segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.5\n";
-    let none = |name: &str| -> Result<Course, _> { panic!("asks for {name}") };
+    let none = |name: &str, _: &LaneChoice| -> Result<Course, _> { panic!("asks for {name}") };
     let error = Scenario::from_toml("s.toml", text, none).unwrap_err().to_string();
     assert!(
         error.contains("s.toml") && error.contains("segment 1: curvature_end = 0.5"),
         "{error}"
     );
+}
+
+#[test]
+fn neutral_and_oversteering_vehicles_can_be_driven() {
+    let understeering = VehicleParameters::default();
+    // Neutral where l_r*K_r = l_f*K_f, by a rounding on either side; then oversteering, stable up to 320 km/h.
+    let neutral = understeering.l_f * understeering.k_f / understeering.l_r;
+    for k_r in [neutral, neutral * (1.0 - 1e-9), neutral * (1.0 + 1e-9), 31_000.0] {
+        let vehicle = VehicleParameters { k_r, ..understeering };
+        let scenario = Scenario::builder().vehicle(vehicle).build().unwrap();
+        assert!(scenario.controller_params().vehicle.stability_factor_s2_per_m2 >= 0.0);
+        assert!(!crate::simulation::simulate(&scenario).diverged(), "{k_r}");
+    }
+}
+
+#[test]
+fn a_real_world_is_driven_and_stands_in_the_file_of_the_scenario() {
+    let text = "seed = 3\n[world]\ntyres = \"saturating\"\nmu = 0.8\nfriction = 0.3\nmotor_lag = 0.005\n\
+                gust_sd = 100\n[sensor_errors]\ntorque_bias = 0.05\nlane_noise = 0.01\n";
+    let scenario = Scenario::from_toml("s", text, |_, _| unreachable!()).unwrap();
+    let again = Scenario::from_toml("s", &scenario.to_toml(), |_, _| unreachable!()).unwrap();
+    assert_eq!(again, scenario);
+    let (run, same) = (
+        crate::simulation::simulate(&scenario),
+        crate::simulation::simulate(&again),
+    );
+    assert!(!run.diverged());
+    assert_eq!(run, same, "a seed fixes all");
+    let other = scenario.to_builder().seed(4).build().unwrap();
+    assert_ne!(crate::simulation::simulate(&other), run);
+    // The wind and the friction are there.
+    let ideal = Scenario::builder().seed(3).build().unwrap();
+    let sdlp = |run: &crate::simulation::Run| {
+        let errors = run.trace.samples.iter().map(|s| s.lateral_error_m.powi(2));
+        errors.sum::<f64>() / run.trace.samples.len() as f64
+    };
+    assert!(sdlp(&run) > 1.5 * sdlp(&crate::simulation::simulate(&ideal)));
 }

@@ -9,7 +9,6 @@
 //! between their neighbours. A signal that pauses, a preview that is not valid and a speed that changes are refused
 //! with their line. What is not here: counters and CRCs, which were the business of those who received the frames.
 
-mod candump;
 mod far_point;
 
 use std::path::Path;
@@ -17,7 +16,7 @@ use std::path::Path;
 use can_dbc::{ByteOrder, Dbc, MessageId, Signal, ValueType};
 
 use super::log::{DriveLog, LogError};
-use candump::Record;
+use haptic_log::candump::{self, CandumpFrame};
 
 /// The product's own bus.
 const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
@@ -141,7 +140,7 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
 
 impl Course {
     /// The signal in SI units, from all frames that carry it.
-    fn of(name: &'static str, dbc: &Dbc, records: &[Record]) -> Result<Self, String> {
+    fn of(name: &'static str, dbc: &Dbc, records: &[CandumpFrame]) -> Result<Self, String> {
         let found = dbc
             .messages
             .iter()

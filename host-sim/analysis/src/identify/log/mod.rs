@@ -16,6 +16,9 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
+use haptic_log::table::TableError;
+use haptic_log::table::TableReader;
+
 /// Names of the columns that a log must have, in the order of the fields of [`DriveLog`].
 pub const COLUMNS: [&str; 6] = [
     "time_s",
@@ -85,6 +88,12 @@ impl fmt::Display for LogError {
 
 impl std::error::Error for LogError {}
 
+impl From<TableError> for LogError {
+    fn from(error: TableError) -> Self {
+        Self(error.to_string())
+    }
+}
+
 impl LogError {
     pub(crate) fn new(message: String) -> Self {
         Self(message)
@@ -152,42 +161,21 @@ impl DriveLog {
     /// # Errors
     /// A missing or doubled column, a field that is no finite number, a value beyond its column's range, time
     /// stamps that run backwards, repeat, leave a gap or are uneven, or a record that is too short.
-    pub fn read(mut source: impl Read, manual: bool) -> Result<Self, LogError> {
-        let mut bytes = Vec::new();
-        source
-            .read_to_end(&mut bytes)
-            .map_err(|e| LogError(e.to_string()))?;
-        let text = String::from_utf8_lossy(&bytes);
-        // Numbered here, for the parser counts neither skipped lines nor those that end in CR and LF.
-        let (lines, kept): (Vec<u64>, Vec<&str>) = (1..)
-            .zip(text.trim_start_matches('\u{feff}').lines())
-            .filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty())
-            .unzip();
-        let table = kept.join("\n");
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .from_reader(table.as_bytes());
-        let header = reader.headers().map_err(|e| LogError(e.to_string()))?.clone();
-        let index = find_columns(&header, lines.first().copied().unwrap_or(1), manual)?;
-        let lines = &lines[1..];
+    pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
+        let mut table = TableReader::new(source)?;
+        let index = find_columns(table.header(), table.header_line(), manual)?;
+        let mut lines = Vec::new();
         let mut columns: [Vec<f64>; 6] = Default::default();
-        for (record, &line) in reader.records().zip(lines) {
-            let record = record.map_err(|e| LogError(format!("line {line}: {e}")))?;
-            if record.len() != header.len() {
-                return refuse(format!(
-                    "line {line}: {} fields where the header has {}",
-                    record.len(),
-                    header.len()
-                ));
-            }
+        for row in table.rows() {
+            let row = row?;
+            lines.push(row.line);
             for (c, column) in columns.iter_mut().enumerate() {
                 column.push(match index[c] {
                     // Not used, but if it is there, it shows whether the drive was a manual one.
                     Some(i) if manual && c == GUIDANCE_COLUMN => {
-                        field(&record[i], line, c).unwrap_or_default()
+                        field(row.field(i), row.line, c).unwrap_or_default()
                     }
-                    Some(i) => field(&record[i], line, c)?,
+                    Some(i) => field(row.field(i), row.line, c)?,
                     None => 0.0,
                 });
             }
@@ -200,8 +188,8 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
         ] = columns;
-        let (start_s, dt_s) = check_time(&time, lines)?;
-        check_wheel_resolution(&wheel_angle_rad, lines)?;
+        let (start_s, dt_s) = check_time(&time, &lines)?;
+        check_wheel_resolution(&wheel_angle_rad, &lines)?;
         check_sensor(&driver_torque_nm)?;
         Ok(Self {
             start_s,
@@ -227,7 +215,7 @@ fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
 }
 
 /// Where each of [`COLUMNS`] stands; all that are missing are named at once.
-fn find_columns(header: &csv::StringRecord, line: u64, manual: bool) -> Result<[Option<usize>; 6], LogError> {
+fn find_columns(header: &[String], line: u64, manual: bool) -> Result<[Option<usize>; 6], LogError> {
     if header.len() == 1
         && let Some(separator) = header[0].chars().find(|c| [';', '\t'].contains(c))
     {
@@ -235,7 +223,7 @@ fn find_columns(header: &csv::StringRecord, line: u64, manual: bool) -> Result<[
             "line {line}: this file is separated by {separator:?}; commas are wanted"
         ));
     }
-    let names: Vec<String> = header.iter().map(str::to_ascii_lowercase).collect();
+    let names: Vec<String> = header.iter().map(|name| name.to_ascii_lowercase()).collect();
     let mut index = [None; 6];
     let mut missing = Vec::new();
     for (c, wanted) in COLUMNS.iter().enumerate() {

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use haptic_log::table::TableWriter;
+
 use super::{COLUMNS, DriveLog};
 
 impl DriveLog {
@@ -10,20 +12,18 @@ impl DriveLog {
     /// # Errors
     /// What `out` says.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{}", COLUMNS.join(","))?;
+        let signals = [
+            &self.e_y_m,
+            &self.e_theta_rad,
+            &self.wheel_angle_rad,
+            &self.guidance_torque_nm,
+            &self.driver_torque_nm,
+        ];
+        let mut table = TableWriter::new(out, COLUMNS)?;
         for k in 0..self.len() {
-            write!(out, "{:.6}", self.time_s(k))?;
-            for column in [
-                &self.e_y_m,
-                &self.e_theta_rad,
-                &self.wheel_angle_rad,
-                &self.guidance_torque_nm,
-                &self.driver_torque_nm,
-            ] {
-                write!(out, ",{:.9}", column[k])?;
-            }
-            writeln!(out)?;
+            let time = format!("{:.6}", self.time_s(k));
+            table.row(std::iter::once(time).chain(signals.map(|signal| format!("{:.9}", signal[k]))))?;
         }
-        Ok(())
+        table.finish()
     }
 }

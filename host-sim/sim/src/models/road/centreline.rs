@@ -6,6 +6,7 @@
 //! of the perpendicular is found by Newton's method, starting from where the same point was last seen: a
 //! `Tracker` walks forward with its point, so a course may cross itself.
 
+use super::piece::{Piece, Pose, Surface};
 use super::{Course, Segment};
 
 /// Longest cell, m.
@@ -23,6 +24,9 @@ const MAX_NEWTON_STEPS: usize = 20;
 const MIN_DETERMINANT: f64 = 0.1;
 /// How far beyond its ends the centreline is continued, m: enough for the step that finds the end.
 const OVERRUN_M: f64 = 2.0;
+/// A lane of a file may have kinks, where a perpendicular has no foot on one side and two on the other: the search
+/// goes to and fro across the kink in steps of this length at most, m, and the kink itself is the answer.
+const KINK_M: f64 = 0.5;
 
 /// A piece of the centreline, expanded about its middle.
 #[derive(Debug, Clone, Copy)]
@@ -41,12 +45,99 @@ struct Cell {
     curvature_slope_1pm2: f64,
 }
 
-/// A course turned into a curve.
+/// A point in the frame of a place on the centreline.
+struct Near {
+    /// Heading of the place against the cell's middle, rad.
+    theta: f64,
+    /// Curvature there, 1/m.
+    curvature: f64,
+    /// How far ahead of the place the point lies, m.
+    distance_to_foot: f64,
+    /// How far to its left, m.
+    offset_m: f64,
+}
+
+impl Cell {
+    /// The point `(x_m, y_m)` as the place at `sigma` behind the cell's middle sees it.
+    #[inline]
+    fn near(&self, sigma: f64, x_m: f64, y_m: f64) -> Near {
+        let (k0, k1) = (self.curvature_1pm, self.curvature_slope_1pm2);
+        let [tx, ty] = self.tangent;
+        let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
+        if k0 == 0.0 && k1 == 0.0 {
+            // A straight: the expansion below without the terms that vanish, to the same bits. What is left of them
+            // keeps the signs of zeros and lets nothing pass that is not a number.
+            let (ahead, left) = (dx * tx + dy * ty - sigma, dy * tx - dx * ty);
+            return Near {
+                theta: sigma * 0.0,
+                curvature: 0.0,
+                distance_to_foot: ahead,
+                offset_m: left - ahead * 0.0,
+            };
+        }
+        // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
+        let theta = sigma * (k0 + 0.5 * k1 * sigma);
+        let sigma2 = sigma * sigma;
+        let along = sigma - sigma2 * sigma * (k0 * k0 / 6.0 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
+        let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - k0 * k0 * k0 * sigma2 / 24.0);
+        let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
+        let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
+        Near {
+            theta,
+            curvature: k0 + k1 * sigma,
+            distance_to_foot: ahead * cos + left * sin,
+            offset_m: left * cos - ahead * sin,
+        }
+    }
+}
+
+/// What the surface is like in a cell: values at its middle and their change with arc length, per m.
+#[derive(Debug, Clone, Copy)]
+struct Ground {
+    middle: Surface,
+    slope: Surface,
+}
+
+impl Ground {
+    /// Between the ends of a stretch, at a distance from its start.
+    fn within(at_m: f64, length_m: f64, bank_rad: [f64; 2], grade: [f64; 2], width_m: [f64; 2]) -> Self {
+        let slope = |[start, end]: [f64; 2]| (end - start) / length_m;
+        let value = |ends: [f64; 2]| ends[0] + slope(ends) * at_m;
+        Self {
+            middle: Surface {
+                bank_rad: value(bank_rad),
+                grade: value(grade),
+                width_m: value(width_m),
+            },
+            slope: Surface {
+                bank_rad: slope(bank_rad),
+                grade: slope(grade),
+                width_m: slope(width_m),
+            },
+        }
+    }
+
+    fn at(&self, sigma: f64) -> Surface {
+        let Self { middle, slope } = self;
+        Surface {
+            bank_rad: middle.bank_rad + slope.bank_rad * sigma,
+            grade: middle.grade + slope.grade * sigma,
+            width_m: middle.width_m + slope.width_m * sigma,
+        }
+    }
+}
+
+/// A course turned into a curve that starts at the origin, heading along x.
 #[derive(Debug, Clone)]
 pub struct Centreline {
     cells: Vec<Cell>,
+    /// One for each cell; apart from them, because only some ask for it.
+    grounds: Vec<Ground>,
     length_m: f64,
     lane_width_m: f64,
+    /// Where the start is in the frame of the course's file.
+    start: Pose,
+    has_kinks: bool,
 }
 
 /// The foot of the perpendicular from a point to the centreline.
@@ -71,15 +162,56 @@ pub struct Tracker {
 }
 
 impl Centreline {
-    /// Starts at the origin, heading along x.
+    /// The curve of a course, moved to start at the origin, heading along x.
     pub fn new(course: &Course) -> Self {
-        let mut cells = Vec::new();
+        match course.pieces() {
+            Some(pieces) => Self::of_pieces(course, pieces),
+            None => Self::of_segments(course),
+        }
+    }
+
+    fn of_pieces(course: &Course, pieces: &[Piece]) -> Self {
+        let start = pieces[0].pose_at(-0.5 * pieces[0].length_m);
+        let mut s = 0.0;
+        let (mut cells, mut grounds) = (Vec::with_capacity(pieces.len()), Vec::with_capacity(pieces.len()));
+        for piece in pieces {
+            let half_m = 0.5 * piece.length_m;
+            let middle = start.to_local(piece.middle);
+            cells.push(Cell {
+                s_m: s + half_m,
+                half_m,
+                x_m: middle.x_m,
+                y_m: middle.y_m,
+                tangent: [middle.heading_rad.cos(), middle.heading_rad.sin()],
+                heading_rad: middle.heading_rad,
+                curvature_1pm: piece.curvature_1pm,
+                curvature_slope_1pm2: piece.curvature_slope_1pm2,
+            });
+            let ends = (piece.bank_rad, piece.grade, piece.width_m);
+            grounds.push(Ground::within(half_m, piece.length_m, ends.0, ends.1, ends.2));
+            s += piece.length_m;
+        }
+        Self {
+            cells,
+            grounds,
+            length_m: s,
+            lane_width_m: course.lane_width_m(),
+            start,
+            has_kinks: true,
+        }
+    }
+
+    fn of_segments(course: &Course) -> Self {
+        let (mut cells, mut grounds) = (Vec::new(), Vec::new());
+        let width_m = [course.lane_width_m(); 2];
         let (mut x, mut y, mut heading, mut s) = (0.0, 0.0, 0.0, 0.0);
         for segment in course.segments() {
             let Segment {
                 length_m,
                 curvature_start_1pm: start,
                 curvature_end_1pm: end,
+                bank_rad,
+                grade,
             } = *segment;
             let turn = start.abs().max(end.abs()) * length_m;
             let count = (length_m / MAX_CELL_M)
@@ -104,6 +236,7 @@ impl Centreline {
                     curvature_1pm: curvature,
                     curvature_slope_1pm2: slope,
                 });
+                grounds.push(Ground::within(middle, length_m, bank_rad, grade, width_m));
                 let (dx2, dy2) = arc(heading_mid, curvature, slope, half_m);
                 (x, y) = (x + dx + dx2, y + dy + dy2);
                 heading = heading_mid + (curvature + 0.5 * slope * half_m) * half_m;
@@ -112,9 +245,44 @@ impl Centreline {
         }
         Self {
             cells,
+            grounds,
             length_m: s,
             lane_width_m: course.lane_width_m(),
+            start: Pose::default(),
+            has_kinks: false,
         }
+    }
+
+    /// Where the start of the curve is in the frame of the course's file.
+    pub fn start(&self) -> Pose {
+        self.start
+    }
+
+    /// The place at an arc length, its curvature (1/m) and surface; beyond the ends the curve is continued.
+    pub fn at(&self, s_m: f64) -> (Pose, f64, Surface) {
+        let index = self.tracker(s_m).cell;
+        let cell = &self.cells[index];
+        let sigma = s_m - cell.s_m;
+        let piece = Piece {
+            length_m: 2.0 * cell.half_m,
+            middle: Pose {
+                x_m: cell.x_m,
+                y_m: cell.y_m,
+                heading_rad: cell.heading_rad,
+            },
+            curvature_1pm: cell.curvature_1pm,
+            curvature_slope_1pm2: cell.curvature_slope_1pm2,
+            bank_rad: [0.0; 2],
+            grade: [0.0; 2],
+            width_m: [0.0; 2],
+        };
+        let curvature = cell.curvature_1pm + cell.curvature_slope_1pm2 * sigma;
+        (piece.pose_at(sigma), curvature, self.grounds[index].at(sigma))
+    }
+
+    /// What the road is like where a point was last projected.
+    pub fn surface(&self, tracker: &Tracker) -> Surface {
+        self.grounds[tracker.cell].at(tracker.s_m - self.cells[tracker.cell].s_m)
     }
 
     /// Arc length of the whole course, m.
@@ -147,7 +315,7 @@ impl Centreline {
     pub fn project(&self, x_m: f64, y_m: f64, tracker: &mut Tracker) -> Option<Projection> {
         let mut s = tracker.s_m + tracker.advance_m;
         let mut index = tracker.cell;
-        for _ in 0..MAX_NEWTON_STEPS {
+        for iteration in 1..=MAX_NEWTON_STEPS {
             let mut cell = &self.cells[index];
             while s > cell.s_m + cell.half_m && index + 1 < self.cells.len() {
                 index += 1;
@@ -157,28 +325,20 @@ impl Centreline {
                 index -= 1;
                 cell = &self.cells[index];
             }
-            let sigma = s - cell.s_m;
-            let (k0, k1) = (cell.curvature_1pm, cell.curvature_slope_1pm2);
-            // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
-            let theta = sigma * (k0 + 0.5 * k1 * sigma);
-            let sigma2 = sigma * sigma;
-            let along =
-                sigma - sigma2 * sigma * (k0 * k0 / 6.0 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
-            let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - k0 * k0 * k0 * sigma2 / 24.0);
-            let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
-            let [tx, ty] = cell.tangent;
-            let (dx, dy) = (x_m - cell.x_m, y_m - cell.y_m);
-            let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
-            let distance_to_foot = ahead * cos + left * sin;
-            let offset_m = left * cos - ahead * sin;
-            let curvature = k0 + k1 * sigma;
+            let Near {
+                theta,
+                curvature,
+                distance_to_foot,
+                offset_m,
+            } = cell.near(s - cell.s_m, x_m, y_m);
             let determinant = 1.0 - curvature * offset_m;
             if determinant.is_nan() || determinant < MIN_DETERMINANT {
                 return None;
             }
             let step = distance_to_foot / determinant;
             s += step;
-            if step.abs() < CONVERGED_M {
+            let at_kink = iteration == MAX_NEWTON_STEPS && self.has_kinks && step.abs() < KINK_M;
+            if step.abs() < CONVERGED_M || at_kink {
                 if s < -OVERRUN_M || s > self.length_m + OVERRUN_M {
                     return None;
                 }

@@ -1,8 +1,10 @@
-//! A course as a person writes it: segments of linearly varying curvature, and a lane width.
+//! A course as a person writes it: segments of linearly varying curvature, bank and grade, and a lane width; or
+//! a lane of an OpenDRIVE file.
 //!
 //! As TOML: `lane_width = 3.6` (m) and `[[segment]]` tables with `length` (m) and either `curvature` (1/m,
-//! left positive, default 0) or both `curvature_start` and `curvature_end`. Curvature may jump between
-//! segments (an arc without a clothoid); heading never does.
+//! left positive, default 0) or both `curvature_start` and `curvature_end`; in the same way `bank` (rad, positive
+//! where the left edge is the higher one) and `grade` (rise per distance). All may jump between segments (an arc
+//! without a clothoid); heading never does.
 
 use std::fmt;
 use std::sync::{Arc, LazyLock, OnceLock};
@@ -10,6 +12,8 @@ use std::sync::{Arc, LazyLock, OnceLock};
 use serde::Deserialize;
 
 use super::Centreline;
+use super::opendrive::{self, LaneChoice, RoadUsed};
+use super::piece::Piece;
 use crate::input::{InputError, RangeError, in_range, parse_toml};
 
 /// Name under which the built-in course is asked for.
@@ -24,8 +28,12 @@ const MAX_COURSE_M: f64 = 200_000.0;
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=10.0;
 /// Width of a lane unless a course has its own, m: the paper's.
 pub const DEFAULT_LANE_WIDTH_M: f64 = 3.6;
+/// Banks of a course file, rad: far beyond the 8 % of public roads.
+const BANK_RAD: std::ops::RangeInclusive<f64> = -0.3..=0.3;
+/// Grades of a course file.
+const GRADE: std::ops::RangeInclusive<f64> = -0.3..=0.3;
 
-/// A piece of road whose curvature is linear in arc length.
+/// A part of a road whose curvature, bank and grade are linear in arc length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
     /// Arc length, m.
@@ -34,6 +42,10 @@ pub struct Segment {
     pub curvature_start_1pm: f64,
     /// Curvature at the end, 1/m, left positive.
     pub curvature_end_1pm: f64,
+    /// Bank at the start and at the end, rad, positive where the left edge is the higher one.
+    pub bank_rad: [f64; 2],
+    /// Rise per distance at the start and at the end, positive uphill.
+    pub grade: [f64; 2],
 }
 
 /// A checked course: every segment finite, within range, and at least one of them.
@@ -42,6 +54,10 @@ pub struct Course {
     name: String,
     lane_width_m: f64,
     segments: Vec<Segment>,
+    /// The lane's centre in fine pieces where segments are only a summary of it.
+    pieces: Option<Arc<[Piece]>>,
+    roads: Vec<RoadUsed>,
+    notes: Vec<String>,
     /// Made when first asked for, and shared with every clone.
     centreline: Arc<OnceLock<Arc<Centreline>>>,
 }
@@ -49,7 +65,7 @@ pub struct Course {
 impl PartialEq for Course {
     fn eq(&self, other: &Self) -> bool {
         let of = |course: &Self| (course.name.clone(), course.lane_width_m);
-        of(self) == of(other) && self.segments == other.segments
+        of(self) == of(other) && self.segments == other.segments && self.pieces == other.pieces
     }
 }
 
@@ -91,6 +107,12 @@ struct SegmentFile {
     curvature: Option<f64>,
     curvature_start: Option<f64>,
     curvature_end: Option<f64>,
+    bank: Option<f64>,
+    bank_start: Option<f64>,
+    bank_end: Option<f64>,
+    grade: Option<f64>,
+    grade_start: Option<f64>,
+    grade_end: Option<f64>,
 }
 
 fn default_lane_width() -> f64 {
@@ -123,12 +145,33 @@ impl Course {
         segments.push(Segment::straight(200.0));
         segments.extend(curve(1.0 / 600.0, 100.0, 400.0));
         segments.push(Segment::straight(400.0));
+        Self::of_segments(PAPER_COURSE, DEFAULT_LANE_WIDTH_M, segments)
+    }
+
+    pub(super) fn of_segments(name: impl Into<String>, lane_width_m: f64, segments: Vec<Segment>) -> Self {
         Self {
-            name: PAPER_COURSE.into(),
-            lane_width_m: DEFAULT_LANE_WIDTH_M,
+            name: name.into(),
+            lane_width_m,
             segments,
+            pieces: None,
+            roads: Vec::new(),
+            notes: Vec::new(),
             centreline: Arc::default(),
         }
+    }
+
+    /// A lane's centre in fine pieces; `segments` sum it up for pictures.
+    pub(super) fn of_pieces(name: &str, pieces: Vec<Piece>, segments: Vec<Segment>) -> Self {
+        let widths = pieces.iter().flat_map(|piece| piece.width_m);
+        let narrowest = widths.fold(f64::INFINITY, f64::min);
+        Self {
+            pieces: Some(pieces.into()),
+            ..Self::of_segments(name, narrowest, segments)
+        }
+    }
+
+    pub(super) fn from_roads(self, roads: Vec<RoadUsed>, notes: Vec<String>) -> Self {
+        Self { roads, notes, ..self }
     }
 
     /// A course from its segments, in order of arc length. `name` stands for it in results and errors.
@@ -148,15 +191,27 @@ impl Course {
         for (i, segment) in segments.iter().enumerate() {
             segment.check().map_err(|e| CourseError::Range(Some(i + 1), e))?;
         }
-        let course = Self {
-            name: name.into(),
-            lane_width_m,
-            segments,
-            centreline: Arc::default(),
-        };
+        let course = Self::of_segments(name, lane_width_m, segments);
         let length_m = course.length_m();
         in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(whole)?;
         Ok(course)
+    }
+
+    /// A lane of an OpenDRIVE file's text; `name` stands for the file in errors and results.
+    ///
+    /// # Errors
+    /// What is broken, missing or not supported, by road and element.
+    pub fn from_opendrive(name: &str, text: &str, choice: &LaneChoice) -> Result<Self, InputError> {
+        let course = opendrive::read(name, text, choice).map_err(|e| InputError::new(name, e))?;
+        let length_m = course.length_m();
+        let fits = in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m");
+        fits.map_err(|e| InputError::new(name, e))?;
+        Ok(course)
+    }
+
+    /// The course as the text of an OpenDRIVE file.
+    pub fn to_opendrive(&self) -> String {
+        opendrive::write(self)
     }
 
     /// Checks the text of a course file; `name` stands for the file in errors and results.
@@ -181,14 +236,42 @@ impl Course {
         &self.name
     }
 
-    /// Width of the lane whose middle is the centreline, m.
+    /// Width of the lane whose middle is the centreline, m; the least one where it varies.
     pub fn lane_width_m(&self) -> f64 {
         self.lane_width_m
     }
 
-    /// The segments, in order of arc length.
+    /// The segments, in order of arc length. Of a lane of an OpenDRIVE file that is not made of straights, arcs
+    /// and clothoids they are a summary, one a geometry element.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
+    }
+
+    /// Whether no part of the course is banked. A grade does not move a vehicle of a given speed.
+    pub fn is_level(&self) -> bool {
+        match &self.pieces {
+            Some(pieces) => pieces.iter().all(|piece| piece.bank_rad == [0.0; 2]),
+            None => self.segments.iter().all(|segment| segment.bank_rad == [0.0; 2]),
+        }
+    }
+
+    /// Whether the segments are all there is to the course.
+    pub fn is_of_segments(&self) -> bool {
+        self.pieces.is_none()
+    }
+
+    pub(super) fn pieces(&self) -> Option<&[Piece]> {
+        self.pieces.as_deref()
+    }
+
+    /// The roads of the OpenDRIVE file that the course came from, in order of driving.
+    pub fn roads(&self) -> &[RoadUsed] {
+        &self.roads
+    }
+
+    /// What was decided for the reader of an OpenDRIVE file, in sentences.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// The course as a curve, made once for it and all its clones.
@@ -199,7 +282,10 @@ impl Course {
 
     /// Arc length of the whole centreline, m.
     pub fn length_m(&self) -> f64 {
-        self.segments.iter().map(|s| s.length_m).sum()
+        match &self.pieces {
+            Some(pieces) => pieces.iter().map(|piece| piece.length_m).sum(),
+            None => self.segments.iter().map(|s| s.length_m).sum(),
+        }
     }
 }
 
@@ -220,30 +306,66 @@ impl Segment {
             length_m,
             curvature_start_1pm,
             curvature_end_1pm,
+            bank_rad: [0.0; 2],
+            grade: [0.0; 2],
+        }
+    }
+
+    /// The same with a bank (rad, positive where the left edge is the higher one) and a grade (rise per distance),
+    /// each at the start and at the end.
+    #[must_use]
+    pub fn with_surface(self, bank_rad: [f64; 2], grade: [f64; 2]) -> Self {
+        Self {
+            bank_rad,
+            grade,
+            ..self
         }
     }
 
     fn check(&self) -> Result<(), RangeError> {
         in_range("length", self.length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
-        let (start, end) = (self.curvature_start_1pm, self.curvature_end_1pm);
-        let constant = start.to_bits() == end.to_bits();
-        let name = |ramp| if constant { "curvature" } else { ramp };
-        let range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
-        in_range(name("curvature_start"), start, range.clone(), "1/m")?;
-        in_range(name("curvature_end"), end, range, "1/m")
+        let curvature = [self.curvature_start_1pm, self.curvature_end_1pm];
+        let curvature_range = -MAX_CURVATURE_1PM..=MAX_CURVATURE_1PM;
+        for (quantity, [start, end], range, unit) in [
+            ("curvature", curvature, curvature_range, "1/m"),
+            ("bank", self.bank_rad, BANK_RAD, "rad"),
+            ("grade", self.grade, GRADE, ""),
+        ] {
+            let constant = start.to_bits() == end.to_bits();
+            let name = |end: &str| {
+                if constant {
+                    quantity.into()
+                } else {
+                    format!("{quantity}_{end}")
+                }
+            };
+            in_range(&name("start"), start, range.clone(), unit)?;
+            in_range(&name("end"), end, range, unit)?;
+        }
+        Ok(())
     }
 }
 
 impl SegmentFile {
-    fn parsed(&self) -> Result<Segment, &'static str> {
-        match (self.curvature, self.curvature_start, self.curvature_end) {
-            (constant, None, None) => Ok(Segment::arc(self.length, constant.unwrap_or(0.0))),
-            (None, Some(start), Some(end)) => Ok(Segment::clothoid(self.length, start, end)),
-            (Some(_), _, _) => {
-                Err("give either `curvature` or `curvature_start` and `curvature_end`, not both")
-            }
-            (None, ..) => Err("`curvature_start` and `curvature_end` go together"),
-        }
+    fn parsed(&self) -> Result<Segment, String> {
+        let curvature = [self.curvature, self.curvature_start, self.curvature_end];
+        let bank = [self.bank, self.bank_start, self.bank_end];
+        let grade = [self.grade, self.grade_start, self.grade_end];
+        let [start, end] = ends("curvature", curvature)?;
+        let segment = Segment::clothoid(self.length, start, end);
+        Ok(segment.with_surface(ends("bank", bank)?, ends("grade", grade)?))
+    }
+}
+
+/// A quantity of a segment: `NAME` for all of it, or `NAME_start` and `NAME_end`.
+fn ends(name: &str, given: [Option<f64>; 3]) -> Result<[f64; 2], String> {
+    match given {
+        [constant, None, None] => Ok([constant.unwrap_or(0.0); 2]),
+        [None, Some(start), Some(end)] => Ok([start, end]),
+        [Some(_), ..] => Err(format!(
+            "give either `{name}` or `{name}_start` and `{name}_end`, not both"
+        )),
+        [None, ..] => Err(format!("`{name}_start` and `{name}_end` go together")),
     }
 }
 

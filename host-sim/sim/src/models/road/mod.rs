@@ -1,11 +1,15 @@
-//! The road: a centreline of straights, arcs and clothoids.
+//! The road: the centre of one lane, with its curvature, bank, grade and width.
 //!
-//! `course` holds what a person writes down (segments, lane width) and checks it; `centreline` turns it into
-//! a curve that can be projected onto a thousand times a simulated second. Banking, slope and neighbouring
-//! lanes are not modelled.
+//! `course` holds what a person writes down (segments, lane width) and checks it; `opendrive` reads a lane out of
+//! an OpenDRIVE file and writes a course as one; `centreline` turns either into a curve that can be projected onto
+//! a thousand times a simulated second. Neighbouring lanes are not modelled.
 
 mod centreline;
 mod course;
+mod opendrive;
+mod piece;
 
 pub use centreline::{Centreline, Projection, Tracker};
 pub use course::{Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};
+pub use opendrive::{LaneChoice, RoadUsed};
+pub use piece::{Pose, Surface};

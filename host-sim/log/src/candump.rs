@@ -1,17 +1,25 @@
 //! The text that `candump` writes: `(1700000000.123456) can0 0C0#0102030405060708` with `-L` or `-l`, and
-//! `(1700000000.123456)  can0  0C0   [8]  01 02 03 04 05 06 07 08` with `-ta`.
+//! `(1700000000.123456)  can0  0C0   [8]  01 02 03 04 05 06 07 08` with `-ta`. Written is the first form.
+//!
+//! Not here: what the frames mean.
+
+use std::io::{self, Write};
 
 /// A frame with its time and the line that it stands on.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Record {
+pub struct CandumpFrame {
+    /// The line, from 1.
     pub line: usize,
+    /// When it was received, s.
     pub time_s: f64,
+    /// The identifier, 11 or 29 bits.
     pub id: u32,
+    /// Up to eight bytes.
     pub data: Vec<u8>,
 }
 
 /// Whether `text` is a trace of `candump` rather than a table.
-pub(super) fn looks_like_one(text: &str) -> bool {
+pub fn looks_like_one(text: &str) -> bool {
     let Some(line) = text.lines().map(str::trim).find(|line| !line.is_empty()) else {
         return false;
     };
@@ -21,8 +29,11 @@ pub(super) fn looks_like_one(text: &str) -> bool {
 
 /// Every data frame of classic CAN, in the order of the text. Remote, error and FD frames are left out: none of
 /// the messages looked for is one.
-pub(super) fn parse(text: &str) -> Result<Vec<Record>, String> {
-    let mut records: Vec<Record> = Vec::new();
+///
+/// # Errors
+/// A line that is not in one of the two forms, with its number.
+pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
+    let mut frames: Vec<CandumpFrame> = Vec::new();
     for (line, content) in (1..).zip(text.lines()) {
         let content = content.trim();
         if content.is_empty() {
@@ -64,19 +75,47 @@ pub(super) fn parse(text: &str) -> Result<Vec<Record>, String> {
             .collect::<Option<Vec<u8>>>()
             .filter(|data| data.len() <= 8)
             .ok_or_else(|| refuse("the data are no bytes in hexadecimal"))?;
-        records.push(Record {
+        frames.push(CandumpFrame {
             line,
             time_s,
             id,
             data,
         });
     }
-    Ok(records)
+    Ok(frames)
+}
+
+/// Writes a frame of an 11-bit identifier as `candump -L` writes it, on an interface that is called `can0`.
+///
+/// # Errors
+/// What `out` says.
+pub fn write(out: &mut (impl Write + ?Sized), time_s: f64, id: u16, data: &[u8]) -> io::Result<()> {
+    write!(out, "({time_s:.6}) can0 {id:03X}#")?;
+    for byte in data {
+        write!(out, "{byte:02X}")?;
+    }
+    writeln!(out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let mut text = Vec::new();
+        write(&mut text, 12.5, 0x0C0, &[0x01, 0xAB]).unwrap();
+        write(&mut text, 12.501, 0x7FF, &[]).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert_eq!(text, "(12.500000) can0 0C0#01AB\n(12.501000) can0 7FF#\n");
+        assert!(looks_like_one(&text));
+        let frames = parse(&text).unwrap();
+        let found: Vec<_> = frames.iter().map(|f| (f.time_s, f.id, &f.data[..])).collect();
+        assert_eq!(
+            found,
+            [(12.5, 0x0C0, &[0x01, 0xAB][..]), (12.501, 0x7FF, &[][..])]
+        );
+    }
 
     /// The two lines are those of the manual page of candump's own output forms.
     #[test]

@@ -1,0 +1,49 @@
+"""Haptic-guidance steering: the closed loop, driver identification, and the shipping ECU.
+
+The controller, the models and the estimators are those of the command line `host-sim`, bit for bit. Names bear their
+units, signs are those of ISO 8855: left is positive.
+
+Examples
+--------
+>>> import haptic_guidance as hg
+>>> run = hg.simulate(hg.Scenario(condition="high", failure={"kind": "torque"}))
+>>> run.ending
+'course-end'
+"""
+
+from ._errors import InputError, RangeError
+from ._native import (
+    Action,
+    Bus,
+    Ecu,
+    Frame,
+    Outcome,
+    Scenario,
+    Simulation,
+    Step,
+    metric_definitions,
+    parameters,
+)
+from ._results import Evaluation, Fit, Parameter, Run, evaluate, identify, simulate
+
+__all__ = [
+    "Action",
+    "Bus",
+    "Ecu",
+    "Evaluation",
+    "Fit",
+    "Frame",
+    "InputError",
+    "Outcome",
+    "Parameter",
+    "RangeError",
+    "Run",
+    "Scenario",
+    "Simulation",
+    "Step",
+    "evaluate",
+    "identify",
+    "metric_definitions",
+    "parameters",
+    "simulate",
+]

@@ -1,0 +1,68 @@
+//! Long work beside the interpreter: the GIL is free, Ctrl-C ends the call, and a callable hears of progress.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+/// How often Ctrl-C and progress are looked after.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// What the work says of itself, and what it is told.
+#[derive(Default)]
+pub(crate) struct Progress {
+    done: AtomicUsize,
+    stop: AtomicBool,
+}
+
+impl Progress {
+    /// One more part is done. Work that nobody waits for any more ends here: it unwinds, without a message.
+    pub(crate) fn tick(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+        if self.stop.load(Ordering::Relaxed) {
+            std::panic::resume_unwind(Box::new("interrupted"));
+        }
+    }
+}
+
+/// Does `work` on a thread of its own. `told` is called with the number of parts done since it was last called.
+pub(crate) fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    told: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Progress) -> T + Send + 'static,
+) -> PyResult<T> {
+    let progress = Arc::new(Progress::default());
+    let (sender, mut receiver) = channel();
+    let worker = Arc::clone(&progress);
+    std::thread::spawn(move || {
+        // Nobody hears it after an interrupt.
+        let _ = sender.send(work(&worker));
+    });
+    let mut heard = 0;
+    loop {
+        let (received, back) = py.detach(move || (receiver.recv_timeout(LOOK), receiver));
+        receiver = back;
+        let done = progress.done.load(Ordering::Relaxed);
+        let looked = py.check_signals().and_then(|()| match told {
+            Some(told) if done > heard => told.call1((done - heard,)).map(|_| ()),
+            _ => Ok(()),
+        });
+        if let Err(error) = looked {
+            progress.stop.store(true, Ordering::Relaxed);
+            return Err(error);
+        }
+        heard = done;
+        match received {
+            Ok(result) => return Ok(result),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err(
+                    "the simulator stopped by a defect of its own",
+                ));
+            }
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! The native part of the Python package `haptic_guidance`. No model and no maths: every call goes to the crate that
+//! the command line uses too. What only arranges results is Python (`python/haptic_guidance`).
+
+mod bus;
+mod ecu;
+mod errors;
+mod identify;
+mod interrupt;
+mod run;
+mod scenario;
+mod simulation;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::bus::{Bus, Frame};
+    #[pymodule_export]
+    use crate::ecu::{Ecu, Step, parameters};
+    #[pymodule_export]
+    use crate::identify::identify;
+    #[pymodule_export]
+    use crate::run::{evaluate, metric_definitions, simulate};
+    #[pymodule_export]
+    use crate::scenario::Scenario;
+    #[pymodule_export]
+    use crate::simulation::{Action, Outcome, Simulation};
+}

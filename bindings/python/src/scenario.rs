@@ -1,0 +1,382 @@
+//! A scenario in Python: the fields of a scenario file as keywords, checked by the simulator itself.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use haptic_sim::input::InputError;
+use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
+use haptic_sim::scenario::ScenarioBuilder;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
+use toml::{Table, Value};
+
+use crate::errors;
+
+/// Everything that decides a run, checked.
+///
+/// The keywords are the fields of a scenario file (docs/files.md lists names, units, ranges and defaults); what is not
+/// given keeps its default, so ``Scenario()`` is the paper's driver 1 with medium reliance at 60 km/h.
+///
+/// Parameters
+/// ----------
+/// course : str, path or mapping, optional
+///     ``"paper-course"``, a course file, or its content: ``{"lane_width": 3.6, "segment": [{"length": 100.0}]}``.
+/// speed : float, optional
+///     Constant speed, km/h, 20 to 250.
+/// condition : {"manual", "high", "mid", "low"}, optional
+///     How much the driver relies on the guidance.
+/// sensors : {"paper", "exact"}, optional
+///     What the controller sees.
+/// seed : int, optional
+///     Root of all random numbers.
+/// driver, vehicle, guidance, failure, driver_change : mapping, optional
+///     The tables of the file, such as ``driver={"t_p": 0.3}``.
+///
+/// Raises
+/// ------
+/// RangeError
+///     A value outside its range; the exception has ``field``, ``value``, ``min``, ``max`` and ``unit``.
+/// InputError
+///     An unknown field, a value of the wrong kind, values that do not go together.
+#[pyclass(frozen, module = "haptic_guidance")]
+pub(crate) struct Scenario {
+    pub(crate) inner: haptic_sim::Scenario,
+    /// As given; a course from outside is in `course`.
+    fields: Table,
+    /// Name and text of a course that is not the built-in one.
+    course: Option<(String, String)>,
+}
+
+impl Scenario {
+    fn make(py: Python<'_>, name: &str, fields: Table, course: Option<(String, String)>) -> PyResult<Self> {
+        let text = fields.to_string();
+        let open = |named: &str, _: &LaneChoice| match &course {
+            Some((name, text)) => Course::from_toml(name, text),
+            None => Err(InputError::new(named, "no such course")),
+        };
+        let builder =
+            ScenarioBuilder::from_toml(name, &text, open).map_err(|error| errors::input(py, error))?;
+        let inner = builder.build().map_err(|error| errors::scenario(py, &error))?;
+        Ok(Self {
+            inner,
+            fields,
+            course,
+        })
+    }
+
+    /// The text of the course file that `fields` name, looked for in `folder`.
+    fn read_course(py: Python<'_>, fields: &Table, folder: &Path) -> PyResult<Option<(String, String)>> {
+        match fields.get("course") {
+            Some(Value::String(name)) if name != PAPER_COURSE => {
+                let path = folder.join(name);
+                Ok(Some((path.display().to_string(), read(py, &path)?)))
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+#[pymethods]
+impl Scenario {
+    #[new]
+    #[pyo3(signature = (**fields))]
+    fn new(py: Python<'_>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut fields = fields.map_or_else(|| Ok(Table::new()), |given| table(given, ""))?;
+        let course = match fields.get("course") {
+            Some(Value::Table(course)) => {
+                let mut course = course.clone();
+                let name = match course.remove("name") {
+                    Some(Value::String(name)) => name,
+                    _ => "course".to_owned(),
+                };
+                let text = course.to_string();
+                fields.insert("course".into(), Value::String(name.clone()));
+                Some((name, text))
+            }
+            _ => Self::read_course(py, &fields, Path::new(""))?,
+        };
+        Self::make(py, "scenario", fields, course)
+    }
+
+    /// A scenario from a mapping of the same fields as the keywords.
+    ///
+    /// Parameters
+    /// ----------
+    /// fields : dict
+    ///     Fields and tables of a scenario file.
+    ///
+    /// Returns
+    /// -------
+    /// Scenario
+    #[classmethod]
+    fn from_dict(class: &Bound<'_, PyType>, fields: &Bound<'_, PyDict>) -> PyResult<Self> {
+        Self::new(class.py(), Some(fields))
+    }
+
+    /// A scenario from the text of a scenario file.
+    ///
+    /// Parameters
+    /// ----------
+    /// text : str
+    ///     TOML. A course file that it names is looked for in the current folder.
+    ///
+    /// Returns
+    /// -------
+    /// Scenario
+    #[staticmethod]
+    fn from_toml(py: Python<'_>, text: &str) -> PyResult<Self> {
+        Self::parse(py, "scenario", text, Path::new(""))
+    }
+
+    /// Reads a scenario file.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path
+    ///     The file. A course file that it names is looked for beside it.
+    ///
+    /// Returns
+    /// -------
+    /// Scenario
+    #[staticmethod]
+    fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::parse(py, &path.display().to_string(), &read(py, &path)?, folder)
+    }
+
+    /// The same scenario with some fields changed; a table is changed field by field.
+    ///
+    /// Parameters
+    /// ----------
+    /// **fields
+    ///     As of `Scenario`.
+    ///
+    /// Returns
+    /// -------
+    /// Scenario
+    #[pyo3(signature = (**fields))]
+    fn replace(&self, py: Python<'_>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let Some(fields) = fields else {
+            return Self::make(py, "scenario", self.fields.clone(), self.course.clone());
+        };
+        if fields.contains("course")? {
+            let merged = self.to_dict(py)?;
+            for (key, value) in fields {
+                merged.set_item(key, value)?;
+            }
+            return Self::new(py, Some(&merged));
+        }
+        let mut merged = self.fields.clone();
+        for (name, value) in table(fields, "")? {
+            match (merged.get_mut(&name), value) {
+                (Some(Value::Table(old)), Value::Table(new)) => old.extend(new),
+                (_, value) => {
+                    merged.insert(name, value);
+                }
+            }
+        }
+        Self::make(py, "scenario", merged, self.course.clone())
+    }
+
+    /// The fields that were given, as a mapping that `from_dict` takes.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let mut fields = self.fields.clone();
+        if let Some((name, text)) = &self.course {
+            let mut course: Table = toml::from_str(text).map_err(|error| errors::input(py, error))?;
+            course.insert("name".into(), Value::String(name.clone()));
+            fields.insert("course".into(), Value::Table(course));
+        }
+        dict(py, &fields)
+    }
+
+    /// Every value as the text of a scenario file that needs no other file.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    fn to_toml(&self) -> String {
+        self.inner.to_toml()
+    }
+
+    /// Constant speed, km/h.
+    #[getter]
+    fn speed_kmh(&self) -> f64 {
+        self.inner.speed_kmh()
+    }
+
+    /// Constant speed, m/s.
+    #[getter]
+    fn speed_m_per_s(&self) -> f64 {
+        self.inner.speed_m_per_s()
+    }
+
+    /// How the driver drives: ``"manual"``, ``"high"``, ``"mid"``, ``"low"`` or ``"custom"``.
+    #[getter]
+    fn condition(&self) -> String {
+        self.inner.condition().to_string()
+    }
+
+    /// K_d, torque of the driver's arm per target angle, N.m/rad.
+    #[getter]
+    fn k_d(&self) -> f64 {
+        self.inner.gains().k_d
+    }
+
+    /// K_hg, share of the guidance torque that the driver's arm works against.
+    #[getter]
+    fn k_hg(&self) -> f64 {
+        self.inner.gains().k_hg
+    }
+
+    /// t_p, processing delay of the driver, s.
+    #[getter]
+    fn t_p_s(&self) -> f64 {
+        self.inner.driver().t_p
+    }
+
+    /// When the guidance fails, s; None if it does not.
+    #[getter]
+    fn failure_time_s(&self) -> Option<f64> {
+        self.inner.failure().at_s()
+    }
+
+    /// Name of the course.
+    #[getter]
+    fn course_name(&self) -> &str {
+        self.inner.course().name()
+    }
+
+    /// Length of the course, m.
+    #[getter]
+    fn course_length_m(&self) -> f64 {
+        self.inner.course().length_m()
+    }
+
+    /// Width of the lane, m.
+    #[getter]
+    fn lane_width_m(&self) -> f64 {
+        self.inner.course().lane_width_m()
+    }
+
+    /// How long a run lasts that does not diverge, s.
+    #[getter]
+    fn duration_s(&self) -> f64 {
+        self.inner.duration_s()
+    }
+
+    /// Root of all random numbers.
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.inner.seed()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.inner == other.inner
+    }
+
+    fn __repr__(&self) -> String {
+        let mut text = String::from("Scenario(");
+        for (i, (name, value)) in self.fields.iter().enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            // Writing to a string does not fail.
+            let _ = write!(text, "{comma}{name}={value}");
+        }
+        text + ")"
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let py = slf.py();
+        let class = py.get_type::<Self>();
+        let fields = slf.get().to_dict(py)?;
+        Ok((class.getattr("from_dict")?, PyTuple::new(py, [fields])?))
+    }
+}
+
+impl Scenario {
+    fn parse(py: Python<'_>, name: &str, text: &str, folder: &Path) -> PyResult<Self> {
+        let fields: Table = haptic_sim::input::parse_toml(name, text).map_err(|e| errors::input(py, e))?;
+        let course = Self::read_course(py, &fields, folder)?;
+        // Once on the text itself, whose errors name lines.
+        let open = |_: &str, _: &LaneChoice| Ok(Course::paper());
+        let parsed = ScenarioBuilder::from_toml(name, text, open).map(drop);
+        parsed.map_err(|error| errors::input(py, error))?;
+        Self::make(py, name, fields, course)
+    }
+}
+
+fn read(py: Python<'_>, path: &Path) -> PyResult<String> {
+    std::fs::read_to_string(path).map_err(|e| errors::input(py, InputError::new(path.display(), e)))
+}
+
+/// A mapping as TOML; `place` names it in errors.
+fn table(fields: &Bound<'_, PyDict>, place: &str) -> PyResult<Table> {
+    let mut made = Table::new();
+    for (key, value) in fields {
+        let name: String = key.extract()?;
+        let here = format!("{place}{name}");
+        if !value.is_none() {
+            made.insert(name, toml_value(&value, &here)?);
+        }
+    }
+    Ok(made)
+}
+
+fn toml_value(value: &Bound<'_, PyAny>, place: &str) -> PyResult<Value> {
+    if value.is_instance_of::<PyBool>() {
+        return Ok(Value::Boolean(value.extract()?));
+    }
+    if value.is_instance_of::<PyInt>() {
+        return Ok(Value::Integer(value.extract()?));
+    }
+    if value.is_instance_of::<PyFloat>() {
+        return Ok(Value::Float(value.extract()?));
+    }
+    if value.is_instance_of::<PyString>() {
+        return Ok(Value::String(value.extract()?));
+    }
+    if let Ok(fields) = value.cast::<PyDict>() {
+        return Ok(Value::Table(table(fields, &format!("{place}."))?));
+    }
+    if let Ok(items) = value.cast::<PyList>() {
+        let items = items.iter().map(|item| toml_value(&item, place));
+        return Ok(Value::Array(items.collect::<PyResult<_>>()?));
+    }
+    // Numbers of NumPy, and paths.
+    if let Ok(number) = value.extract::<i64>() {
+        return Ok(Value::Integer(number));
+    }
+    if let Ok(number) = value.extract::<f64>() {
+        return Ok(Value::Float(number));
+    }
+    if let Ok(path) = value.extract::<std::path::PathBuf>() {
+        return Ok(Value::String(path.display().to_string()));
+    }
+    let kind = value.get_type().name()?;
+    Err(errors::input(
+        value.py(),
+        format!("{place}: a {kind} is no number, no text and no table"),
+    ))
+}
+
+fn dict<'py>(py: Python<'py>, fields: &Table) -> PyResult<Bound<'py, PyDict>> {
+    let made = PyDict::new(py);
+    for (name, value) in fields {
+        made.set_item(name, python_value(py, value)?)?;
+    }
+    Ok(made)
+}
+
+fn python_value<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        Value::Boolean(value) => PyBool::new(py, *value).to_owned().into_any(),
+        Value::Integer(value) => value.into_pyobject(py)?.into_any(),
+        Value::Float(value) => value.into_pyobject(py)?.into_any(),
+        Value::String(value) => value.into_pyobject(py)?.into_any(),
+        Value::Table(fields) => dict(py, fields)?.into_any(),
+        Value::Array(items) => {
+            let items = items.iter().map(|item| python_value(py, item));
+            PyList::new(py, items.collect::<PyResult<Vec<_>>>()?)?.into_any()
+        }
+        Value::Datetime(date) => date.to_string().into_pyobject(py)?.into_any(),
+    })
+}

@@ -1,0 +1,76 @@
+"""Identification, against drives whose driver is known."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import haptic_guidance as hg
+
+LOGS = Path(__file__).parents[3] / "tests" / "data" / "driver-logs"
+
+
+def table(path):
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    names = lines[0].split(",")
+    values = np.array([[float(value) for value in line.split(",")] for line in lines[1:]])
+    return dict(zip(names, values.T))
+
+
+def test_a_path_and_its_columns_give_the_same_driver():
+    path = LOGS / "guided-probe-clean.csv"
+    by_path, by_columns = hg.identify(path), hg.identify(table(path))
+    assert by_path.results["parameters"] == by_columns.results["parameters"]
+    truth = json.loads(path.with_suffix(".json").read_text())
+    assert abs(by_path["k_hg"].optimum - truth["K_hg"]) < 0.02
+    assert abs(by_path["t_p"].optimum - truth["t_p"]) < 0.02
+
+
+def probed_run():
+    driver = {"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}
+    return hg.simulate(hg.Scenario(driver=driver, guidance={"probe": True}))
+
+
+def test_the_covariance_has_the_variances_on_its_diagonal():
+    fit = hg.identify(probed_run())
+    names, covariance = fit.covariance
+    assert np.allclose(covariance, covariance.T, equal_nan=True)
+    for i, name in enumerate(names):
+        assert covariance[i, i] == pytest.approx(fit[name].standard_error ** 2)
+    assert np.nanmin(np.linalg.eigvalsh(covariance)) > 0
+    assert len(fit.traces["time_s"]) == len(fit.traces["residual_nm"])
+
+
+def test_a_simulated_run_is_a_drive():
+    fit = hg.identify(probed_run(), fix={"k_nms": 1.0, "t_nms": 0.1})
+    assert fit.refuted == [] and fit["k_hg"].identified
+    low, high = fit["k_hg"].interval_95
+    assert low <= fit["k_hg"].estimate <= high
+    assert abs(fit["t_p"].estimate - 0.2) < 3 * fit["t_p"].standard_error
+    assert abs(fit["k_hg"].estimate - 0.4) < 3 * fit["k_hg"].standard_error
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda t: t.pop("e_y_m"), "e_y_m"),
+        (lambda t: t["e_y_m"].__setitem__(5, np.nan), "e_y_m"),
+        (lambda t: t.update(e_y_m=t["e_y_m"][:-1]), "rows"),
+        (lambda t: t.update(e_y_m=np.zeros((2, 2))), "dimensions"),
+        (lambda t: t.update(wheel_angle_rad=np.degrees(t["wheel_angle_rad"])), "degrees"),
+        (lambda t: t["time_s"].__setitem__(7, 0.0), "line"),
+    ],
+)
+def test_columns_that_are_no_drive_are_refused(change, says):
+    columns = table(LOGS / "guided-probe-clean.csv")
+    change(columns)
+    with pytest.raises(hg.InputError, match=says):
+        hg.identify(columns)
+
+
+def test_what_cannot_be_fixed_is_refused():
+    with pytest.raises(hg.InputError, match="k_x"):
+        hg.identify(LOGS / "manual.csv", fix={"k_x": 1.0})
+    with pytest.raises(hg.InputError, match="no-such"):
+        hg.identify("no-such.csv")

@@ -1,0 +1,152 @@
+"""Whole runs, steps and evaluation, against the independent C program's curves and against each other."""
+
+import copy
+import csv
+import os
+import pickle
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import haptic_guidance as hg
+
+DATA = Path(__file__).parents[3] / "tests" / "data"
+SHORT = {"segment": [{"length": 300.0}, {"length": 60.0, "curvature_start": 0.0, "curvature_end": 0.002}, {"length": 200.0, "curvature": 0.002}]}
+
+
+def test_a_run_is_the_curve_of_an_independent_program():
+    failing = hg.Scenario(condition="high", driver={"t_p": 0.5}, failure={"kind": "torque"}, sensors="exact")
+    run = hg.simulate(failing)
+    lines = (DATA / "closed_loop_high_tp05_failure70.csv").read_text().splitlines()
+    rows = [[float(value) for value in line.split(",")] for line in lines if line[:1].isdigit()]
+    assert len(rows) > 390
+    for t_s, s_m, error_m, guidance_nm, _, wheel_rad in rows:
+        i = round(t_s * 200)
+        if i < len(run):
+            assert abs(run["s_m"][i] - s_m) < 0.01
+            assert abs(run["lateral_error_m"][i] - error_m) < 0.1e-3
+            assert abs(run["guidance_torque_nm"][i] - guidance_nm) < 0.1e-3
+            assert abs(run["wheel_angle_rad"][i] - wheel_rad) < 0.02e-3
+
+
+def test_columns_are_arrays_in_time():
+    run = hg.simulate(hg.Scenario(course=SHORT))
+    assert run.ending == "course-end" and run.steps >= 5 * (len(run) - 1)
+    assert np.allclose(np.diff(run["time_s"]), 0.005)
+    for name, column in run.columns.items():
+        assert column.dtype == np.float64 and column.shape == (len(run),), name
+        assert np.isfinite(column).all(), name
+
+
+def test_metrics_are_those_of_the_columns():
+    run = hg.simulate(hg.Scenario(course=SHORT))
+    assert run.metrics["peak_lateral_error_m"] == np.abs(run["lateral_error_m"]).max()
+    assert run.metrics["rms_driver_torque_nm"] == pytest.approx(np.sqrt(np.mean(run["driver_torque_nm"] ** 2)), rel=1e-9)
+    assert run.metrics["time_to_recover_s"] is None
+
+
+def test_pandas_and_arrow_share_the_memory():
+    pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
+    run = hg.simulate(hg.Scenario(course=SHORT))
+    frame = run.to_pandas()
+    assert isinstance(frame, pandas.DataFrame) and list(frame) == list(run.columns)
+    assert np.shares_memory(frame["time_s"].to_numpy(), run["time_s"])
+    table = run.to_arrow()
+    assert isinstance(table, pyarrow.Table) and table.num_rows == len(run)
+    assert table["s_m"].chunk(0).buffers()[1].address == run["s_m"].ctypes.data
+
+
+def test_a_run_can_be_pickled():
+    run = hg.simulate(hg.Scenario(course=SHORT), bus=True)
+    again = pickle.loads(pickle.dumps(run))
+    assert again.results == run.results and np.array_equal(again.bus["data"], run.bus["data"])
+
+
+def test_steps_give_the_samples_of_the_whole_run():
+    scenario = hg.Scenario(course=SHORT, condition="high", driver={"remnant_sd": 0.1})
+    run, simulation = hg.simulate(scenario), hg.Simulation(scenario)
+    row = 0
+    while (outcome := simulation.step()) is not None:
+        if outcome.sample is not None:
+            assert all(outcome.sample[name] == column[row] for name, column in run.columns.items()), row
+            row += 1
+    assert row == len(run) and simulation.steps == run.steps and simulation.ending == run.ending
+
+
+def test_a_clone_and_a_pickle_go_on_as_the_original():
+    simulation = hg.Simulation(hg.Scenario(course=SHORT, driver={"remnant_sd": 0.1}))
+    push = hg.Action(hand_torque_nm=0.7, authority=0.5)
+    simulation.step(push, steps=700)
+    simulation.step(steps=300)
+    others = [simulation.clone(), copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
+    expected = [simulation.step(push) for _ in range(500)]
+    for other in others:
+        assert other.steps == 1000
+        for outcome in expected:
+            got = other.step(push)
+            assert (got.e_y_m, got.guidance_torque_nm, got.driver_torque_nm) == (
+                outcome.e_y_m,
+                outcome.guidance_torque_nm,
+                outcome.driver_torque_nm,
+            )
+            assert got.frames_out == outcome.frames_out
+
+
+def test_a_hand_on_the_wheel_moves_the_vehicle_to_its_side():
+    free, pushed = (hg.Simulation(hg.Scenario(course=SHORT)) for _ in range(2))
+    left = pushed.step(hg.Action(hand_torque_nm=0.5), steps=1000)
+    assert left.e_y_m < free.step(steps=1000).e_y_m, "the target lies farther to the right"
+
+
+def test_what_an_action_cannot_be_is_refused():
+    with pytest.raises(hg.RangeError) as caught:
+        hg.Action(authority=1.5)
+    assert (caught.value.field, caught.value.max) == ("authority", 1.0)
+    with pytest.raises(hg.RangeError, match="hand_torque_nm"):
+        hg.Action(hand_torque_nm=float("nan"))
+    with pytest.raises(ValueError, match="steps"):
+        hg.Simulation(hg.Scenario()).step(steps=0)
+
+
+def test_a_failure_after_the_end_is_refused():
+    with pytest.raises(hg.RangeError) as caught:
+        hg.simulate(hg.Scenario(course=SHORT, failure={"kind": "torque", "time": 1000}))
+    assert caught.value.field == "failure.time"
+
+
+def test_a_bus_where_there_is_none_is_refused():
+    with pytest.raises(hg.InputError, match="no bus"):
+        hg.simulate(hg.Scenario(sensors="exact"), bus=True)
+
+
+def test_the_evaluation_holds_its_claims_and_tells_its_progress():
+    told = []
+    evaluation = hg.evaluate(progress=told.append)
+    assert sum(told) == len(evaluation.results["runs"]) == len(evaluation.columns) == 30
+    assert evaluation.results["claims"] and evaluation.all_claims_hold
+
+
+def test_ctrl_c_ends_a_long_call_and_the_gil_is_free():
+    # 200 km at 20 km/h: ten hours of driving.
+    long = hg.Scenario(course={"segment": [{"length": 200_000.0}]}, speed=20)
+    turns, begun = [], time.monotonic()
+
+    def interrupt():
+        # This thread counts while the simulator works: it could not if the call held the interpreter.
+        while len(turns) < 20:
+            turns.append(None)
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    for call in (lambda: hg.simulate(long), lambda: hg.Simulation(long).step(steps=4_000_000_000)):
+        turns.clear()
+        thread = threading.Thread(target=interrupt)
+        thread.start()
+        with pytest.raises(KeyboardInterrupt):
+            call()
+        thread.join()
+        assert len(turns) == 20

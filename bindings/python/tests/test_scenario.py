@@ -1,0 +1,108 @@
+"""Scenarios: every way to make one, and what is refused."""
+
+import copy
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import haptic_guidance as hg
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+COURSE = {"lane_width": 3.5, "segment": [{"length": 400.0}, {"length": 200.0, "curvature": 0.002}]}
+
+
+def test_the_file_with_every_field_holds_the_defaults():
+    assert hg.Scenario.load(EXAMPLES / "every-field.toml") == hg.Scenario()
+
+
+def test_keywords_dict_and_toml_say_the_same():
+    keywords = hg.Scenario(speed=80, condition="high", driver={"t_p": 0.3}, failure={"kind": "torque", "time": 20})
+    fields = {"speed": 80, "condition": "high", "driver": {"t_p": 0.3}, "failure": {"kind": "torque", "time": 20}}
+    text = 'speed = 80\ncondition = "high"\ndriver.t_p = 0.3\nfailure = { kind = "torque", time = 20 }'
+    assert keywords == hg.Scenario.from_dict(fields) == hg.Scenario.from_toml(text)
+    assert keywords != hg.Scenario()
+    assert (keywords.speed_kmh, keywords.condition, keywords.k_d, keywords.k_hg) == (80.0, "high", 2.0, 0.0)
+    assert (keywords.t_p_s, keywords.failure_time_s) == (0.3, 20.0)
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert hg.Scenario(speed=np.float64(80), seed=np.int64(7)) == hg.Scenario(speed=80.0, seed=7)
+
+
+def test_a_course_comes_from_a_file_or_as_its_content():
+    scenario = hg.Scenario(course=COURSE)
+    assert (scenario.course_length_m, scenario.lane_width_m) == (600.0, 3.5)
+    hill = hg.Scenario.load(EXAMPLES / "relying-driver.toml")
+    assert hill.course_name.endswith("hill-road.toml")
+    same = hg.Scenario(course=EXAMPLES / "hill-road.toml")
+    assert same.course_length_m == hill.course_length_m
+
+
+@pytest.mark.parametrize("scenario", [hg.Scenario(course=COURSE, seed=3), hg.Scenario.load(EXAMPLES / "relying-driver.toml")])
+def test_a_pickle_is_the_same_scenario(scenario):
+    again = pickle.loads(pickle.dumps(scenario))
+    assert again == scenario and again.course_length_m == scenario.course_length_m
+    assert copy.deepcopy(scenario) == scenario
+
+
+def test_the_text_of_a_scenario_is_the_scenario():
+    scenario = hg.Scenario(course=COURSE, condition="low", driver={"t_p": 0.1234567890123456}, seed=3)
+    assert hg.Scenario.from_toml(scenario.to_toml()) == scenario
+
+
+def test_replace_changes_one_field_of_a_table():
+    scenario = hg.Scenario(driver={"t_p": 0.3, "a_1": 0.2}, course=COURSE)
+    changed = scenario.replace(driver={"t_p": 0.5})
+    assert changed == hg.Scenario(driver={"t_p": 0.5, "a_1": 0.2}, course=COURSE)
+    assert scenario.t_p_s == 0.3
+    assert scenario.replace(course="paper-course").course_length_m == 3350.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "field", "value", "low", "high", "unit"),
+    [
+        ({"speed": 300}, "speed", 300.0, 20.0, 250.0, "km/h"),
+        ({"driver": {"t_p": 5}}, "driver.t_p", 5.0, 0.001, 2.0, "s"),
+        ({"guidance": {"torque_limit_nm": 9.0}}, "guidance.torque_limit_nm", 9.0, 0.1, 5.0, "N.m"),
+        ({"failure": {"kind": "torque", "time": -1}}, "failure.time", -1.0, 0.0, 1e6, "s"),
+    ],
+)
+def test_a_value_out_of_range_is_named_with_its_range(fields, field, value, low, high, unit):
+    with pytest.raises(hg.RangeError) as caught:
+        hg.Scenario(**fields)
+    error = pickle.loads(pickle.dumps(caught.value))
+    assert (error.field, error.value, error.min, error.max, error.unit) == (field, value, low, high, unit)
+    assert field in str(error) and isinstance(error, ValueError)
+
+
+def test_nan_is_out_of_range():
+    with pytest.raises(hg.RangeError, match="speed = NaN"):
+        hg.Scenario(speed=float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"sped": 60}, "sped"),
+        ({"speed": "fast"}, "expected a number"),
+        ({"condition": "hihg"}, "hihg"),
+        ({"driver": {"t_p": object()}}, "driver.t_p: a object is no number"),
+        ({"course": "no-such.toml"}, "no-such.toml"),
+        ({"condition": "manual", "failure": {"kind": "torque"}}, "manual"),
+        ({"course": {"segment": [{"length": 100, "curvature": 1.0}]}}, "segment 1: curvature = 1"),
+    ],
+)
+def test_what_makes_no_scenario_is_refused_by_name(fields, says):
+    with pytest.raises(hg.InputError, match=says):
+        hg.Scenario(**fields)
+
+
+def test_everything_public_is_documented():
+    for name in hg.__all__:
+        thing = getattr(hg, name)
+        assert thing.__doc__, name
+        for member in vars(thing) if isinstance(thing, type) else ():
+            if not member.startswith("_") and callable(getattr(thing, member)):
+                assert getattr(thing, member).__doc__, f"{name}.{member}"

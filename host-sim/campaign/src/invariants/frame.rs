@@ -1,0 +1,91 @@
+//! The rules that one frame shows, and the bound that leaves the driver in charge.
+
+use haptic_core::bus::Frame;
+
+use super::{LIMIT_NM, MEMORY_FAULT, OVERRIDE_FROM_NM, OVERRIDE_SLOPE};
+use crate::bytes::{self, FAULT, HANDOVER, LOCKED, Status};
+
+/// Bits of the faults of class B, of class C, and of class Locked. A copy of the core's list on purpose: a test compares
+/// them, so that a new fault is classed here by a person too.
+const CLASSES: [u64; 3] = [0x3_80FF, 0x1F00, 0x6000];
+
+/// The classes that a guidance frame must name with these faults.
+fn classes_of(faults: u64) -> u64 {
+    let present = CLASSES.map(|mask| u64::from(faults & mask != 0));
+    present[0] | present[1] << 1 | present[2] << 2
+}
+
+pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Result<(), String> {
+    if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
+        return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
+    }
+    if status.limit > 7
+        || status.mode > LOCKED
+        || status.reset > 6
+        || status.spare != 0
+        || status.classes != classes_of(status.faults)
+    {
+        return Err(format!("frame: a code that does not exist in {status:?}"));
+    }
+    match before {
+        // An ECU that lost its memory counts anew.
+        Some(before)
+            if status.counter != (before.counter + 1) % 16
+                && (status.faults & !before.faults) & MEMORY_FAULT == 0 =>
+        {
+            Err(format!(
+                "frame: counter {} after {}",
+                status.counter, before.counter
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
+    if status.warning != matches!(status.mode, HANDOVER | FAULT | LOCKED) {
+        return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
+    }
+    if status.warning && !before && !others.iter().any(|frame| frame.id() == bytes::WARNING) {
+        return Err("no warning frame in the cycle of the reaction".into());
+    }
+    Ok(())
+}
+
+/// Least and largest torque that leave the driver in charge.
+pub(super) fn override_bounds(driver_nm: f64) -> (f64, f64) {
+    let bound = |toward: f64| (LIMIT_NM + OVERRIDE_SLOPE * (toward + OVERRIDE_FROM_NM)).clamp(0.0, LIMIT_NM);
+    (-bound(-driver_nm), bound(driver_nm))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptic_core::faults::{Class, Fault};
+
+    /// Bits of the fault word in a guidance frame.
+    const FAULT_BITS: i64 = 21;
+
+    #[test]
+    fn every_fault_of_the_core_has_its_class_here_and_every_other_bit_has_none() {
+        for code in 0..FAULT_BITS {
+            let expected = match Fault::from_code(code).map(Fault::class) {
+                Some(Class::B) => 1,
+                Some(Class::C) => 2,
+                Some(Class::Locked) => 4,
+                _ => 0,
+            };
+            assert_eq!(classes_of(1 << code), expected, "bit {code}");
+        }
+    }
+
+    #[test]
+    fn spare_are_the_bits_without_a_fault() {
+        for code in 0..FAULT_BITS {
+            let word = 1_u64 << (37 + code);
+            let frame = Frame::new(bytes::GUIDANCE, &word.to_le_bytes()).unwrap();
+            let is_spare = Status::of(&frame).spare != 0;
+            assert_eq!(is_spare, Fault::from_code(code).is_none(), "bit {code}");
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! What sensors add to the truth: gains and biases, and a camera that is late, noisy, blind at times, and that may
+//! take another line for the lane's.
+//!
+//! All is off by default, and then nothing is drawn and nothing is changed. The noise has a seed of its own, so that
+//! one more draw here renumbers nothing elsewhere.
+
+use std::collections::VecDeque;
+
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::{STEP_S, STEPS_PER_SECOND};
+use crate::input::{RangeError, in_range};
+
+/// The table `[sensor_errors]` of a scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SensorErrors {
+    /// Bias of the driver torque, N.m.
+    pub torque_bias: f64,
+    /// Gain of the driver torque.
+    pub torque_gain: f64,
+    /// Bias of the wheel angle, deg.
+    pub angle_bias: f64,
+    /// Gain of the speed.
+    pub speed_gain: f64,
+    /// Standard deviation of e_y', m.
+    pub lane_noise: f64,
+    /// Standard deviation of e_theta', mrad.
+    pub heading_noise: f64,
+    /// Bias of e_theta', mrad: the yaw of the camera's mount.
+    pub camera_yaw: f64,
+    /// Time from a picture to its lane errors, s.
+    pub camera_latency: f64,
+    /// Standard deviation of that time, s.
+    pub camera_jitter: f64,
+    /// Dropouts in an hour.
+    pub dropouts: f64,
+    /// How long each lasts, s.
+    pub dropout: f64,
+    /// Changes of the line to one beside it and back in an hour.
+    pub line_jumps: f64,
+    /// How far the other line lies to the left, m.
+    pub line_jump: f64,
+}
+
+impl Default for SensorErrors {
+    fn default() -> Self {
+        Self {
+            torque_bias: 0.0,
+            torque_gain: 1.0,
+            angle_bias: 0.0,
+            speed_gain: 1.0,
+            lane_noise: 0.0,
+            heading_noise: 0.0,
+            camera_yaw: 0.0,
+            camera_latency: 0.0,
+            camera_jitter: 0.0,
+            dropouts: 0.0,
+            dropout: 0.2,
+            line_jumps: 0.0,
+            line_jump: 0.3,
+        }
+    }
+}
+
+impl SensorErrors {
+    /// Whether every value is one that a sensor can have.
+    ///
+    /// # Errors
+    /// The first field out of range, with its value and range.
+    pub fn check(&self) -> Result<(), RangeError> {
+        in_range("torque_bias", self.torque_bias, -2.0..=2.0, "N.m")?;
+        in_range("torque_gain", self.torque_gain, 0.5..=1.5, "")?;
+        in_range("angle_bias", self.angle_bias, -20.0..=20.0, "deg")?;
+        in_range("speed_gain", self.speed_gain, 0.5..=1.5, "")?;
+        in_range("lane_noise", self.lane_noise, 0.0..=1.0, "m")?;
+        in_range("heading_noise", self.heading_noise, 0.0..=50.0, "mrad")?;
+        in_range("camera_yaw", self.camera_yaw, -50.0..=50.0, "mrad")?;
+        in_range("camera_latency", self.camera_latency, 0.0..=0.5, "s")?;
+        in_range("camera_jitter", self.camera_jitter, 0.0..=0.1, "s")?;
+        in_range("dropouts", self.dropouts, 0.0..=3600.0, "1/h")?;
+        in_range("dropout", self.dropout, 0.0..=10.0, "s")?;
+        in_range("line_jumps", self.line_jumps, 0.0..=3600.0, "1/h")?;
+        in_range("line_jump", self.line_jump, -5.0..=5.0, "m")
+    }
+}
+
+/// A picture's lane errors (m, rad) on their way.
+#[derive(Debug, Clone, Copy)]
+struct Picture {
+    due_step: u32,
+    errors: [f64; 2],
+}
+
+/// The camera's errors, with what they remember.
+#[derive(Debug, Clone)]
+pub struct ErringCamera {
+    errors: SensorErrors,
+    on_their_way: VecDeque<Picture>,
+    blind_until: u32,
+    is_on_other_line: bool,
+    last_step: Option<u32>,
+    generator: Xoshiro256PlusPlus,
+}
+
+impl ErringCamera {
+    /// `seed` is of the sensors' stream.
+    pub fn new(errors: SensorErrors, seed: u64) -> Self {
+        Self {
+            errors,
+            on_their_way: VecDeque::new(),
+            blind_until: 0,
+            is_on_other_line: false,
+            last_step: None,
+            generator: Xoshiro256PlusPlus::seed_from_u64(seed),
+        }
+    }
+
+    /// Takes a picture's true errors (e_y' in m, e_theta' in rad) at a step; returns those that arrive then.
+    pub fn see(&mut self, step: u32, [e_y_m, e_theta_rad]: [f64; 2]) -> Option<[f64; 2]> {
+        let errors = self.errors;
+        let since_s = f64::from(step - self.last_step.unwrap_or(step)) * STEP_S;
+        self.last_step = Some(step);
+        if self.happens(errors.dropouts, since_s) {
+            self.blind_until = step + (errors.dropout * f64::from(STEPS_PER_SECOND)) as u32;
+        }
+        if self.happens(errors.line_jumps, since_s) {
+            self.is_on_other_line = !self.is_on_other_line;
+        }
+        let beside_m = if self.is_on_other_line {
+            errors.line_jump
+        } else {
+            0.0
+        };
+        let seen = [
+            e_y_m + beside_m + errors.lane_noise * self.normal(errors.lane_noise),
+            e_theta_rad
+                + 1e-3 * (errors.camera_yaw + errors.heading_noise * self.normal(errors.heading_noise)),
+        ];
+        let late_s = errors.camera_latency + errors.camera_jitter * self.normal(errors.camera_jitter);
+        let late = (late_s.max(0.0) / STEP_S).round() as u32;
+        if step >= self.blind_until {
+            // A picture does not overtake the one before it.
+            let after = self.on_their_way.back().map_or(0, |last| last.due_step);
+            self.on_their_way.push_back(Picture {
+                due_step: (step + late).max(after),
+                errors: seen,
+            });
+        }
+        let mut arrived = None;
+        while let Some(picture) = self.on_their_way.front().filter(|p| p.due_step <= step) {
+            arrived = Some(picture.errors);
+            self.on_their_way.pop_front();
+        }
+        arrived
+    }
+
+    /// Whether something that happens so often in an hour happens in a time.
+    fn happens(&mut self, per_hour: f64, time_s: f64) -> bool {
+        per_hour > 0.0 && self.generator.random::<f64>() < per_hour * time_s / 3600.0
+    }
+
+    /// A draw, but none for what is off.
+    fn normal(&mut self, scale: f64) -> f64 {
+        if scale == 0.0 {
+            return 0.0;
+        }
+        StandardNormal.sample(&mut self.generator)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pictures(errors: SensorErrors, count: u32) -> Vec<Option<[f64; 2]>> {
+        let mut camera = ErringCamera::new(errors, 5);
+        (0..count)
+            .map(|n| camera.see(8 * n, [f64::from(n), 0.1]))
+            .collect()
+    }
+
+    #[test]
+    fn a_camera_without_errors_shows_the_truth() {
+        for (n, seen) in (0_u32..).zip(pictures(SensorErrors::default(), 100)) {
+            assert_eq!(seen, Some([f64::from(n), 0.1]));
+        }
+    }
+
+    #[test]
+    fn a_late_camera_shows_the_truth_of_before() {
+        let errors = SensorErrors {
+            camera_latency: 0.08,
+            ..SensorErrors::default()
+        };
+        let seen = pictures(errors, 100);
+        assert_eq!(seen[..10], [None; 10]);
+        for (n, seen) in (10_u32..).zip(&seen[10..]) {
+            assert_eq!(*seen, Some([f64::from(n - 10), 0.1]));
+        }
+    }
+
+    #[test]
+    fn noise_has_its_spread_and_dropouts_their_number_and_length() {
+        let errors = SensorErrors {
+            lane_noise: 0.03,
+            heading_noise: 2.0,
+            camera_yaw: 1.5,
+            ..SensorErrors::default()
+        };
+        let mut camera = ErringCamera::new(errors, 5);
+        let seen: Vec<_> = (0..40_000)
+            .filter_map(|n| camera.see(8 * n, [0.5, 0.0]))
+            .collect();
+        let moments = |of: fn(&[f64; 2]) -> f64| {
+            let mean = seen.iter().map(of).sum::<f64>() / seen.len() as f64;
+            let square = seen.iter().map(|s| (of(s) - mean).powi(2)).sum::<f64>() / seen.len() as f64;
+            (mean, square.sqrt())
+        };
+        // 40000 draws: means within 4 standard errors, deviations within 2 %.
+        let (lane, heading) = (moments(|s| s[0]), moments(|s| s[1]));
+        assert!(
+            (lane.0 - 0.5).abs() < 6e-4 && (lane.1 / 0.03 - 1.0).abs() < 0.02,
+            "{lane:?}"
+        );
+        assert!(
+            (heading.0 - 1.5e-3).abs() < 4e-5 && (heading.1 / 2e-3 - 1.0).abs() < 0.02,
+            "{heading:?}"
+        );
+
+        let errors = SensorErrors {
+            dropouts: 360.0,
+            dropout: 0.5,
+            ..SensorErrors::default()
+        };
+        // An hour and a bit, with a dropout of 0.5 s every 10 s: 5 % of the pictures are missing.
+        let seen = pictures(errors, 450_000);
+        let missing = seen.iter().filter(|s| s.is_none()).count() as f64 / seen.len() as f64;
+        assert!((missing - 0.048).abs() < 0.01, "{missing}");
+    }
+}

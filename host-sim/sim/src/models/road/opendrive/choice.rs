@@ -1,0 +1,168 @@
+//! Where a course begins in an OpenDRIVE file: the road and the lane that a person chose, or sensible ones.
+
+use super::network::{Leg, Network, Next};
+use super::road::{Lane, Road};
+use crate::input::InputError;
+
+/// Lane types that vehicles drive on beside `driving`, for roads that have no lane of that type.
+const OTHER_DRIVEN: [&str; 9] = [
+    "entry",
+    "exit",
+    "onRamp",
+    "offRamp",
+    "connectingRamp",
+    "slipLane",
+    "bidirectional",
+    "shared",
+    "taxi",
+];
+
+/// Which road of an OpenDRIVE file a course begins on, and in which lane.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct LaneChoice {
+    /// Id of the road; the first of the only chain if not given.
+    pub road: Option<String>,
+    /// Id of the lane where the course begins; the rightmost driving lane in the direction of travel if not given.
+    pub lane: Option<i32>,
+}
+
+impl LaneChoice {
+    /// Only files of OpenDRIVE have roads and lanes to choose from.
+    ///
+    /// # Errors
+    /// A road or a lane is chosen.
+    pub fn check_none(&self, name: &str) -> Result<(), InputError> {
+        if *self == Self::default() {
+            return Ok(());
+        }
+        Err(InputError::new(
+            name,
+            "a road and a lane can only be chosen of an OpenDRIVE file (.xodr)",
+        ))
+    }
+}
+
+/// The first leg and its lane.
+///
+/// # Errors
+/// A road or lane that is not there, or a file that leaves the choice open.
+pub(super) fn start(
+    network: &Network,
+    choice: &LaneChoice,
+    notes: &mut Vec<String>,
+) -> Result<(Leg, i32), String> {
+    if choice.lane == Some(0) {
+        return Err("lane 0 is the centre lane, which has no width".into());
+    }
+    let candidates = match &choice.road {
+        Some(id) => {
+            let road = network.road(id)?;
+            vec![(road, true), (road, false)]
+        }
+        None => chain_ends(network)?,
+    };
+    let mut refusals = Vec::new();
+    for leg in candidates {
+        match lane_on(network, leg, choice.lane) {
+            Ok(lane) => {
+                if choice.road.is_none() || choice.lane.is_none() {
+                    let road = network.roads[leg.0].id;
+                    notes.push(format!("the course begins on road {road} in lane {lane}"));
+                }
+                return Ok((leg, lane));
+            }
+            Err(refusal) => refusals.push(refusal),
+        }
+    }
+    // The candidate in the direction of the road says it best.
+    Err(refusals.swap_remove(0))
+}
+
+/// The legs from which all roads of the file can be driven in one go, those along the road's s first.
+fn chain_ends(network: &Network) -> Result<Vec<Leg>, String> {
+    let mut ends = Vec::new();
+    for along in [true, false] {
+        for index in 0..network.roads.len() {
+            let (legs, _) = network.chain((index, along))?;
+            if legs.len() == network.roads.len() {
+                ends.push((index, along));
+            }
+        }
+    }
+    if ends.is_empty() {
+        let (legs, stuck) = network.chain((0, true))?;
+        return Err(not_one_chain(network, &legs, stuck));
+    }
+    Ok(ends)
+}
+
+fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> String {
+    let list = |ids: Vec<&str>| {
+        let more = if ids.len() > 12 { ", ..." } else { "" };
+        format!("{}{more}", ids[..ids.len().min(12)].join(", "))
+    };
+    if let Some(Next::Junction(junction, roads)) = stuck {
+        return format!(
+            "its roads are not one chain: junction {junction} leads on to {}; choose the road to begin on with \
+             --road",
+            if roads.is_empty() {
+                "no road".into()
+            } else {
+                format!("roads {}", list(roads))
+            }
+        );
+    }
+    let outside = network.roads.iter().enumerate();
+    let outside = outside.filter(|(i, road)| !road.in_junction && chain.iter().all(|(on, _)| on != i));
+    let outside: Vec<&str> = outside.map(|(_, road)| road.id).collect();
+    let first = network.roads[chain[0].0].id;
+    format!(
+        "its {} roads are not one chain: road {first} has no link to roads {}; choose the road to begin on with \
+         --road",
+        network.roads.len(),
+        list(outside)
+    )
+}
+
+/// The lane to begin in on a leg: the one asked for, if it is driven in that direction, or the rightmost.
+fn lane_on(network: &Network, (index, along): Leg, lane: Option<i32>) -> Result<i32, String> {
+    let node = &network.roads[index];
+    let road = Road::read(node.id, node.node)?;
+    // The side that is driven along s.
+    let along_side = if node.left_hand { 1 } else { -1 };
+    let is_driven_so = |lane: &Lane| (lane.id.signum() == along_side) != lane.is_reversed();
+    let sections = road.sections(lane.unwrap_or(if along { along_side } else { -along_side }))?;
+    let section = if along {
+        &sections[0]
+    } else {
+        &sections[sections.len() - 1]
+    };
+    if let Some(id) = lane {
+        let found = section.need(node.id, id)?;
+        if is_driven_so(&found) == along {
+            return Ok(id);
+        }
+        let against = if along { "against" } else { "along" };
+        return Err(format!(
+            "road {}: lane {id} is driven {against} the road's s there",
+            node.id
+        ));
+    }
+    let of_types = |types: &[&str]| {
+        let lanes = section.lanes();
+        let lanes = lanes.filter(|lane| types.contains(&lane.kind()) && is_driven_so(lane) == along);
+        // To the right is a smaller id, seen along s.
+        lanes
+            .map(|lane| lane.id)
+            .min_by_key(|id| if along { *id } else { -*id })
+    };
+    of_types(&["driving"])
+        .or_else(|| of_types(&OTHER_DRIVEN))
+        .ok_or_else(|| {
+            let direction = if along { "along" } else { "against" };
+            format!(
+                "road {}: it has no driving lane {direction} its s; choose one with --lane",
+                node.id
+            )
+        })
+}

@@ -1,0 +1,185 @@
+//! Which road follows which: links between roads, and the ways through junctions.
+
+use std::collections::HashMap;
+
+use roxmltree::Node;
+
+use super::xml::{child, children, text};
+
+/// A road and the direction in which it is driven: along its s or against it.
+pub(super) type Leg = (usize, bool);
+
+/// The roads of a file by their links, their insides unread.
+pub(super) struct Network<'a> {
+    pub(super) roads: Vec<RoadNode<'a>>,
+    by_id: HashMap<&'a str, usize>,
+    junctions: HashMap<&'a str, Node<'a, 'a>>,
+}
+
+/// A road in the network.
+pub(super) struct RoadNode<'a> {
+    pub(super) id: &'a str,
+    pub(super) node: Node<'a, 'a>,
+    pub(super) left_hand: bool,
+    pub(super) in_junction: bool,
+}
+
+/// What comes after a road.
+#[derive(Debug)]
+pub(super) enum Next<'a> {
+    /// The road ends.
+    End,
+    /// A road; the link of the lane says which lane.
+    Road(Leg),
+    /// A way through a junction, and which lane it gives to ours, if it says so.
+    Connection(Leg, Option<i32>),
+    /// A junction that leads on to none or to several roads.
+    Junction(&'a str, Vec<&'a str>),
+}
+
+impl<'a> Network<'a> {
+    /// # Errors
+    /// A road without an identifier, or two with the same one; no road at all.
+    pub(super) fn read(root: Node<'a, 'a>) -> Result<Self, String> {
+        let (mut roads, mut by_id) = (Vec::new(), HashMap::new());
+        for node in children(root, "road") {
+            let id = text(node, "id").ok_or("a <road> has no `id`")?;
+            if by_id.insert(id, roads.len()).is_some() {
+                return Err(format!("two roads have the id {id}"));
+            }
+            roads.push(RoadNode {
+                id,
+                node,
+                left_hand: text(node, "rule") == Some("LHT"),
+                in_junction: !matches!(text(node, "junction"), None | Some("-1" | "")),
+            });
+        }
+        if roads.is_empty() {
+            return Err("it has no <road>".into());
+        }
+        let junctions = children(root, "junction").filter_map(|node| Some((text(node, "id")?, node)));
+        Ok(Self {
+            junctions: junctions.collect(),
+            roads,
+            by_id,
+        })
+    }
+
+    pub(super) fn road(&self, id: &str) -> Result<usize, String> {
+        let listed = || {
+            self.roads
+                .iter()
+                .map(|road| road.id)
+                .take(20)
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        let found = self.by_id.get(id).copied();
+        found.ok_or_else(|| format!("it has no road {id}; it has {}", listed()))
+    }
+
+    /// What comes after a leg, for a lane of it if one is given.
+    ///
+    /// # Errors
+    /// A link to a road or junction that is not in the file.
+    pub(super) fn next(&self, (road, along): Leg, lane: Option<i32>) -> Result<Next<'a>, String> {
+        let RoadNode { id, node, .. } = self.roads[road];
+        let side = if along { "successor" } else { "predecessor" };
+        let Some(link) = child(node, "link").and_then(|link| child(link, side)) else {
+            return Ok(Next::End);
+        };
+        let Some(target) = text(link, "elementId").filter(|target| !target.is_empty()) else {
+            return Err(format!("road {id}: its {side} has no `elementId`"));
+        };
+        if text(link, "elementType") == Some("junction") {
+            let junction = self.junctions.get(target);
+            let missing = || format!("road {id}: its {side} is junction {target}, which is not in the file");
+            return self.through(target, *junction.ok_or_else(missing)?, (road, along), lane);
+        }
+        let Some(&target_road) = self.by_id.get(target) else {
+            return Err(format!(
+                "road {id}: its {side} is road {target}, which is not in the file"
+            ));
+        };
+        let at_start = match text(link, "contactPoint") {
+            Some("start") => true,
+            Some("end") => false,
+            Some(other) => {
+                return Err(format!(
+                    "road {id}: contactPoint=\"{other}\" of its {side} is neither start nor end"
+                ));
+            }
+            // Left out: a road is met where its own link says that it meets this one, or as most are.
+            None => match (
+                self.links_to(target_road, "predecessor", id),
+                self.links_to(target_road, "successor", id),
+            ) {
+                (false, true) => false,
+                (true, false) => true,
+                _ => along,
+            },
+        };
+        Ok(Next::Road((target_road, at_start)))
+    }
+
+    fn links_to(&self, road: usize, side: &'static str, id: &str) -> bool {
+        let link = child(self.roads[road].node, "link").and_then(|link| child(link, side));
+        link.is_some_and(|link| text(link, "elementId") == Some(id))
+    }
+
+    /// The way through a junction, if there is one only.
+    fn through(
+        &self,
+        junction: &'a str,
+        node: Node<'a, 'a>,
+        (road, along): Leg,
+        lane: Option<i32>,
+    ) -> Result<Next<'a>, String> {
+        let id = self.roads[road].id;
+        let mut ways: Vec<(Leg, Option<i32>)> = Vec::new();
+        for connection in children(node, "connection").filter(|c| text(*c, "incomingRoad") == Some(id)) {
+            // A direct junction links roads themselves.
+            let to = text(connection, "connectingRoad").or(text(connection, "linkedRoad"));
+            let Some(to) = to else { continue };
+            let Some(&target) = self.by_id.get(to) else {
+                return Err(format!(
+                    "junction {junction}: connecting road {to} is not in the file"
+                ));
+            };
+            let at_start = text(connection, "contactPoint") != Some("end");
+            let pairs: Vec<[i32; 2]> = children(connection, "laneLink")
+                .filter_map(|link| Some([text(link, "from")?.parse().ok()?, text(link, "to")?.parse().ok()?]))
+                .collect();
+            let ours = pairs
+                .iter()
+                .find(|[from, _]| Some(*from) == lane)
+                .map(|[_, to]| *to);
+            if lane.is_none() || pairs.is_empty() || ours.is_some() {
+                let straight = lane.map(|lane| if at_start == along { lane } else { -lane });
+                ways.push(((target, at_start), ours.or(straight)));
+            }
+        }
+        match ways[..] {
+            [(leg, lane)] => Ok(Next::Connection(leg, lane)),
+            _ => {
+                let roads = ways.iter().map(|((road, _), _)| self.roads[*road].id).collect();
+                Ok(Next::Junction(junction, roads))
+            }
+        }
+    }
+
+    /// The legs from one on, for as long as there is one way only; a ring ends where it began.
+    pub(super) fn chain(&self, start: Leg) -> Result<(Vec<Leg>, Option<Next<'a>>), String> {
+        let mut legs = vec![start];
+        loop {
+            let next = self.next(legs[legs.len() - 1], None)?;
+            match next {
+                Next::Road(leg) | Next::Connection(leg, _) if legs.iter().all(|(road, _)| *road != leg.0) => {
+                    legs.push(leg);
+                }
+                Next::Junction(..) => return Ok((legs, Some(next))),
+                Next::End | Next::Road(_) | Next::Connection(..) => return Ok((legs, None)),
+            }
+        }
+    }
+}

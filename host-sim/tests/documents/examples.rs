@@ -1,0 +1,260 @@
+//! The examples of the documents run.
+//!
+//! The first word behind the three backticks is the language. What follows says what the example needs:
+//!
+//! - `sh`: every command runs, in a directory of the document's own with the repository's files in it. `exit=N` is the
+//!   exit code to expect. `cargo`: a test or a tool of the workspace that CI runs elsewhere; what it names has to be
+//!   there. `hardware`: a board, QEMU or another program is needed; the command and its options have to be known.
+//!   `setup` installs something and is not run.
+//! - `toml file=NAME`, written there before the commands run. - `python` runs behind the commands before it;
+//!   `python hardware` only has to be Python.
+//! - `rust` runs as a doctest of `host-sim`. `rust file=PATH` and `python file=PATH` are a part of that file.
+//! - `text output`: lines that the commands before it printed; how many blanks lie between words does not matter.
+//! - `text`, `mermaid` and blocks without a word are not for running.
+//!
+//! Commands that take long run shorter here: [`SHORTER`].
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::{documents, place, root, run};
+
+/// What a reader waits for and a test does not.
+const SHORTER: [(&str, &str); 4] = [
+    ("--seeds 20", "--seeds 1"),
+    ("--repetitions 200", "--repetitions 1"),
+    ("-- experiment --probe", "-- experiment --participants 3 --probe"),
+    ("-- reliance", "-- reliance --participants 3 --seeds 1"),
+];
+
+/// A fenced block: its first line without the backticks, and its text.
+struct Block {
+    line: usize,
+    info: String,
+    text: String,
+}
+
+impl Block {
+    fn language(&self) -> &str {
+        self.info.split_whitespace().next().unwrap_or("")
+    }
+
+    fn has(&self, word: &str) -> bool {
+        self.info.split_whitespace().any(|w| w == word)
+    }
+
+    fn value(&self, key: &str) -> Option<&str> {
+        self.info
+            .split_whitespace()
+            .find_map(|w| w.strip_prefix(key)?.strip_prefix('='))
+    }
+}
+
+fn blocks(text: &str) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let mut open: Option<(Block, usize)> = None;
+    for (number, line) in text.lines().enumerate() {
+        let indent = line.len() - line.trim_start().len();
+        match (&mut open, line.trim_start().strip_prefix("```")) {
+            (None, Some(info)) => {
+                let (line, info) = (number + 1, info.trim().to_owned());
+                let text = String::new();
+                open = Some((Block { line, info, text }, indent));
+            }
+            (Some(_), Some("")) => blocks.extend(open.take().map(|(block, _)| block)),
+            (Some((block, indent)), _) => {
+                // A block in a list is indented as the list is.
+                block.text.push_str(line.get(*indent..).unwrap_or(""));
+                block.text.push('\n');
+            }
+            (None, None) => {}
+        }
+    }
+    assert!(open.is_none(), "a block without an end");
+    blocks
+}
+
+/// Words of a command line; `>` and what follows it stay words.
+fn words(command: &str) -> Vec<&str> {
+    let command = command.split(" # ").next().unwrap_or("");
+    command.split_whitespace().collect()
+}
+
+/// Runs one line of an `sh` block; what it printed.
+fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
+    let shorter = SHORTER
+        .iter()
+        .fold(line.to_owned(), |line, (long, short)| line.replace(long, short));
+    let all = words(&shorter);
+    let (all, into) = match all.iter().position(|w| *w == ">") {
+        Some(k) => (&all[..k], Some(all[k + 1])),
+        None => (&all[..], None),
+    };
+    let at = format!("{at}: {line}");
+    let (code, out, err) = match all {
+        ["cargo", "run", "--release", "-p", package, "--example", example] => {
+            let mut cargo = Command::new(env!("CARGO"));
+            cargo.args(["run", "--quiet", "--package", package, "--example", example]);
+            cargo.arg("--manifest-path").arg(root().join("Cargo.toml"));
+            run(&mut cargo, place, &at)
+        }
+        ["cargo", "run", "--release", rest @ ..] => {
+            let arguments = rest.strip_prefix(&["--"]).unwrap_or(rest);
+            let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+            if block.has("hardware") {
+                let known = knows(arguments, &mut program, place, &at);
+                assert!(known, "{at}: an option is not known");
+                return String::new();
+            }
+            run(program.args(arguments), place, &at)
+        }
+        ["python3", ..] => {
+            let script = shorter.split(" > ").next().unwrap_or("");
+            run(Command::new("sh").args(["-c", script]), place, &at)
+        }
+        _ => panic!("{at}: not a command that this test can check; mark the block"),
+    };
+    let expected = block.value("exit").map_or(0, |code| code.parse().unwrap());
+    assert_eq!(code, Some(expected), "{at}\n{err}");
+    if let Some(file) = into {
+        std::fs::write(place.join(file), &out).unwrap();
+    }
+    out + &err
+}
+
+/// Whether a command's help has the options that the line names.
+fn knows(arguments: &[&str], program: &mut Command, place: &Path, at: &str) -> bool {
+    let command = arguments.first().filter(|w| !w.starts_with('-'));
+    let (code, help, err) = run(program.args(command).arg("--help"), place, at);
+    assert_eq!(code, Some(0), "{at}\n{err}");
+    let mut options = arguments.iter().filter(|w| w.starts_with("--"));
+    options.all(|option| help.contains(*option))
+}
+
+/// What a `cargo` line names has to be there: an alias, a package, a test.
+fn exists(line: &str, at: &str) {
+    let all = words(line);
+    let at = format!("{at}: {line}");
+    match all[..] {
+        ["cargo", "xtask", command, ..] => {
+            let main = std::fs::read_to_string(root().join("xtask/src/main.rs")).unwrap();
+            let variant = command[..1].to_uppercase() + &command[1..];
+            let commands = main.split("enum Command {").nth(1).unwrap();
+            let known = commands.lines().any(|l| {
+                let name = l.trim_start().split(['(', ',', ' ']).next();
+                name == Some(variant.as_str())
+            });
+            assert!(known, "{at}: no such command of xtask");
+        }
+        ["cargo", "test", ref rest @ ..] => {
+            let package = rest
+                .iter()
+                .position(|w| *w == "-p")
+                .map_or("haptic-guidance", |k| rest[k + 1]);
+            let folder = package_folder(package, &at);
+            for k in (0..rest.len()).filter(|k| rest[*k] == "--test") {
+                let file = folder.join("tests").join(rest[k + 1]).with_extension("rs");
+                assert!(file.exists(), "{at}: {} is not there", file.display());
+            }
+        }
+        ["cargo", "run", "--release", ..] => {}
+        _ => panic!("{at}: not a command that this test knows"),
+    }
+}
+
+fn package_folder(package: &str, at: &str) -> PathBuf {
+    let mut folders = vec![root()];
+    for top in ["core", "firmware", "host-sim", "xtask", "bindings"] {
+        folders.push(root().join(top));
+        let entries = std::fs::read_dir(root().join(top)).into_iter().flatten();
+        folders.extend(
+            entries
+                .map(|entry| entry.unwrap().path())
+                .filter(|path| path.is_dir()),
+        );
+    }
+    let name = format!("name = \"{package}\"");
+    let named = |folder: &PathBuf| {
+        let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
+        manifest.lines().any(|line| line == name)
+    };
+    let found = folders.into_iter().find(named);
+    found.unwrap_or_else(|| panic!("{at}: no package {package}"))
+}
+
+fn python(block: &Block, place: &Path, at: &str) {
+    let script = place.join("example.py");
+    std::fs::write(&script, &block.text).unwrap();
+    let mut python = Command::new("python3");
+    if block.has("hardware") {
+        python.args(["-m", "py_compile"]);
+    }
+    let (code, _, err) = run(python.arg(&script), place, "python3 (Debian package python3)");
+    assert_eq!(code, Some(0), "{at}\n{err}");
+}
+
+/// Words with one blank between them.
+fn evenly(line: &str) -> String {
+    line.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Runs the examples of one document in their order.
+fn run_examples(name: &Path, text: &str) {
+    let place = place();
+    let mut seen = 0;
+    let mut printed = Vec::new();
+    for block in blocks(text) {
+        let at = format!("{}:{}", name.display(), block.line);
+        match block.language() {
+            "toml" => {
+                let file = block
+                    .value("file")
+                    .unwrap_or_else(|| panic!("{at}: give it a file's name"));
+                std::fs::write(place.path().join(file), &block.text).unwrap();
+            }
+            "sh" => {
+                for line in block.text.lines().filter(|line| !words(line).is_empty()) {
+                    if block.has("setup") {
+                        continue;
+                    } else if block.has("cargo") || line.starts_with("cargo xtask") {
+                        exists(line, &at);
+                    } else {
+                        let text = run_line(line, &block, place.path(), &at);
+                        printed.extend(text.lines().map(evenly));
+                    }
+                    seen += 1;
+                }
+            }
+            "python" | "rust" if block.value("file").is_some() => {
+                let file = block.value("file").unwrap_or_default();
+                let source = std::fs::read_to_string(root().join(file)).unwrap();
+                assert!(source.contains(&block.text), "{at}: {file} has other lines");
+            }
+            "python" => python(&block, place.path(), &at),
+            "rust" => {
+                let lib = include_str!("../../src/lib.rs");
+                let shown = format!("include_str!(\"../../{}\")", name.display());
+                assert!(lib.contains(&shown), "{at}: host-sim/src/lib.rs does not run it");
+            }
+            "text" if block.has("output") => {
+                for line in block.text.lines().map(evenly) {
+                    assert!(printed.contains(&line), "{at}: nothing printed {line:?}");
+                }
+            }
+            "text" | "mermaid" | "" => {}
+            other => panic!("{at}: nobody runs {other}"),
+        }
+    }
+    println!("{}: {seen} commands", name.display());
+}
+
+#[test]
+fn the_examples_of_every_document_run() {
+    // A panic in a document's thread is passed on when all have ended, so that one run names every wrong example.
+    let documents = documents();
+    std::thread::scope(|scope| {
+        for (name, text) in &documents {
+            scope.spawn(move || run_examples(name, text));
+        }
+    });
+}

@@ -1,0 +1,110 @@
+//! What commands print and tools measured is what the documents say.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use super::{documents, place, root, run};
+
+/// Every command of the program has its row in the reference.
+#[test]
+fn the_reference_names_every_command() {
+    let place = place();
+    let (_, help, _) = run(
+        Command::new(env!("CARGO_BIN_EXE_host-sim")).arg("--help"),
+        place.path(),
+        "--help",
+    );
+    let commands = help
+        .split("Commands:\n")
+        .nth(1)
+        .unwrap()
+        .split("\n\n")
+        .next()
+        .unwrap();
+    let names: Vec<_> = commands
+        .lines()
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .collect();
+    assert!(names.len() > 9, "{names:?}");
+    let reference = std::fs::read_to_string(root().join("docs/reference/commands.md")).unwrap();
+    for name in names {
+        let [row, row_with_arguments] = [format!("\n| `{name}`"), format!("\n| `{name} ")];
+        let named = reference.contains(&row) || reference.contains(&row_with_arguments);
+        assert!(named, "docs/reference/commands.md: no row for {name}");
+    }
+}
+
+/// A number of the goldens with thousands set apart, as documents write it.
+fn golden(name: &str) -> String {
+    let text = std::fs::read_to_string(root().join("xtask/golden.json")).unwrap();
+    let goldens: BTreeMap<String, u64> = serde_json::from_str(&text).unwrap();
+    let digits = goldens[name].to_string();
+    let groups = digits.as_bytes().rchunks(3).rev();
+    let groups: Vec<_> = groups
+        .map(|group| String::from_utf8_lossy(group).into_owned())
+        .collect();
+    groups.join(",")
+}
+
+/// What `cargo xtask` measured and keeps is what the documents say.
+#[test]
+fn instruction_counts_in_documents_are_those_of_the_goldens() {
+    let documents = documents();
+    let has = |name: &str, sentence: String| {
+        let text = documents[Path::new(name)].replace('\n', " ");
+        assert!(text.contains(&sentence), "{name} should say: {sentence}");
+    };
+    let porting = "docs/porting.md";
+    let share = |count: &str| {
+        let count: f64 = count.replace(',', "").parse().unwrap();
+        // Two cycles an instruction, 170,000 cycles in a tick.
+        format!("{:.1} %", 2.0 * count / 170e3 * 100.0)
+    };
+    for (row, key) in [
+        ("mean", "mps2-an386 mean step"),
+        ("worst", "mps2-an386 worst step"),
+    ] {
+        let count = golden(key);
+        has(porting, format!("| {row} | {count} | {} |", share(&count)));
+    }
+    let worst: f64 = golden("mps2-an386 worst step").replace(',', "").parse().unwrap();
+    let slower = 2.0 * worst / 120e3 * 100.0;
+    has(
+        porting,
+        format!("At the SAM E54's 120 MHz the worst step is {slower:.1} % of a tick."),
+    );
+    let background = golden("mps2-an386 worst background step");
+    has(
+        "docs/numerics.md",
+        format!("at most {background} instructions on the target"),
+    );
+    let per_ms = golden("host_simulated_second")
+        .replace(',', "")
+        .parse::<f64>()
+        .unwrap()
+        / 1000.0;
+    let thousands = format!("{},{:03}", per_ms as u64 / 1000, per_ms as u64 % 1000);
+    has(
+        "docs/numerics.md",
+        format!("A simulated millisecond takes {thousands} instructions."),
+    );
+    has(
+        "docs/numerics.md",
+        format!("The ECU's step takes {} of them.", golden("host_step_mean")),
+    );
+}
+
+#[test]
+fn the_load_of_the_bus_in_the_design_is_what_the_command_prints() {
+    let place = place();
+    let mut bus = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    let (_, out, err) = run(bus.args(["bus", "--json"]), place.path(), "host-sim bus");
+    let load: serde_json::Value = serde_json::from_str(&out).expect(&err);
+    let percent = |name: &str| format!("{:.0} %", 100.0 * load[name].as_f64().unwrap());
+    let sentence = format!(": {}, of {} allowed.", percent("load"), percent("max_load"));
+    let design = &documents()[Path::new("docs/design.md")];
+    assert!(design.contains(&sentence), "docs/design.md should say{sentence}");
+}

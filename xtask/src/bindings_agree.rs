@@ -1,0 +1,88 @@
+//! The controller behind every door, on the bus of one whole run: the frames that it sends must be the same bits.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::Stdio;
+
+use anyhow::{Context, Result, bail};
+
+use crate::tool::{cargo, command, output, root, run};
+use crate::{c_library, wheel};
+
+const SCENARIO: &str = "examples/relying-driver.toml";
+/// Identifiers of what the ECU hears from the camera, the column, the vehicle and the host.
+const INPUTS: [&str; 4] = ["100", "110", "120", "130"];
+
+/// Prints the table, and fails where a door sends another bit.
+pub(crate) fn check() -> Result<()> {
+    let out = root().join("target/bindings-agree");
+    run(cargo()
+        .args([
+            "run",
+            "-q",
+            "--release",
+            "-p",
+            "host-sim",
+            "--",
+            "run",
+            SCENARIO,
+            "--bus-log",
+            "--out",
+        ])
+        .arg(&out)
+        .stdout(Stdio::null()))?;
+    let bus = read(&out.join("bus.log"))?;
+    let expected: Vec<&str> = bus.lines().filter(|line| !is_input(line)).collect();
+    let python = wheel::python()?;
+    let mut in_python = command(&python.to_string_lossy());
+    in_python.arg("bindings/python/replay.py");
+    let in_c = command(&c_library::replay()?.to_string_lossy());
+    println!("{SCENARIO}, frames that the controller sent\n");
+    println!("{:<20} {:>9} {:>9}", "door", "frames", "differing");
+    println!("{:<20} {:>9} {:>9}", "command line", expected.len(), "-");
+    let mut differing = Vec::new();
+    for (door, mut program) in [("Python", in_python), ("C", in_c)] {
+        let sent = replayed(&mut program, &bus)?;
+        let sent: Vec<&str> = sent.lines().collect();
+        let same = sent.iter().zip(&expected).filter(|(a, b)| a == b).count();
+        let wrong = sent.len().max(expected.len()) - same;
+        println!("{door:<20} {:>9} {wrong:>9}", sent.len());
+        if wrong > 0 {
+            differing.push(door);
+        }
+    }
+    if expected.is_empty() || !differing.is_empty() {
+        bail!("not the same bits: {}", differing.join(", "));
+    }
+    Ok(())
+}
+
+fn is_input(line: &str) -> bool {
+    line.split(' ').nth(1).is_some_and(|id| INPUTS.contains(&id))
+}
+
+/// A log of candump as lines of `t_us id data`.
+fn read(log: &Path) -> Result<String> {
+    let text = std::fs::read_to_string(log).with_context(|| log.display().to_string())?;
+    let mut lines = String::new();
+    for line in text.lines() {
+        let parts: Vec<&str> = line.split(' ').collect();
+        let [time, _, frame] = parts[..] else {
+            bail!("{}: {line:?} is no line of candump -L", log.display());
+        };
+        let seconds: f64 = time.trim_matches(['(', ')']).parse()?;
+        let (id, data) = frame.split_once('#').context("a frame without #")?;
+        writeln!(lines, "{} {id} {data}", (seconds * 1e6).round() as u64)?;
+    }
+    Ok(lines)
+}
+
+/// What a program answers to the bus on its standard input.
+fn replayed(program: &mut std::process::Command, bus: &str) -> Result<String> {
+    // From a file, so that neither side waits for the other.
+    let mut file = std::fs::File::create(root().join("target/bindings-agree/bus.txt"))?;
+    file.write_all(bus.as_bytes())?;
+    let file = std::fs::File::open(root().join("target/bindings-agree/bus.txt"))?;
+    output(program.stdin(Stdio::from(file)))
+}

@@ -1,0 +1,126 @@
+//! The C library: built for the host and for a Cortex-M4F, its header held to C99 and C++, its example run on both.
+
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use anyhow::{Context, Result, bail};
+
+use crate::image::M4F;
+use crate::tool::{cargo, command, ensure, output, root, run};
+
+const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-pedantic"];
+const CORTEX_M4F: [&str; 4] = [
+    "-mcpu=cortex-m4",
+    "-mthumb",
+    "-mfloat-abi=hard",
+    "-mfpu=fpv4-sp-d16",
+];
+/// What the host's standard library, which the archive holds, asks for.
+const HOST_LIBRARIES: [&str; 4] = ["-lpthread", "-ldl", "-lm", "-lgcc_s"];
+
+/// Builds everything into `target/dist/c`, and compares the example's words on host and target.
+pub(crate) fn check() -> Result<()> {
+    ensure(&[
+        ("gcc", "gcc"),
+        ("g++", "g++"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+        ("qemu-system-arm", "qemu-system-arm"),
+    ])?;
+    let dist = root().join("target/dist/c");
+    std::fs::create_dir_all(&dist).with_context(|| dist.display().to_string())?;
+    std::fs::copy(
+        root().join("bindings/c/include/haptic_guidance.h"),
+        dist.join("haptic_guidance.h"),
+    )?;
+    let host = library(&dist, None)?;
+    let target = library(&dist, Some(M4F))?;
+    header()?;
+    let native = output(&mut command(&example(&dist, "main", &host)?.to_string_lossy()))?;
+    print!("{native}");
+    let image = image(&dist, &target)?;
+    let in_qemu = output(
+        command("qemu-system-arm")
+            .args([
+                "-M",
+                "mps2-an386",
+                "-nographic",
+                "-semihosting-config",
+                "enable=on,target=native",
+            ])
+            .arg("-kernel")
+            .arg(&image)
+            .stdin(Stdio::null()),
+    )?;
+    if in_qemu.replace('\r', "") != native {
+        bail!("in QEMU the example says something else:\n{in_qemu}");
+    }
+    println!("The same in QEMU on a Cortex-M4F, linked without a panic handler of its own");
+    Ok(())
+}
+
+/// The static library of a target, put where users look.
+fn library(dist: &Path, target: Option<&str>) -> Result<PathBuf> {
+    let mut build = cargo();
+    build.args(["build", "--release", "-p", "haptic-c"]);
+    let mut built = root().join("target");
+    if let Some(target) = target {
+        build.args(["--target", target]);
+        built.push(target);
+    }
+    run(&mut build)?;
+    let folder = dist.join(target.unwrap_or("host"));
+    std::fs::create_dir_all(&folder)?;
+    let library = folder.join("libhaptic_guidance.a");
+    std::fs::copy(built.join("release/libhaptic_guidance.a"), &library)?;
+    Ok(library)
+}
+
+/// The header alone, in both languages.
+fn header() -> Result<()> {
+    for (compiler, standard, language) in [("gcc", "-std=c99", "c"), ("g++", "-std=c++11", "c++")] {
+        run(command(compiler)
+            .args([standard, "-x", language, "-fsyntax-only"])
+            .args(WARNINGS)
+            .arg("bindings/c/include/haptic_guidance.h"))?;
+    }
+    println!("The header passes {} as C99 and as C++", WARNINGS.join(" "));
+    Ok(())
+}
+
+/// An example of `examples/c`, for the host.
+pub(crate) fn example(dist: &Path, name: &str, library: &Path) -> Result<PathBuf> {
+    let program = dist.join(name);
+    run(command("gcc")
+        .args(["-std=c99", "-O2", "-Ibindings/c/include"])
+        .args(WARNINGS)
+        .arg(format!("examples/c/{name}.c"))
+        .arg(library)
+        .args(HOST_LIBRARIES)
+        .arg("-o")
+        .arg(&program))?;
+    Ok(program)
+}
+
+/// The host's library and the replaying example.
+pub(crate) fn replay() -> Result<PathBuf> {
+    let dist = root().join("target/dist/c");
+    std::fs::create_dir_all(&dist)?;
+    let library = library(&dist, None)?;
+    example(&dist, "replay", &library)
+}
+
+/// The example for QEMU's board; what it prints goes through semihosting.
+fn image(dist: &Path, library: &Path) -> Result<PathBuf> {
+    let image = dist.join("main.elf");
+    run(command("arm-none-eabi-gcc")
+        .args(CORTEX_M4F)
+        .args(["-std=c99", "-O2", "-Ibindings/c/include", "--specs=rdimon.specs"])
+        .args(["-Wl,--gc-sections", "-Tbindings/c/mps2.ld"])
+        .args(WARNINGS)
+        .args(["examples/c/main.c", "bindings/c/mps2_start.c"])
+        .arg(library)
+        .arg("-o")
+        .arg(&image))?;
+    Ok(image)
+}
