@@ -63,6 +63,7 @@ pub fn unlock(in_use: u32) -> Frame {
 
 /// The value that is due at a turn, of the set in use.
 #[must_use]
+#[expect(clippy::as_conversions, reason = "fewer than 256 values; the bus carries f32")]
 pub fn value(params: &Params, turn: u32) -> Option<ParameterValue> {
     let index = turn.checked_rem(VALUES as u32)?;
     let value = params.to_values().get(index as usize).copied()?;

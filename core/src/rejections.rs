@@ -31,6 +31,7 @@ impl Rejections {
     };
 
     /// Counts one. An identifier that is none of the bus's is not counted: nobody rejects it.
+    #[expect(clippy::as_conversions, reason = "the code of a variant")]
     pub fn count(&mut self, id: u16, reason: Reject) {
         let message = MESSAGES.iter().position(|message| message.id == id);
         let place = message.map(|message| message.saturating_mul(REASONS).saturating_add(reason as usize));

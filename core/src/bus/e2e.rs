@@ -124,6 +124,7 @@ impl Reject {
 
     /// The reason of a code on the bus.
     #[must_use]
+    #[expect(clippy::as_conversions, reason = "the code of a variant")]
     pub fn from_code(code: i64) -> Option<Self> {
         Self::ALL
             .into_iter()

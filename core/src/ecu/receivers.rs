@@ -213,11 +213,8 @@ impl Receivers {
                 Ok(())
             }),
             ColumnMessage::ID => self.column.change(|slot| {
-                // The longer ago the last one, the more may have been lost: at once no more than three, so that few of
-                // the sixteen counters let an old frame pass.
-                let since = now.since(slot.at).us() / COLUMN_PERIOD_US;
-                let window = since.saturating_add(u32::from(ColumnMessage::MAX_DELTA)).min(14);
-                let c = ColumnMessage::decode_within(&mut slot.e2e, frame, window as u8)?;
+                let c =
+                    ColumnMessage::decode_within(&mut slot.e2e, frame, column_window(now.since(slot.at)))?;
                 let column = Column {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
@@ -302,4 +299,14 @@ impl Receivers {
             faults,
         })
     }
+}
+
+/// The step of the column's counter that may have been lost in a silence. The longer it lasted, the more: at once no more
+/// than three, so that few of the sixteen counters let an old frame pass.
+#[expect(clippy::as_conversions, reason = "at most 14")]
+fn column_window(silence: Micros) -> u8 {
+    let periods = silence.us() / COLUMN_PERIOD_US;
+    periods
+        .saturating_add(u32::from(ColumnMessage::MAX_DELTA))
+        .min(14) as u8
 }

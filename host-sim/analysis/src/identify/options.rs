@@ -216,7 +216,7 @@ impl Options {
         for i in 0..from.len().max(to.len()) {
             let begin = from.get(i).copied().unwrap_or(f64::NEG_INFINITY);
             let end = to.get(i).copied().unwrap_or(f64::INFINITY);
-            if !(begin < end) {
+            if begin.is_nan() || end.is_nan() || begin >= end {
                 return Err(FixError(format!(
                     "--from {begin} --to {end}: the end is not after the beginning"
                 )));

@@ -41,6 +41,10 @@ const INDEPENDENT_ENOUGH: f64 = 7.0;
 const ALL_BUT_PERFECT: f64 = 98.0;
 
 /// What the balance of torques on the column refutes.
+#[expect(
+    clippy::too_many_lines,
+    reason = "one finding after the other, in the order of their precedence"
+)]
 pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
     let mut out = Vec::new();
     if b.explained < BALANCE_SEEN {

@@ -85,7 +85,7 @@ impl Problem<'_> {
         let full = self.sums::<COUNT>(p);
         [K_NMS, T_NMS, H_LATE, D_LATE]
             .into_iter()
-            .filter(|&x| !self.is_free(x) && !(x == H_LATE && p[K_HG] == 0.0))
+            .filter(|&x| !(self.is_free(x) || x == H_LATE && p[K_HG] == 0.0))
             .filter_map(|place| freed(&full, free, place, variance))
             .collect()
     }
@@ -102,7 +102,8 @@ fn freed(full: &Quadratic, free: &[usize], place: usize, variance: f64) -> Optio
     });
     let follow = &inverse * &mixed;
     let curvature = full.hessian[(place, place)] - mixed.dot(&follow);
-    if !(curvature > 1e-9 * full.hessian[(place, place)]) || !follow.iter().all(|x| x.is_finite()) {
+    let least = 1e-9 * full.hessian[(place, place)];
+    if curvature.is_nan() || curvature <= least || !follow.iter().all(|x| x.is_finite()) {
         return None;
     }
     let score = full.gradient[place] - follow.dot(&full.gradient);

@@ -29,6 +29,10 @@ const TRIMMED_AT_MOST: f64 = 3.0;
 const TRIMMED_SHARE: f64 = 0.01;
 
 impl Problem<'_> {
+    #[expect(
+        clippy::too_many_lines,
+        reason = "one value with many fields, each from what stands above it"
+    )]
     pub(super) fn report(
         &self,
         prepared: &Prepared,

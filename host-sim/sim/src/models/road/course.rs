@@ -170,7 +170,7 @@ impl Course {
         }
     }
 
-    pub(super) fn from_roads(self, roads: Vec<RoadUsed>, notes: Vec<String>) -> Self {
+    pub(super) fn with_roads(self, roads: Vec<RoadUsed>, notes: Vec<String>) -> Self {
         Self { roads, notes, ..self }
     }
 

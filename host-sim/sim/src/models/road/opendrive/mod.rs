@@ -86,7 +86,7 @@ pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course
         Some((lane_width_m, exact)) => Course::of_segments(name, lane_width_m, exact),
         None => Course::of_pieces(name, pieces, segments),
     };
-    Ok(course.from_roads(roads, notes))
+    Ok(course.with_roads(roads, notes))
 }
 
 /// A course in the making: where it has come to.
