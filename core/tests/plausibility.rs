@@ -76,7 +76,10 @@ fn wanted(course: Course, t: f64) -> (f64, f64) {
 }
 
 /// Drives 12 s. `side` is 1 for a course to the left, -1 to the right.
-#[expect(clippy::too_many_lines, reason = "a whole vehicle with its sensors, step by step")]
+#[expect(
+    clippy::too_many_lines,
+    reason = "a whole vehicle with its sensors, step by step"
+)]
 fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Sensors, from_s: f64) -> Drive {
     let config = Config::PAPER;
     let checks: &Plausibility = &config.plausibility;

@@ -281,6 +281,7 @@ fn a_run_records_its_bus_when_asked() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of bad inputs")]
 fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();

@@ -84,7 +84,10 @@ impl Watch {
     }
 
     /// Judges a step.
-    #[expect(clippy::too_many_lines, reason = "every rule of every cycle, one after the other")]
+    #[expect(
+        clippy::too_many_lines,
+        reason = "every rule of every cycle, one after the other"
+    )]
     pub(crate) fn check(&mut self, rig: &Rig, step: &Step) {
         let (torque, mode) = (step.command.torque.nm(), step.command.mode);
         let context = || format!("t = {} us, {:?}, was {self:?}", rig.t_us, step.command);

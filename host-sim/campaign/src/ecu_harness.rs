@@ -84,7 +84,7 @@ impl<'a> EcuHarness<'a> {
             ecu,
             setup: Setup::new(&params).expect("a checked scenario"),
             checker: InvariantChecker::new(is_engaged(row.start), clock_base_us),
-            residual: Residual::new(&scenario.vehicle(), scenario.speed_m_per_s()),
+            residual: Residual::new(scenario.vehicle(), scenario.speed_m_per_s()),
             side: if rng.random_bool(0.5) { 1.0 } else { -1.0 },
             rng,
             clock_base_us,

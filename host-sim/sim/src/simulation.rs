@@ -358,7 +358,13 @@ impl Plan {
     fn request(&self, action: &Action) -> Request {
         Request {
             engage: action.engage.unwrap_or(true),
-            authority: action.authority.map_or(1.0, |share| if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }),
+            authority: action.authority.map_or(1.0, |share| {
+                if share.is_nan() {
+                    0.0
+                } else {
+                    share.clamp(0.0, 1.0)
+                }
+            }),
             probe: action.probe.unwrap_or(self.probe),
         }
     }

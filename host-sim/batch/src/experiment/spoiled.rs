@@ -265,9 +265,9 @@ fn in_words(cause: &str) -> String {
     cause
         .split_whitespace()
         .filter(|w| {
-            !w.trim_matches(|c: char| "(),-+".contains(c))
+            w.trim_matches(|c: char| "(),-+".contains(c))
                 .parse::<f64>()
-                .is_ok()
+                .is_err()
         })
         .collect::<Vec<_>>()
         .join(" ")

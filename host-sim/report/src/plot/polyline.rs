@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn a_thinned_area_holds_the_whole_one() {
         let area: Vec<_> = (0..1000)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|x| [x, -x.sin(), 2.0 + x.cos()])
             .collect();
         let thinned = thin_area(area.clone(), 60);

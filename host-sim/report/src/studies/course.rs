@@ -42,7 +42,9 @@ pub fn stamped(survey: &Survey) -> Stamped<'_, Survey> {
 
 /// Least and largest values along the lane's centre.
 pub fn table(survey: &Survey) -> Table {
-    let quantities: [(&str, &str, usize, fn(&Sample) -> f64); 4] = [
+    /// Name, unit, digits, value.
+    type Quantity = (&'static str, &'static str, usize, fn(&Sample) -> f64);
+    let quantities: [Quantity; 4] = [
         ("Curvature, left positive", "1/m", 5, |s| s.curvature_1pm),
         ("Bank, positive: left edge higher", "rad", 4, |s| s.bank_rad),
         ("Grade, positive uphill", "", 4, |s| s.grade),

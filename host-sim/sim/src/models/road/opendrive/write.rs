@@ -15,7 +15,10 @@ struct Element {
     width_m: [f64; 2],
 }
 
-#[expect(clippy::too_many_lines, reason = "the elements of the file, one after the other")]
+#[expect(
+    clippy::too_many_lines,
+    reason = "the elements of the file, one after the other"
+)]
 pub(in crate::models::road) fn write(course: &Course) -> String {
     let elements = elements(course);
     let length_m: f64 = elements.iter().map(|element| element.length_m).sum();
