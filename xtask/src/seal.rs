@@ -36,15 +36,21 @@ fn seal_bytes(bytes: &mut [u8]) -> Result<u32> {
             .with_context(|| format!("no section {name}"))?;
         let mut data = section.data()?.to_vec();
         if name == ".text" {
-            // The image takes table and code in one piece.
+            // The image takes table and code in one piece, with what the linker put between them to align the code.
+            let (address, offset) = end.context("no table before the code")?;
+            let (start, _) = section.file_range().context("code without bytes")?;
+            let gap = section.address().checked_sub(address);
             ensure!(
-                end == Some(section.address()),
-                "a gap between {:#x?} and {:#x}: what lies there is nobody's",
-                end,
+                gap == Some(0) || gap == start.checked_sub(offset),
+                "a gap between {address:#x} and {:#x} that is not in the file: what lies there is nobody's",
                 section.address()
             );
+            if gap != Some(0) {
+                digest_of.push(bytes[offset as usize..start as usize].to_vec());
+            }
         }
-        end = Some(section.address() + data.len() as u64);
+        let (offset, _) = section.file_range().context("a section without bytes")?;
+        end = Some((section.address() + data.len() as u64, offset + data.len() as u64));
         let within = at.checked_sub(section.address()).map(|offset| offset as usize);
         if name == ".rodata" {
             let offset = within
