@@ -323,7 +323,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
     ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),
-    ("host-sim/sim/src/models/road/opendrive/geometry.rs", "one kind of reference line after the other"),
     ("host-sim/sim/src/scenario/mod.rs", "one document: the fields of a scenario and their meaning"),
     ("host-sim/sim/src/simulation.rs", "one loop with its tests, which look into it"),
 ];

@@ -42,7 +42,7 @@ fn status(machine: &mut Machine) -> (Status, u64, u64) {
     let (mut cause, mut mode) = (u64::MAX, u64::MAX);
     loop {
         match machine.frame() {
-            (0x0C0, word) => (cause, mode) = ((word >> 52) & 0x7, (word >> 32) & 0xF),
+            (0x0C0, word) => (cause, mode) = ((word >> 61) & 0x7, (word >> 32) & 0xF),
             (0x320, word) if mode != u64::MAX => {
                 let status = Status {
                     stored: (word >> 12) & 1 != 0,

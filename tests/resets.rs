@@ -39,7 +39,7 @@ fn status(machine: &mut Machine) -> Status {
     loop {
         if let (0x0C0, word) = machine.frame() {
             return Status {
-                cause: (word >> 52) & 0x7,
+                cause: (word >> 61) & 0x7,
                 mode: (word >> 32) & 0xF,
                 monitor_disagreed: (word >> 46) & 1 != 0,
             };

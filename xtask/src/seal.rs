@@ -12,6 +12,8 @@ use object::{Object, ObjectSection, ObjectSymbol};
 const UNSEALED: u32 = 0x0FF0_5EA1;
 const SEALED: u32 = 0x5EA1_E0D5;
 const LEN: usize = 8;
+/// A byte of flash that nobody wrote.
+const ERASED: u8 = 0xFF;
 
 /// Seals the ELF in place and returns the CRC.
 pub(crate) fn seal(elf: &Path) -> Result<u32> {
@@ -36,21 +38,19 @@ fn seal_bytes(bytes: &mut [u8]) -> Result<u32> {
             .with_context(|| format!("no section {name}"))?;
         let mut data = section.data()?.to_vec();
         if name == ".text" {
-            // The image takes table and code in one piece, with what the linker put between them to align the code.
-            let (address, offset) = end.context("no table before the code")?;
-            let (start, _) = section.file_range().context("code without bytes")?;
-            let gap = section.address().checked_sub(address);
-            ensure!(
-                gap == Some(0) || gap == start.checked_sub(offset),
-                "a gap between {address:#x} and {:#x} that is not in the file: what lies there is nobody's",
-                section.address()
-            );
-            if gap != Some(0) {
-                digest_of.push(bytes[offset as usize..start as usize].to_vec());
-            }
+            // The image takes table and code in one piece. What the linker leaves between them to align the code is in no
+            // file; a flasher erases it and leaves it so.
+            let before: u64 = end.context("no table before the code")?;
+            let gap = section.address().checked_sub(before);
+            let gap = gap.filter(|gap| *gap < section.align()).with_context(|| {
+                format!(
+                    "a gap between {before:#x} and {:#x} that no alignment makes",
+                    section.address()
+                )
+            })?;
+            digest_of.push(vec![ERASED; gap as usize]);
         }
-        let (offset, _) = section.file_range().context("a section without bytes")?;
-        end = Some((section.address() + data.len() as u64, offset + data.len() as u64));
+        end = Some(section.address() + data.len() as u64);
         let within = at.checked_sub(section.address()).map(|offset| offset as usize);
         if name == ".rodata" {
             let offset = within
