@@ -304,6 +304,7 @@ const LONGEST: usize = 350;
 #[rustfmt::skip]
 const LONGER: &[(&str, &str)] = &[
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
+    ("bindings/fmu/src/fmi2.rs", "one C interface, function by function"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
     ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),

@@ -31,6 +31,8 @@ const STATUSES: usize = 5;
 const VALUES_WITHIN: Duration = Duration::from_secs(10);
 /// Speeds before a set: three that a new sender has to show, and more. At their period.
 const SPEEDS: u8 = 6;
+/// Before each frame of a set: those that a sender has to show anew, and one more.
+const SPEEDS_BETWEEN: u8 = 4;
 const SPEED_PERIOD: Duration = Duration::from_millis(10);
 /// A port that is silent for so long may belong to an ECU that speaks SLCAN itself and has just started anew.
 const REOPEN: Duration = Duration::from_millis(100);
@@ -97,10 +99,15 @@ impl Product {
                 "the ECU is in {mode:?}; it takes parameters in Standby only, or where it is locked for want of them"
             )));
         }
+        let mut standstill = None;
         if !self.hears_speed {
-            self.send_standstill()?;
+            standstill = Some(self.send_standstill()?);
         }
         for frame in [unlock(before.sequence)].iter().chain(&frames) {
+            // A slow line must not let the speed grow old on the way: three clean frames and the ECU trusts it again.
+            if let Some(counter) = &mut standstill {
+                self.send_speeds(counter, SPEEDS_BETWEEN)?;
+            }
             self.write(&link::encode(self.channel, frame))?;
         }
         for since in 0..STATUSES {
@@ -114,14 +121,23 @@ impl Product {
         )))
     }
 
-    /// Speeds of zero, for an ECU on a bench: nobody else sends any.
-    fn send_standstill(&mut self) -> Result<(), PilError> {
+    /// Speeds of zero, for an ECU on a bench: nobody else sends any. Returns the counter of the next.
+    fn send_standstill(&mut self) -> Result<u8, PilError> {
+        let mut counter = 0;
+        for _ in 0..SPEEDS {
+            self.send_speeds(&mut counter, 1)?;
+            std::thread::sleep(SPEED_PERIOD);
+        }
+        Ok(counter)
+    }
+
+    fn send_speeds(&mut self, counter: &mut u8, count: u8) -> Result<(), PilError> {
         let standing = Vehicle {
             speeds: [Speed::ZERO; 2],
         };
-        for counter in 0..SPEEDS {
-            self.write(&link::encode(self.channel, &standing.encode(counter)))?;
-            std::thread::sleep(SPEED_PERIOD);
+        for _ in 0..count {
+            self.write(&link::encode(self.channel, &standing.encode(*counter)))?;
+            *counter = counter.wrapping_add(1);
         }
         Ok(())
     }
