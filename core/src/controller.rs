@@ -1,5 +1,5 @@
 //! The controller: decoded inputs in, one torque command out. What it reads, decides and remembers stands here, and
-//! the order of a step in [`step`]: inputs, modes, torque, limit and feedback.
+//! the order of a step in `step`: inputs, modes, torque, limit and feedback.
 //!
 //! Not here: bytes and their checks, the monitor, the motor ([`crate::ecu`]).
 

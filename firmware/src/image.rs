@@ -1,7 +1,7 @@
 //! Whether the image in the flash is the one that was built: a CRC-32 over its code and constants, looked at once, at
 //! every start.
 //!
-//! The linker cannot compute it. `cargo xtask seal` writes it into the ELF afterwards, into [`IMAGE_SEAL`], which the
+//! The linker cannot compute it. `cargo xtask seal` writes it into the ELF afterwards, into `IMAGE_SEAL`, which the
 //! sum leaves out; `flash` and `run` seal what they put on a board. An image that nobody sealed is good for the bench
 //! only (feature `bench`).
 //!

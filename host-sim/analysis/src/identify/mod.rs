@@ -1,9 +1,9 @@
 //! From a recorded drive to the driver's parameters, their uncertainty, and a verdict on whether the data can
 //! carry them.
 //!
-//! Two estimators share one log, one muscle and one form of result: [`noise_model`] (the default) and
-//! [`paper`] (the published way, kept as the baseline it is compared with); [`tracking`] follows a driver who
-//! changes. A log is a CSV file ([`log`]) or a recording of the bus ([`bus_trace`]). Terms: *a_1, a_2, a_3, t_p,
+//! Two estimators share one log, one muscle and one form of result: `noise_model` (the default) and
+//! `paper` (the published way, kept as the baseline it is compared with); `tracking` follows a driver who
+//! changes. A log is a CSV file (`log`) or a recording of the bus (`bus_trace`). Terms: *a_1, a_2, a_3, t_p,
 //! K_d, K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
 //! and a_i; the *remnant* is the part of the driver's torque that no linear model of the inputs explains.
 //!

@@ -32,7 +32,7 @@ const NAMES: [Option<&str>; COUNT] = [
     Some("k_hg"),
 ];
 
-/// Table 4: default value and variation interval, in the order of [`NAMES`].
+/// Table 4: default value and variation interval, in the order of `NAMES`.
 pub const TABLE_4: [(f64, f64, f64); COUNT] = [
     (0.1, 0.0, 0.5),
     (0.01, 0.0, 0.1),
