@@ -71,20 +71,20 @@ pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
             if negative {
                 sign(
                     "the sign of driver_torque_nm is swapped",
-                    "--map driver_torque_nm=driver_torque_nm*-1",
+                    "multiply driver_torque_nm by -1 in the log",
                     format!("with a scale of {s:.3} and a negative stiffness"),
                 );
             } else {
                 sign(
                     "the sign of guidance_torque_nm is swapped",
-                    "--map guidance_torque_nm=guidance_torque_nm*-1",
+                    "multiply guidance_torque_nm by -1 in the log",
                     format!("with a scale of {s:.3} to guidance_torque_nm"),
                 );
             }
         }
         _ if negative => sign(
             "the sign of wheel_angle_rad is swapped, or, in a drive without guidance, that of driver_torque_nm",
-            "--map wheel_angle_rad=wheel_angle_rad*-1 (or driver_torque_nm=driver_torque_nm*-1)",
+            "multiply wheel_angle_rad (or driver_torque_nm) by -1 in the log",
             format!("with a stiffness of {:.2} N.m/rad", b.stiffness[0]),
         ),
         Some([s, e]) if sure(1.0 - s, e) && s.abs() < SMALL_SCALE => out.push(Refutation {
@@ -100,7 +100,7 @@ pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
                 "driver_torque_nm is recorded at {s:.3} times its value (or guidance_torque_nm at {:.3} times)",
                 1.0 / s
             ),
-            cure: format!("--map driver_torque_nm=driver_torque_nm*{:.3}", 1.0 / s),
+            cure: format!("multiply driver_torque_nm by {:.3} in the log", 1.0 / s),
         }),
         _ => {}
     }

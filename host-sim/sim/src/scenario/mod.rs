@@ -284,7 +284,8 @@ impl Scenario {
         builder.build().map_err(|e| InputError::new(name, e))
     }
 
-    /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit.
+    /// The scenario as the text of a file that needs no other file: read again it is the same scenario, bit for bit. A
+    /// course of OpenDRIVE is made of pieces that are written with rounding, so that a run on it is not the same to the last bit.
     pub fn to_toml(&self) -> String {
         // Only a map whose keys are no strings cannot be written, and there is none.
         file::write(self).unwrap_or_default()
