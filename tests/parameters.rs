@@ -16,6 +16,7 @@ use haptic_core::bus::slcan;
 use haptic_core::download;
 use haptic_core::params::Params;
 use haptic_core::quantity::Speed;
+use haptic_target::live::{Listener, View};
 use haptic_target::parameters::Product;
 use machine::{Machine, image};
 
@@ -189,8 +190,27 @@ fn the_workbench_stores_a_set_over_a_serial_adapter() {
     };
     assert!(product.store(&too_much).is_err());
     assert_eq!(product.status().unwrap().outcome, WriteOutcome::TooSoon);
+    listen(Listener::after(product));
     qemu.kill().unwrap();
     qemu.wait().unwrap();
+}
+
+/// An ECU that nobody else talks to any more waits, and says what it misses.
+fn listen(mut listener: Listener) {
+    let mut view = View::default();
+    let mut changes = Vec::new();
+    for _ in 0..5000 {
+        let frame = listener.frame().unwrap();
+        if let Some(frame) = frame {
+            changes.extend(view.take(0.0, &frame));
+        }
+    }
+    assert_eq!(changes[0], "mode Standby, last start: NewParameters");
+    let status = view.status();
+    assert_eq!((status.torque_nm, status.warning), (Some(0.0), false));
+    assert_eq!(status.speed_m_per_s, None, "nobody sends one");
+    assert!(status.faults.contains(&"SpeedTimeout".to_owned()), "{status:?}");
+    assert_eq!((view.counts().damaged, view.counts().foreign), (0, 0));
 }
 
 /// The image cuts the supply of its flash at every number of operations, resets, and looks (`power_loss.rs`).

@@ -5,11 +5,8 @@
 //! sends any, as on a bench, the client does, while it sends the set.
 //! Not here: what is in a set, and the way to the bus (`adapter`).
 
-use std::io::Write;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome};
 use haptic_core::config::Config;
@@ -18,10 +15,8 @@ use haptic_core::modes::Mode;
 use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::Speed;
 
-use super::adapter::{self, Adapter};
-use super::link::{self, Decoder};
-use super::responses::pump;
-use super::{Channel, PilError};
+use super::PilError;
+use super::port::Port;
 
 /// Longest wait for a status, which comes every second, and a start takes less than another.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
@@ -34,16 +29,10 @@ const SPEEDS: u8 = 6;
 /// Before each frame of a set: those that a sender has to show anew, and one more.
 const SPEEDS_BETWEEN: u8 = 4;
 const SPEED_PERIOD: Duration = Duration::from_millis(10);
-/// A port that is silent for so long may belong to an ECU that speaks SLCAN itself and has just started anew.
-const REOPEN: Duration = Duration::from_millis(100);
 
 /// The ECU at the other end of an adapter.
 pub struct Product {
-    input: Box<dyn Write + Send>,
-    bytes: Receiver<Vec<u8>>,
-    pending: std::vec::IntoIter<u8>,
-    decoder: Decoder,
-    channel: Channel,
+    pub(super) port: Port,
     /// Somebody sends the vehicle's speed.
     hears_speed: bool,
 }
@@ -54,23 +43,10 @@ impl Product {
     /// # Errors
     /// What is missing on the way.
     pub fn on(adapter: &str) -> Result<Self, PilError> {
-        let Adapter {
-            channel,
-            input,
-            output,
-        } = adapter::open(adapter)?;
-        let mut product = Self {
-            input,
-            bytes: pump(output),
-            pending: Vec::new().into_iter(),
-            decoder: Decoder::new(channel),
-            channel,
+        Ok(Self {
+            port: Port::open(adapter)?,
             hears_speed: false,
-        };
-        if channel == Channel::Slcan {
-            product.write(link::OPEN)?;
-        }
-        Ok(product)
+        })
     }
 
     /// Which set is in use, and what became of the last one sent.
@@ -108,7 +84,7 @@ impl Product {
             if let Some(counter) = &mut standstill {
                 self.send_speeds(counter, SPEEDS_BETWEEN)?;
             }
-            self.write(&link::encode(self.channel, frame))?;
+            self.port.send(frame)?;
         }
         for since in 0..STATUSES {
             if let Some(verdict) = verdict(&before, &self.status()?, since) {
@@ -136,7 +112,7 @@ impl Product {
             speeds: [Speed::ZERO; 2],
         };
         for _ in 0..count {
-            self.write(&link::encode(self.channel, &standing.encode(*counter)))?;
+            self.port.send(&standing.encode(*counter))?;
             *counter = counter.wrapping_add(1);
         }
         Ok(())
@@ -150,7 +126,11 @@ impl Product {
         let until = Instant::now() + VALUES_WITHIN;
         let mut values = [None; PARAMETERS.len()];
         while Instant::now() < until {
-            let Some(frame) = self.frame()?.filter(|frame| frame.id() == ParameterValue::ID) else {
+            let Some(frame) = self
+                .port
+                .frame()?
+                .filter(|frame| frame.id() == ParameterValue::ID)
+            else {
                 continue;
             };
             if let Ok(value) = ParameterValue::decode(&mut { ReceiverState::TRUSTED }, &frame) {
@@ -173,7 +153,7 @@ impl Product {
         let until = Instant::now() + REPLY_TIMEOUT;
         let mut mode = None;
         while Instant::now() < until {
-            let Some(frame) = self.frame()? else {
+            let Some(frame) = self.port.frame()? else {
                 continue;
             };
             // Two counters of one second tell nothing: each frame is judged by itself.
@@ -200,43 +180,6 @@ impl Product {
              and ECU both run at 500 kbit/s?",
             REPLY_TIMEOUT.as_secs()
         )))
-    }
-
-    /// The next frame; None when none came for [`REOPEN`].
-    fn frame(&mut self) -> Result<Option<Frame>, PilError> {
-        loop {
-            for byte in self.pending.by_ref() {
-                if let Some(frame) = self.decoder.push(byte).map_err(PilError::Failed)? {
-                    return Ok(Some(frame));
-                }
-            }
-            match self.bytes.recv_timeout(REOPEN) {
-                Ok(bytes) => self.pending = bytes.into_iter(),
-                Err(RecvTimeoutError::Timeout) => {
-                    if self.channel == Channel::Slcan {
-                        self.write(link::REOPEN)?;
-                    }
-                    return Ok(None);
-                }
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(PilError::Failed("the adapter is gone".into()));
-                }
-            }
-        }
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PilError> {
-        let written = self.input.write_all(bytes).and_then(|()| self.input.flush());
-        written.map_err(|e| PilError::Failed(format!("the adapter takes no frames: {e}")))
-    }
-}
-
-impl Drop for Product {
-    fn drop(&mut self) {
-        if self.channel == Channel::Slcan {
-            // An adapter that is gone is closed.
-            let _ = self.write(link::CLOSE);
-        }
     }
 }
 
