@@ -170,7 +170,7 @@ fn guidance() {
     let dbc = dbc();
     for raw in -20_480..=20_480_i32 {
         let torque = f64::from(raw) / 4096.0;
-        let (code, bits) = (raw.rem_euclid(7), (raw & 0x3_FFFF) as u32);
+        let (code, bits) = (raw.rem_euclid(7), (raw & 0xF_FFFF) as u32);
         let sent = Guidance {
             torque: Torque::from_nm(torque),
             limit: LimitReason::from_code(i64::from(code)).unwrap(),
@@ -185,7 +185,7 @@ fn guidance() {
         assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
         assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code));
-        let classes = [("ClassB", 0x3_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
+        let classes = [("ClassB", 0x7_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
         for (name, mask) in classes {
             assert_eq!(
                 signal(&dbc, &frame, name),
