@@ -8,12 +8,13 @@ mod step;
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason};
 use crate::faults::{Fault, FaultSet};
+use crate::hands::HandsState;
 use crate::injection::{Injection, NoInjection};
 use crate::law::{LaneSample, LawState};
 use crate::modes::Mode;
 use crate::plausibility::PlausibilityState;
 use crate::probe::ProbeState;
-use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque};
+use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use crate::ramp::{History, Ramp};
 use crate::redundant::{Redundant, words};
 use step::{Step, without};
@@ -62,6 +63,37 @@ words! {
     }
 }
 
+words! {
+    /// How the vehicle moves, as its own sensors have it.
+    #[derive(Default)]
+    pub struct Motion {
+        /// Two sources of its speed.
+        pub speeds: [Speed; 2],
+        /// The measured yaw rate; counts only where there is one.
+        pub yaw_rate: TurningRate,
+        /// 1 where there is a measured yaw rate.
+        pub has_yaw_rate: u32,
+    }
+}
+
+impl Motion {
+    /// Speeds, and the yaw rate if it is measured.
+    #[must_use]
+    pub fn new(speeds: [Speed; 2], yaw_rate: Option<TurningRate>) -> Self {
+        Self {
+            speeds,
+            yaw_rate: yaw_rate.unwrap_or(TurningRate::ZERO),
+            has_yaw_rate: u32::from(yaw_rate.is_some()),
+        }
+    }
+
+    /// The yaw rate, if it is measured.
+    #[must_use]
+    pub fn yaw_rate(&self) -> Option<TurningRate> {
+        (self.has_yaw_rate != 0).then_some(self.yaw_rate)
+    }
+}
+
 /// What the host requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
@@ -80,8 +112,8 @@ pub struct Inputs {
     pub lane: Input<LaneSample>,
     /// The column's sensors.
     pub column: Input<Column>,
-    /// Two sources of the vehicle's speed.
-    pub speeds: Input<[Speed; 2]>,
+    /// Two sources of the vehicle's speed, and its yaw rate.
+    pub motion: Input<Motion>,
     /// What the host requests.
     pub request: Input<Request>,
     /// Faults found outside: on the bus, by the monitor, at the output.
@@ -127,6 +159,7 @@ words! {
         law: LawState,
         envelope: EnvelopeState,
         plausibility: PlausibilityState,
+        hands: HandsState,
         ramp: Ramp,
         probe: ProbeState,
         /// The part of the torque applied that is the probe.
@@ -166,6 +199,7 @@ impl Memory {
             law: LawState::NEW,
             envelope: EnvelopeState::new(now),
             plausibility: PlausibilityState::NEW,
+            hands: HandsState::NEW,
             ramp: Ramp::NONE,
             probe: ProbeState::SILENT,
             probe_applied: Torque::ZERO,

@@ -224,7 +224,7 @@ fn the_ends_of_every_range_are_taken() {
         for end in [min, max] {
             // Others so small that no product is beyond its own range.
             let mut sent = Params {
-                k_1: 0.25,
+                k_1: 0.02,
                 a_3: 1.0,
                 probe_amplitude_nm: 0.1,
                 probe_frequency_hz: 1.5,

@@ -45,10 +45,10 @@ pub(super) fn is_engaged(start: Start) -> bool {
 fn absurd() -> Params {
     Params {
         k_1: 4.0,
-        a_1: 8.0,
-        a_2: 8.0,
+        a_1: 0.8,
+        a_2: 0.01,
         a_3: 8.0,
-        a_4: 8.0,
+        a_4: 0.2,
         rate_corner_hz: 60.0,
         least_speed_m_per_s: 0.5,
         ..Params::PAPER
