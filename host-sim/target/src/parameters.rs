@@ -7,13 +7,15 @@
 
 use std::time::{Duration, Instant};
 
+use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome};
+use haptic_core::bus::messages::{
+    Guidance, Identity, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome,
+};
 use haptic_core::config::Config;
 use haptic_core::download::{frames, mode_for_parameters, unlock};
 use haptic_core::modes::Mode;
 use haptic_core::params::{PARAMETERS, Params};
-use haptic_core::quantity::Speed;
 
 use super::PilError;
 use super::port::Port;
@@ -57,11 +59,12 @@ impl Product {
         Ok(self.status_and_mode()?.0)
     }
 
-    /// Sends a set and waits until it is in use. The ECU must be in Standby, and starts anew with the set.
+    /// Sends a set for the vehicle of that number (0: nobody says) and waits until it is in use. The ECU must be in Standby,
+    /// and starts anew with the set.
     ///
     /// # Errors
     /// Why it is not in use.
-    pub fn store(&mut self, params: &Params) -> Result<ParameterStatus, PilError> {
+    pub fn store(&mut self, params: &Params, vehicle: u32) -> Result<ParameterStatus, PilError> {
         let frames = frames(params);
         // The bus rounds to f32, which may be too far at the end of a range: the ECU's own judgement, before it is asked.
         let rounded = Params::from_values(&params.to_values().map(|value| f64::from(value as f32)));
@@ -79,12 +82,14 @@ impl Product {
         if !self.hears_speed {
             standstill = Some(self.send_standstill()?);
         }
-        for frame in [unlock(before.sequence)].iter().chain(&frames) {
+        for frame in [unlock(before.sequence, vehicle)].iter().chain(&frames) {
             // A slow line must not let the speed grow old on the way: three clean frames and the ECU trusts it again.
+            let mut together = Vec::new();
             if let Some(counter) = &mut standstill {
-                self.send_speeds(counter, SPEEDS_BETWEEN)?;
+                together.extend((0..SPEEDS_BETWEEN).map(|_| standing(counter)));
             }
-            self.port.send(frame)?;
+            together.push(*frame);
+            self.port.send(&together)?;
         }
         for since in 0..STATUSES {
             if let Some(verdict) = verdict(&before, &self.status()?, since) {
@@ -101,22 +106,28 @@ impl Product {
     fn send_standstill(&mut self) -> Result<u8, PilError> {
         let mut counter = 0;
         for _ in 0..SPEEDS {
-            self.send_speeds(&mut counter, 1)?;
+            self.port.send(&[standing(&mut counter)])?;
             std::thread::sleep(SPEED_PERIOD);
         }
         Ok(counter)
     }
 
-    fn send_speeds(&mut self, counter: &mut u8, count: u8) -> Result<(), PilError> {
-        let standing = Vehicle {
-            speeds: [Speed::ZERO; 2],
-            yaw_rate: None,
-        };
-        for _ in 0..count {
-            self.port.send(&standing.encode(*counter))?;
-            *counter = counter.wrapping_add(1);
+    /// What the stored set is bound to.
+    ///
+    /// # Errors
+    /// The ECU does not say so.
+    pub fn identity(&mut self) -> Result<Identity, PilError> {
+        let until = Instant::now() + REPLY_TIMEOUT;
+        while Instant::now() < until {
+            if let Some(frame) = self.port.frame()?.filter(|frame| frame.id() == Identity::ID)
+                && let Ok(identity) = Identity::decode(&mut { ReceiverState::TRUSTED }, &frame)
+            {
+                return Ok(identity);
+            }
         }
-        Ok(())
+        Err(PilError::Failed(
+            "the ECU does not say what its parameters are bound to: it runs an older image".into(),
+        ))
     }
 
     /// The parameters in use, as the ECU tells them.
@@ -182,6 +193,13 @@ impl Product {
             REPLY_TIMEOUT.as_secs()
         )))
     }
+}
+
+/// The next frame of a vehicle that stands.
+fn standing(counter: &mut u8) -> Frame {
+    let frame = Vehicle::default().encode(*counter);
+    *counter = counter.wrapping_add(1);
+    frame
 }
 
 /// What a status says of a set that was sent when the status was `before`; None: nothing yet. `since` counts the

@@ -45,8 +45,13 @@ impl Port {
         Ok(port)
     }
 
-    pub(super) fn send(&mut self, frame: &Frame) -> Result<(), PilError> {
-        self.write(&link::encode(self.channel, frame))
+    /// All in one piece: what belongs together is not torn apart where this computer is busy.
+    pub(super) fn send(&mut self, frames: &[Frame]) -> Result<(), PilError> {
+        let bytes: Vec<u8> = frames
+            .iter()
+            .flat_map(|frame| link::encode(self.channel, frame))
+            .collect();
+        self.write(&bytes)
     }
 
     /// The next frame; None when none came for [`REOPEN`].
