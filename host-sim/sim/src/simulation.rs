@@ -25,6 +25,7 @@ use crate::models::driver::{ArmGains, Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::real::RealPlant;
 use crate::models::road::{Centreline, Projection, Tracker};
+use crate::models::tolerances::Car;
 use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::{PreviewPoints, wrapped};
 use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
@@ -231,7 +232,7 @@ impl<G: Guidance> Simulation<G> {
             }
         }
         if self.ending.is_none() {
-            self.move_on(preview, applied.torque_nm, remnant_nm);
+            self.move_on(preview, applied.torque_nm, remnant_nm, action.takes_over);
         }
         Some(Outcome {
             preview,
@@ -246,7 +247,7 @@ impl<G: Guidance> Simulation<G> {
 
     /// Lets the plant move for 1 ms.
     #[inline]
-    fn move_on(&mut self, preview: LaneErrors, guidance_torque_nm: f64, remnant_nm: f64) {
+    fn move_on(&mut self, preview: LaneErrors, guidance_torque_nm: f64, remnant_nm: f64, takes_over: bool) {
         let target_next_rad = self.vision.step(preview.e_y_m, preview.e_theta_rad);
         let input = PlantInput {
             target_now_rad: self.target_now_rad,
@@ -254,7 +255,11 @@ impl<G: Guidance> Simulation<G> {
             guidance_torque_nm,
             remnant_nm,
         };
-        let transition = self.plan.transition(self.step, self.failed_at);
+        let transition = if takes_over {
+            &self.plan.manual
+        } else {
+            self.plan.transition(self.step, self.failed_at)
+        };
         self.motor_torque_nm = match &mut self.real {
             None => {
                 self.plant.step(transition, &input);
@@ -320,6 +325,16 @@ impl<G: Guidance> Simulation<G> {
         &self.guidance
     }
 
+    /// Who guides, to change something about it in mid-run.
+    pub fn guidance_mut(&mut self) -> &mut G {
+        &mut self.guidance
+    }
+
+    /// Position of the centre of gravity, m, and the direction of movement, rad, not wrapped.
+    pub fn place(&self) -> ([f64; 2], f64) {
+        (self.plant.position_m(), self.plant.direction_rad())
+    }
+
     /// Who guided, for what it kept.
     pub fn into_guidance(self) -> G {
         self.guidance
@@ -329,8 +344,8 @@ impl<G: Guidance> Simulation<G> {
 impl Plan {
     fn new(scenario: &Scenario, road: &Centreline) -> Self {
         let v = scenario.speed_m_per_s();
-        let (vehicle, driver) = (scenario.vehicle(), scenario.driver());
-        let transition = |gains| Transition::new(v, vehicle, driver, gains);
+        let (vehicle, driver) = (scenario.car().vehicle, scenario.driver());
+        let transition = |gains| Transition::new(v, &vehicle, driver, gains);
         let failure = scenario.failure();
         Self {
             speed_m_per_s: v,
@@ -389,7 +404,7 @@ struct Sensing {
 
 impl Sensing {
     fn of(scenario: &Scenario) -> Option<Box<Self>> {
-        let errors = *scenario.sensor_errors();
+        let errors = scenario.car().sensor_errors;
         if errors == SensorErrors::default() {
             return None;
         }
@@ -415,12 +430,13 @@ impl Sensing {
 
 /// The plant of a world that is not the paper's.
 fn real(scenario: &Scenario) -> Option<Box<RealPlant>> {
-    let (world, vehicle, driver) = (scenario.world(), scenario.vehicle(), scenario.driver());
+    let (car, driver) = (scenario.car(), scenario.driver());
+    let Car { world, vehicle, .. } = car;
     if world.is_ideal() && scenario.course().is_level() {
         return None;
     }
     let seed = Stream::World.seed(scenario.seed());
-    Some(Box::new(RealPlant::new(*world, vehicle, driver, seed)))
+    Some(Box::new(RealPlant::new(world, &vehicle, driver, seed)))
 }
 
 /// The step at or next to a time.
