@@ -66,6 +66,7 @@ const SETTLES_WITHIN: usize = 11;
 fn send(machine: &mut Machine, params: &Params, in_use: u32, without: Option<usize>) {
     let standing = Vehicle {
         speeds: [Speed::ZERO; 2],
+        yaw_rate: None,
     };
     for counter in 0..5 {
         machine.send(&slcan::format(&standing.encode(counter)));

@@ -13,7 +13,7 @@ use crate::law::{LaneSample, LawState};
 use crate::modes::Mode;
 use crate::plausibility::PlausibilityState;
 use crate::probe::ProbeState;
-use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque};
+use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use crate::ramp::{History, Ramp};
 use crate::redundant::{Redundant, words};
 use step::{Step, without};
@@ -62,6 +62,37 @@ words! {
     }
 }
 
+words! {
+    /// How the vehicle moves, as its own sensors have it.
+    #[derive(Default)]
+    pub struct Motion {
+        /// Two sources of its speed.
+        pub speeds: [Speed; 2],
+        /// The measured yaw rate; counts only where there is one.
+        pub yaw_rate: TurningRate,
+        /// 1 where there is a measured yaw rate.
+        pub has_yaw_rate: u32,
+    }
+}
+
+impl Motion {
+    /// Speeds, and the yaw rate if it is measured.
+    #[must_use]
+    pub fn new(speeds: [Speed; 2], yaw_rate: Option<TurningRate>) -> Self {
+        Self {
+            speeds,
+            yaw_rate: yaw_rate.unwrap_or(TurningRate::ZERO),
+            has_yaw_rate: u32::from(yaw_rate.is_some()),
+        }
+    }
+
+    /// The yaw rate, if it is measured.
+    #[must_use]
+    pub fn yaw_rate(&self) -> Option<TurningRate> {
+        (self.has_yaw_rate != 0).then_some(self.yaw_rate)
+    }
+}
+
 /// What the host requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
@@ -80,8 +111,8 @@ pub struct Inputs {
     pub lane: Input<LaneSample>,
     /// The column's sensors.
     pub column: Input<Column>,
-    /// Two sources of the vehicle's speed.
-    pub speeds: Input<[Speed; 2]>,
+    /// Two sources of the vehicle's speed, and its yaw rate.
+    pub motion: Input<Motion>,
     /// What the host requests.
     pub request: Input<Request>,
     /// Faults found outside: on the bus, by the monitor, at the output.

@@ -254,7 +254,7 @@ impl Ecu {
         let inputs = Inputs {
             lane: Input::Lost,
             column: Input::Lost,
-            speeds: Input::Lost,
+            motion: Input::Lost,
             request: Input::Lost,
             faults: FaultSet::NONE,
         };

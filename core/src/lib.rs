@@ -53,7 +53,7 @@
 //!     let frames = [
 //!         (8, lane.encode((ms / 8) as u8)),
 //!         (2, column.encode((ms / 2) as u8)),
-//!         (10, Vehicle { speeds }.encode((ms / 10) as u8)),
+//!         (10, Vehicle { speeds, yaw_rate: None }.encode((ms / 10) as u8)),
 //!         (10, demand.encode((ms / 10) as u8)),
 //!     ];
 //!     for (period, frame) in frames {

@@ -229,6 +229,7 @@ fn both_speeds_have_to_be_next_to_nothing() {
     // Forged once, contradicted by the next true one.
     let forged = Vehicle {
         speeds: [Speed::ZERO; 2],
+        yaw_rate: None,
     };
     let mut rig = Rig::paper();
     rig.run(100);

@@ -14,7 +14,7 @@ use haptic_core::estimator::Reading;
 use haptic_core::faults::{Fault, FaultSet, Record};
 use haptic_core::modes::Mode;
 use haptic_core::params::PARAMETERS;
-use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -130,11 +130,24 @@ fn vehicle_and_demand() {
         let (a, b) = (f64::from(raw) / 256.0, f64::from(90 * 256 - raw) / 256.0);
         let sent = Vehicle {
             speeds: [Speed::from_m_per_s(a), Speed::from_m_per_s(b)],
+            yaw_rate: None,
         };
         let frame = sent.encode(3);
+        let names = ["Speed1", "Speed2", "YawRate", "YawRateValid"];
+        assert_eq!(names.map(|name| signal(&dbc, &frame, name)), [a, b, 0.0, 0.0]);
+        assert_eq!(decode(sent), sent);
+    }
+    for raw in -8191..=8191 {
+        let rate = f64::from(raw) / 4096.0;
+        let sent = Vehicle {
+            speeds: [Speed::from_m_per_s(20.0); 2],
+            yaw_rate: Some(TurningRate::from_rad_per_s(rate)),
+        };
+        let frame = sent.encode(3);
+        let names = ["Speed1", "Speed2", "YawRate", "YawRateValid"];
         assert_eq!(
-            [signal(&dbc, &frame, "Speed1"), signal(&dbc, &frame, "Speed2")],
-            [a, b]
+            names.map(|name| signal(&dbc, &frame, name)),
+            [20.0, 20.0, rate, 1.0]
         );
         assert_eq!(decode(sent), sent);
     }
@@ -416,6 +429,26 @@ fn one_lsb_beyond_the_range_is_rejected_when_received() {
             }
         }
     }
+}
+
+/// The raw value -8192 of a yaw rate has no counterpart to the left, so it is no value; where the sender says that it has
+/// no good one, nobody looks at it. Beyond the range a value saturates when it is sent.
+#[test]
+fn a_yaw_rate_counts_only_where_it_is_valid() {
+    let unpack = |raw: i64, valid: u64| {
+        Vehicle::unpack(((raw as u64) & 0x3FFF) << 44 | valid << 58)
+            .map(|v| v.yaw_rate.map(|r| r.rad_per_s()))
+    };
+    assert_eq!(unpack(-8191, 1), Some(Some(-8191.0 / 4096.0)));
+    assert_eq!(unpack(-8192, 1), None);
+    assert_eq!(unpack(-8192, 0), Some(None));
+    assert_eq!(unpack(100, 0), Some(None));
+    let spinning = Vehicle {
+        yaw_rate: Some(TurningRate::from_rad_per_s(-5.0)),
+        ..Vehicle::default()
+    };
+    let sent = decode(spinning).yaw_rate.map(|rate| rate.rad_per_s());
+    assert_eq!(sent, Some(-8191.0 / 4096.0));
 }
 
 /// By their lateral errors in 2^-13 m, 32,769 is beyond 4 m: a sender is trusted with its third good frame in a row,

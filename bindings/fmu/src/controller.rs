@@ -4,7 +4,7 @@ use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::config::Setup;
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::params::{PARAMETERS, ParamError, Params};
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// What a variable is to FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,7 +66,7 @@ const fn variable(
 }
 
 /// Variables that are no parameters of the controller.
-const OWN: usize = 15;
+const OWN: usize = 17;
 use Kind::{Boolean, Integer, Real};
 use Role::{Input, Output, Parameter};
 
@@ -103,6 +103,20 @@ pub const VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
             "Torque that the motor delivers",
         ),
         variable("speed_m_per_s", Real, Input, "m/s", "Speed of the vehicle"),
+        variable(
+            "yaw_rate_rad_per_s",
+            Real,
+            Input,
+            "rad/s",
+            "Measured yaw rate of the vehicle, positive to the left",
+        ),
+        variable(
+            "yaw_rate_valid",
+            Boolean,
+            Input,
+            "",
+            "The vehicle measures its yaw rate",
+        ),
         variable(
             "authority",
             Real,
@@ -159,7 +173,7 @@ pub const VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
 };
 const AUTHORITY: usize = 6;
 const ENGAGED: usize = 9;
-const TORQUE: usize = 10;
+const TORQUE: usize = 12;
 
 /// The unit under way.
 #[derive(Debug, Clone)]
@@ -211,6 +225,8 @@ impl Controller {
             wheel,
             motor,
             speed,
+            yaw_rate,
+            yaw_rate_valid,
             authority,
             engage,
             probe,
@@ -244,7 +260,8 @@ impl Controller {
         if step.is_multiple_of(10) {
             let counter = (step / 10) as u8;
             let speeds = [Speed::from_m_per_s(speed); 2];
-            hear(Vehicle { speeds }.encode(counter));
+            let yaw_rate = (yaw_rate_valid != 0.0).then(|| TurningRate::from_rad_per_s(yaw_rate));
+            hear(Vehicle { speeds, yaw_rate }.encode(counter));
             let demand = Demand {
                 engage: engage != 0.0,
                 authority: Ratio::from_si(authority),

@@ -1,7 +1,7 @@
 //! One step of the controller: the one place that sees the mode machine, the plausibility checks, the law, the
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
-use super::{Command, Input, Inputs, Memory, READY, Request};
+use super::{Command, Input, Inputs, Memory, Motion, READY, Request};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
@@ -67,7 +67,7 @@ impl<I: Injection> Step<'_, I> {
         let Inputs {
             lane,
             column,
-            speeds,
+            motion,
             request,
             ..
         } = self.inputs;
@@ -75,8 +75,8 @@ impl<I: Injection> Step<'_, I> {
         let mut lost = FaultSet::NONE;
         let mut implausible = FaultSet::from_bits(v.implausible);
 
-        v.age.speeds = self.age(speeds, v.age.speeds);
-        if let Input::New([a, b]) = speeds {
+        v.age.speeds = self.age(motion, v.age.speeds);
+        if let Input::New(Motion { speeds: [a, b], .. }) = motion {
             let agree = speeds_agree(*a, *b);
             implausible.set(!agree, Fault::SpeedImplausible);
             if agree {
@@ -128,7 +128,7 @@ impl<I: Injection> Step<'_, I> {
         );
         lost.insert_if(column.value().is_none(), Fault::ColumnTimeout);
         lost.insert_if(
-            speeds.value().is_none() && !refused(Fault::SpeedStep),
+            motion.value().is_none() && !refused(Fault::SpeedStep),
             Fault::SpeedTimeout,
         );
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
@@ -147,9 +147,9 @@ impl<I: Injection> Step<'_, I> {
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
         self.inputs
-            .speeds
+            .motion
             .value()
-            .map(|speeds| speeds.iter().all(|speed| *speed >= least))
+            .map(|motion| motion.speeds.iter().all(|speed| *speed >= least))
     }
 
     /// Counts steps that came late or early, in a row. A very late one counts for all it missed.

@@ -10,7 +10,7 @@ use crate::bus::messages::{
     ParameterValue, Rejection, TIMEOUT, Telemetry, Vehicle, Warning,
 };
 use crate::bus::{Frame, Reject};
-use crate::controller::{Column, Input, Inputs, Request};
+use crate::controller::{Column, Input, Inputs, Motion, Request};
 use crate::faults::{Fault, FaultSet};
 use crate::law::LaneSample;
 use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
@@ -142,7 +142,7 @@ impl From<RequestWords> for Request {
 pub(super) struct Receivers {
     pub(super) lane: Redundant<Slot<LaneSample>>,
     pub(super) column: Redundant<Slot<Column>>,
-    pub(super) speeds: Redundant<Slot<[Speed; 2]>>,
+    pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
     pub(super) accepted: Accepted,
@@ -171,7 +171,7 @@ impl Receivers {
         Self {
             lane: Slot::redundant(e2e, lane, now),
             column: Slot::redundant(e2e, column, now),
-            speeds: Slot::redundant(e2e, [Speed::ZERO; 2], now),
+            motion: Slot::redundant(e2e, Motion::default(), now),
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::default(),
@@ -224,10 +224,11 @@ impl Receivers {
                 accepted.column = frame.full_data();
                 Ok(())
             }),
-            Vehicle::ID => self.speeds.change(|slot| {
-                let speeds = Vehicle::decode(&mut slot.e2e, frame)?.speeds;
-                let follows = |last: [Speed; 2]| {
-                    last.iter()
+            Vehicle::ID => self.motion.change(|slot| {
+                let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
+                let follows = |last: Motion| {
+                    last.speeds
+                        .iter()
                         .zip(&speeds)
                         .all(|(last, new)| speed_step_is_possible(*last, *new))
                 };
@@ -236,7 +237,7 @@ impl Receivers {
                     return Err(Reject::Step);
                 }
                 slot.doubt = 0;
-                slot.put(speeds, now);
+                slot.put(Motion::new(speeds, yaw_rate), now);
                 Ok(())
             }),
             Demand::ID => self.request.change(|slot| {
@@ -267,8 +268,8 @@ impl Receivers {
 
     /// Whether the vehicle stands: both speeds are known and next to nothing.
     pub(super) fn stands(&self) -> bool {
-        let speeds = self.speeds.get().and_then(Slot::last);
-        speeds.is_some_and(|speeds| speeds.iter().all(|speed| *speed <= STANDSTILL))
+        let motion = self.motion.get().and_then(Slot::last);
+        motion.is_some_and(|motion| motion.speeds.iter().all(|speed| *speed <= STANDSTILL))
     }
 
     /// The last lane preview passes for one that came now.
@@ -279,14 +280,14 @@ impl Receivers {
     /// What a step sees, or `None` if a receiver is damaged.
     pub(super) fn take(&mut self, now: Instant) -> Option<Inputs> {
         let (lane, lane_doubt) = self.lane.change(|slot| (slot.take(now), slot.doubt))?;
-        let (speeds, speeds_doubt) = self.speeds.change(|slot| (slot.take(now), slot.doubt))?;
+        let (motion, speeds_doubt) = self.motion.change(|slot| (slot.take(now), slot.doubt))?;
         let mut faults = FaultSet::NONE;
         // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
         if lane == Input::Lost {
             faults.insert_if(lane_doubt == INVALID, Fault::LaneInvalid);
             faults.insert_if(lane_doubt == STEP, Fault::LaneStep);
         }
-        faults.insert_if(speeds == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
+        faults.insert_if(motion == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
         if self.foreign > 0 {
             self.foreign = self.foreign.saturating_sub(1);
             faults.insert(Fault::OwnIdentifier);
@@ -294,7 +295,7 @@ impl Receivers {
         Some(Inputs {
             lane,
             column: self.column.change(|slot| slot.take(now))?,
-            speeds,
+            motion,
             request: self.request.change(|slot| slot.take(now).map(Request::from))?,
             faults,
         })

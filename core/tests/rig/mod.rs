@@ -14,7 +14,7 @@ use haptic_core::config::Setup;
 use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::modes::Mode;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;
@@ -40,6 +40,8 @@ pub(crate) struct Rig {
     counters: [u8; 4],
     pub(crate) lane: LanePreview,
     pub(crate) speeds: [f64; 2],
+    /// The measured yaw rate, if there is one.
+    pub(crate) yaw_rate: Option<f64>,
     pub(crate) engage: bool,
     pub(crate) authority: f64,
     pub(crate) probe: bool,
@@ -75,6 +77,7 @@ impl Rig {
                 ..LanePreview::default()
             },
             speeds: [SPEED; 2],
+            yaw_rate: None,
             engage: false,
             authority: 1.0,
             probe: false,
@@ -140,6 +143,7 @@ impl Rig {
             }
             2 => Vehicle {
                 speeds: self.speeds.map(Speed::from_m_per_s),
+                yaw_rate: self.yaw_rate.map(TurningRate::from_rad_per_s),
             }
             .encode(counter),
             _ => Demand {

@@ -15,10 +15,11 @@ pub(super) enum Signal {
     WheelAngle,
     Speed1,
     Speed2,
+    YawRate,
 }
 
 impl Signal {
-    pub(super) const COUNT: usize = 6;
+    pub(super) const COUNT: usize = 7;
 }
 
 /// What becomes of a value.

@@ -5,7 +5,7 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -24,6 +24,7 @@ pub(super) struct SensorReadings {
     pub(super) lane_valid: bool,
     pub(super) column: Option<(f64, f64)>,
     pub(super) speeds_m_per_s: Option<[f64; 2]>,
+    pub(super) yaw_rate_rad_per_s: Option<f64>,
 }
 
 /// The senders with their counters, and the values that a fault remembers.
@@ -75,6 +76,10 @@ impl Senders {
                 read(Signal::Speed2, observation.speed_m_per_s),
             ]
         });
+        let yaw_rate_rad_per_s = observation
+            .yaw_rate_rad_per_s
+            .filter(|_| at(HOST_PERIOD_MS))
+            .map(|rate| read(Signal::YawRate, rate));
         let column = at(COLUMN_PERIOD_MS).then(|| {
             (
                 read(
@@ -98,6 +103,7 @@ impl Senders {
             lane_valid: since_s.is_none() || !injections.contains(&Injection::Invalid),
             column,
             speeds_m_per_s,
+            yaw_rate_rad_per_s,
         }
     }
 
@@ -152,6 +158,7 @@ impl Senders {
         if let Some(speeds_m_per_s) = readings.speeds_m_per_s {
             let message = Vehicle {
                 speeds: speeds_m_per_s.map(Speed::from_m_per_s),
+                yaw_rate: readings.yaw_rate_rad_per_s.map(TurningRate::from_rad_per_s),
             };
             frames.push(message.encode(count(2)));
         }

@@ -202,6 +202,7 @@ impl<G: Guidance> Simulation<G> {
             wheel_angle_rad: self.plant.wheel_angle_rad(),
             motor_torque_nm: self.motor_torque_nm,
             speed_m_per_s: self.plan.speed_m_per_s,
+            yaw_rate_rad_per_s: Some(self.plant.yaw_rate_rad_per_s()),
             request: self.plan.request(action),
         };
         let seen = match &mut self.sensing {

@@ -134,6 +134,7 @@ impl Product {
     fn send_speeds(&mut self, counter: &mut u8, count: u8) -> Result<(), PilError> {
         let standing = Vehicle {
             speeds: [Speed::ZERO; 2],
+            yaw_rate: None,
         };
         for _ in 0..count {
             self.write(&link::encode(self.channel, &standing.encode(*counter)))?;

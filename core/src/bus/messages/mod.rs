@@ -20,7 +20,7 @@ use super::frame::Frame;
 use crate::quantity::{Micros, shift_round};
 
 /// Version of the bus: of identifiers, layouts and data IDs. `core/haptic.dbc` carries the same.
-pub const VERSION: &str = "2.1.0";
+pub const VERSION: &str = "2.2.0";
 
 /// Who sends a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use crate::residual::Seen;
 
 use Change::{Approaching, Drifting, Frozen, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
 use Injection::{Invalid, Sensor};
-use Signal::{DriverTorque, LateralError, Speed1, Speed2, WheelAngle, YawError};
+use Signal::{DriverTorque, LateralError, Speed1, Speed2, WheelAngle, YawError, YawRate};
 
 /// Moves the vehicle aside within a second: faults of the lane errors show.
 const JERK: Injection = Injection::Hand(Hand::Jerk {
@@ -67,6 +67,7 @@ pub(super) const ROWS: &[FaultCase] = &[
             Sensor(WheelAngle, Frozen),
             Sensor(Speed1, Frozen),
             Sensor(Speed2, Frozen),
+            Sensor(YawRate, Frozen),
         ],
     )
     .contradicts(),
