@@ -16,6 +16,8 @@ pub enum Stream {
     Car,
     /// Which roads, drivers and winds a population of drives meets.
     Population,
+    /// Noise of the yaw-rate sensor.
+    Gyro,
 }
 
 impl Stream {
@@ -28,6 +30,7 @@ impl Stream {
             Self::Faults => 3,
             Self::Car => 4,
             Self::Population => 5,
+            Self::Gyro => 6,
         };
         split_mix(split_mix(root) ^ name)
     }
@@ -64,11 +67,12 @@ mod tests {
             Stream::Faults,
             Stream::Car,
             Stream::Population,
+            Stream::Gyro,
         ];
         let seeds: std::collections::BTreeSet<u64> = (0..1000)
             .flat_map(|root| streams.map(|stream| stream.seed(root)))
             .collect();
-        assert_eq!(seeds.len(), 6000);
+        assert_eq!(seeds.len(), 7000);
         assert_eq!(Stream::Remnant.seed(7), 7);
     }
 }

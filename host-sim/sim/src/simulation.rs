@@ -20,7 +20,7 @@ use haptic_log::trace::{Sample, Trace};
 
 use crate::action::{Action, Request, WorldFaults};
 use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
-use crate::models::disturbances::{ErringCamera, SensorErrors};
+use crate::models::disturbances::{ErringCamera, ErringGyro, SensorErrors};
 use crate::models::driver::{ArmGains, Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::real::RealPlant;
@@ -401,6 +401,7 @@ impl Plan {
 struct Sensing {
     errors: SensorErrors,
     camera: ErringCamera,
+    gyro: ErringGyro,
 }
 
 impl Sensing {
@@ -410,7 +411,8 @@ impl Sensing {
             return None;
         }
         let camera = ErringCamera::new(errors, Stream::Sensors.seed(scenario.seed()));
-        Some(Box::new(Self { errors, camera }))
+        let gyro = ErringGyro::new(errors, Stream::Gyro.seed(scenario.seed()));
+        Some(Box::new(Self { errors, camera, gyro }))
     }
 
     /// What the sensors make of the truth.
@@ -424,6 +426,9 @@ impl Sensing {
             driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias,
             wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias.to_radians(),
             speed_m_per_s: self.errors.speed_gain * truth.speed_m_per_s,
+            yaw_rate_rad_per_s: truth
+                .yaw_rate_rad_per_s
+                .map(|rate| self.gyro.see(truth.step, rate)),
             ..*truth
         }
     }

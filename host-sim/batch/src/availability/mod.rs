@@ -1,7 +1,7 @@
 //! How often the ECU hands over although nothing is wrong: many cars on many roads, for hours.
 //!
 //! A *leg* is five minutes of driving: a car of the population on a road of its own, with a driver who keeps the lane as
-//! people do. It begins engaged. After every handover the driver takes over, and asks for guidance again 5 s later. A
+//! people do. It begins engaged. After every handover the driver drives alone, and asks for guidance again 5 s later. A
 //! leg ends where the ECU latches a fault: only a standstill would end that. A *declaration* is what took guidance away; as
 //! nothing is wrong in any leg, each is a false one. A *condition* says what is real about the world.
 //!

@@ -25,13 +25,13 @@ pub const ROADS: [Road; 2] = [
         name: "motorway",
         speed_kmh: [100.0, 130.0],
         lateral_m_per_s2: 1.5,
-        remnant_sd_nm: 0.2,
+        remnant_sd_nm: 0.4,
     },
     Road {
         name: "country",
         speed_kmh: [60.0, 100.0],
         lateral_m_per_s2: 2.5,
-        remnant_sd_nm: 0.18,
+        remnant_sd_nm: 0.36,
     },
 ];
 

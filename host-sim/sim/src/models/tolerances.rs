@@ -48,6 +48,8 @@ pub struct Tolerances {
     pub speed_gain: f64,
     /// Standard deviation of the camera's yaw, mrad.
     pub camera_yaw: f64,
+    /// Standard deviation of the yaw rate's bias, mrad/s.
+    pub yaw_rate_bias: f64,
 }
 
 /// A car as it is: what a scenario's tables say, with what its tolerances have drawn.
@@ -103,7 +105,8 @@ impl Tolerances {
         in_range("torque_gain", self.torque_gain, 0.0..=0.15, "")?;
         in_range("angle_bias", self.angle_bias, 0.0..=5.0, "deg")?;
         in_range("speed_gain", self.speed_gain, 0.0..=0.15, "")?;
-        in_range("camera_yaw", self.camera_yaw, 0.0..=15.0, "mrad")
+        in_range("camera_yaw", self.camera_yaw, 0.0..=15.0, "mrad")?;
+        in_range("yaw_rate_bias", self.yaw_rate_bias, 0.0..=30.0, "mrad/s")
     }
 
     /// The car that `seed` draws around one on paper.
@@ -127,6 +130,7 @@ impl Tolerances {
         errors.angle_bias += self.angle_bias * draw.normal();
         errors.speed_gain *= 1.0 + self.speed_gain * draw.normal();
         errors.camera_yaw += self.camera_yaw * draw.normal();
+        errors.yaw_rate_bias += self.yaw_rate_bias * draw.normal();
         car
     }
 }
