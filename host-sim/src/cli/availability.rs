@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::availability::{Availability, CONDITIONS, Leg, Plan, ROADS, study};
+use haptic_batch::availability::{Availability, Leg, Plan, ROADS, study};
 use haptic_report::studies::availability as files;
+use haptic_sim::worlds::WORLDS;
 
 use super::checkpoint::Checkpoint;
 use super::output::Output;
@@ -12,12 +13,12 @@ use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Hours in each condition on each road, in drives of five minutes
+    /// Hours in each world on each road, in drives of five minutes
     #[arg(long, value_name = "H", default_value_t = 0.25)]
     hours: f64,
-    /// Conditions, by name, separated by commas; default: all (--list shows them)
+    /// Worlds, by name, separated by commas; default: all (--list shows them)
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
-    conditions: Vec<String>,
+    worlds: Vec<String>,
     /// Roads, by name, separated by commas: motorway, country; default: both
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     roads: Vec<String>,
@@ -27,7 +28,7 @@ pub(super) struct Arguments {
     /// Keep every drive in FILE as soon as it is done; a run with the same FILE goes on from there
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Fail (exit code 1) if with 95 % confidence the rate of a judged condition may be above R an hour
+    /// Fail (exit code 1) if with 95 % confidence the rate of a judged world may be above R an hour
     #[arg(long, value_name = "R")]
     most_per_hour: Option<f64>,
     /// Directory for figures, the results and a report; default: no files
@@ -36,14 +37,14 @@ pub(super) struct Arguments {
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
-    /// Say what is real in each condition, and drive nothing
+    /// Say what is real in each world, and drive nothing
     #[arg(long, conflicts_with_all = ["out", "json", "checkpoint"])]
     list: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.list {
-        print(&files::conditions().to_text())?;
+        print(&files::worlds().to_text())?;
         return Ok(Outcome::Good);
     }
     let plan = plan(arguments)?;
@@ -98,12 +99,12 @@ fn plan(arguments: &Arguments) -> Result<Plan, BadInput> {
     let unknown = |option: &str, name: &str, all: String| {
         BadInput(format!("{option}: there is no {name}; there are {all}"))
     };
-    let conditions = chosen(&arguments.conditions, &CONDITIONS, |c| c.name)
-        .map_err(|(name, all)| unknown("--conditions", &name, all))?;
+    let worlds = chosen(&arguments.worlds, &WORLDS, |c| c.name)
+        .map_err(|(name, all)| unknown("--worlds", &name, all))?;
     let roads =
         chosen(&arguments.roads, &ROADS, |r| r.name).map_err(|(name, all)| unknown("--roads", &name, all))?;
     Ok(Plan {
-        conditions,
+        worlds,
         roads,
         hours: arguments.hours,
         seed: arguments.seed,

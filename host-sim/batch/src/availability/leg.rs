@@ -13,7 +13,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::{CARS, Condition, LEG_S, Road};
+use super::{CARS, LEG_S, Road, WorldKind};
 
 /// The driver asks for guidance again so long after it has left, ms.
 const AGAIN_MS: u32 = 5000;
@@ -27,7 +27,7 @@ const REMNANT_CORNER_HZ: f64 = 0.1;
 #[derive(Debug, Clone, Copy)]
 pub struct LegNumber {
     /// The world.
-    pub condition: &'static Condition,
+    pub world: &'static WorldKind,
     /// The road.
     pub road: &'static Road,
     /// Counted from zero; legs of one number share course, driver, car and noise.
@@ -38,8 +38,8 @@ pub struct LegNumber {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Leg {
-    /// Name of the condition.
-    pub condition: String,
+    /// Name of the world.
+    pub world: String,
     /// Name of the road.
     pub road: String,
     /// Which leg.
@@ -89,9 +89,7 @@ pub struct Declaration {
 impl Leg {
     /// Whether it is the leg of that number.
     pub fn is(&self, number: &LegNumber) -> bool {
-        self.number == number.number
-            && self.condition == number.condition.name
-            && self.road == number.road.name
+        self.number == number.number && self.world == number.world.name && self.road == number.road.name
     }
 }
 
@@ -99,13 +97,9 @@ impl LegNumber {
     /// The scenario of this leg.
     ///
     /// # Errors
-    /// As [`haptic_sim::scenario::ScenarioBuilder::build`]; no built-in condition meets one.
+    /// As [`haptic_sim::scenario::ScenarioBuilder::build`]; no built-in world meets one.
     pub fn scenario(&self, root: u64) -> Result<Scenario, String> {
-        let Self {
-            condition,
-            road,
-            number,
-        } = self;
+        let Self { world, road, number } = self;
         let named = road.name.bytes().fold(0_u64, |hash, byte| {
             hash.wrapping_mul(31).wrapping_add(byte.into())
         });
@@ -119,8 +113,8 @@ impl LegNumber {
         let reliance: f64 = rng.random();
         // Noise of its own; 53 bits, so that any reader of JSON keeps it.
         let noise = rng.random::<u64>() >> 11;
-        let lateral = condition.lateral_m_per_s2().unwrap_or(road.lateral_m_per_s2);
-        let course = road.course(speed_kmh / 3.6, lateral, condition.surface(), &mut rng);
+        let lateral = world.lateral_m_per_s2().unwrap_or(road.lateral_m_per_s2);
+        let course = road.course(speed_kmh / 3.6, lateral, world.surface(), &mut rng);
         let car = (root << 16).wrapping_add((number % CARS).into()) >> 1;
         let scenario = Scenario::builder()
             .course(course)
@@ -132,9 +126,9 @@ impl LegNumber {
                 ..COMPETENT()
             })
             .gains(arm(speed_kmh / 3.6, reliance))
-            .world(condition.world())
-            .tolerances(condition.tolerances(car))
-            .sensor_errors(condition.sensor_errors())
+            .world(world.parameters())
+            .tolerances(world.tolerances(car))
+            .sensor_errors(world.sensor_errors())
             .seed(noise)
             .build()?;
         Ok(scenario)
@@ -163,7 +157,7 @@ impl LegNumber {
         let samples = watch.samples.max(1.0);
         let mean_m = watch.sum_m / samples;
         Ok(Leg {
-            condition: self.condition.name.into(),
+            world: self.world.name.into(),
             road: self.road.name.into(),
             number: self.number,
             car: scenario.tolerances().car.unwrap_or_default(),

@@ -3,23 +3,22 @@
 //! A *leg* is five minutes of driving: a car of the population on a road of its own, with a driver who keeps the lane as
 //! people do. It begins engaged. After every handover the driver drives alone, and asks for guidance again 5 s later. A
 //! leg ends where the ECU latches a fault: only a standstill would end that. A *declaration* is what took guidance away; as
-//! nothing is wrong in any leg, each is a false one. A *condition* says what is real about the world.
+//! nothing is wrong in any leg, each is a false one. A *world* says what is real (`haptic_sim::worlds`).
 //!
-//! Legs of one number and road share course, driver, car and noise in every condition, so that conditions can be
+//! Legs of one number and road share course, driver, car and noise in every world, so that worlds can be
 //! compared. A leg depends on the seed and on its own number alone: in whatever order and in however many sittings legs
 //! are driven, the results are the same.
 //!
 //! Not here: what is missed. `haptic-campaign` injects faults into the same world.
 
-mod conditions;
 mod leg;
 mod roads;
 
+use haptic_sim::worlds::WorldKind;
 use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-pub use conditions::{CONDITIONS, Condition};
 pub use leg::{Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
 
@@ -32,10 +31,10 @@ pub const CARS: u32 = 30;
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// By name; all if empty.
-    pub conditions: Vec<&'static Condition>,
+    pub worlds: Vec<&'static WorldKind>,
     /// Roads to drive on.
     pub roads: Vec<&'static Road>,
-    /// Hours in each condition on each road.
+    /// Hours in each world on each road.
     pub hours: f64,
     /// Root of all random numbers.
     pub seed: u64,
@@ -46,17 +45,11 @@ impl Plan {
     pub fn legs(&self) -> Vec<LegNumber> {
         let legs = (self.hours * 3600.0 / LEG_S - 1e-9).ceil().max(1.0) as u32;
         let cells = self
-            .conditions
+            .worlds
             .iter()
-            .flat_map(|condition| self.roads.iter().map(move |road| (*condition, *road)));
+            .flat_map(|world| self.roads.iter().map(move |road| (*world, *road)));
         cells
-            .flat_map(|(condition, road)| {
-                (0..legs).map(move |number| LegNumber {
-                    condition,
-                    road,
-                    number,
-                })
-            })
+            .flat_map(|(world, road)| (0..legs).map(move |number| LegNumber { world, road, number }))
             .collect()
     }
 
@@ -118,11 +111,11 @@ fn quantile(law: &ChiSquared, share: f64) -> f64 {
     high
 }
 
-/// What a condition on a road showed.
+/// What driving in a world on a road showed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
-    /// Name of the condition.
-    pub condition: &'static str,
+    /// Name of the world.
+    pub world: &'static str,
     /// Name of the road.
     pub road: &'static str,
     /// Whether no declaration is to be expected: nothing in it is beyond what roads and cars are.
@@ -163,16 +156,16 @@ pub struct Cause {
 pub struct Availability {
     /// Root of all random numbers.
     pub seed: u64,
-    /// Hours asked for in each condition on each road.
+    /// Hours asked for in each world on each road.
     pub hours: f64,
-    /// By condition and road.
+    /// By world and road.
     pub cells: Vec<Cell>,
 }
 
 /// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
 ///
 /// # Errors
-/// A condition that is no scenario; the built-in ones are.
+/// A world that is no scenario; the built-in ones are.
 pub fn study(
     plan: &Plan,
     on_record: &[Leg],
@@ -196,16 +189,16 @@ pub fn study(
 }
 
 fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
-    let cells = plan.conditions.iter().flat_map(|condition| {
+    let cells = plan.worlds.iter().flat_map(|world| {
         plan.roads.iter().map(|road| {
             let mut of_cell: Vec<&Leg> = legs
                 .iter()
                 .copied()
-                .filter(|leg| leg.condition == condition.name && leg.road == road.name)
+                .filter(|leg| leg.world == world.name && leg.road == road.name)
                 .collect();
             // Sums are the same in whatever order the legs were driven.
             of_cell.sort_by_key(|leg| leg.number);
-            cell(condition, road, &of_cell)
+            cell(world, road, &of_cell)
         })
     });
     Availability {
@@ -215,7 +208,7 @@ fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
     }
 }
 
-fn cell(condition: &Condition, road: &Road, legs: &[&Leg]) -> Cell {
+fn cell(world: &WorldKind, road: &Road, legs: &[&Leg]) -> Cell {
     let sum = |of: fn(&Leg) -> f64| legs.iter().map(|leg| of(leg)).sum::<f64>();
     let hours = sum(|leg| leg.driven_s) / 3600.0;
     let declared = || legs.iter().flat_map(|leg| &leg.declarations);
@@ -237,9 +230,9 @@ fn cell(condition: &Condition, road: &Road, legs: &[&Leg]) -> Cell {
             .len()
     };
     Cell {
-        condition: condition.name,
+        world: world.name,
         road: road.name,
-        judged: condition.judged,
+        judged: world.judged,
         hours,
         available: sum(|leg| leg.active_s) / (3600.0 * hours),
         declarations: Rate::of(declared().count() as u64, hours),

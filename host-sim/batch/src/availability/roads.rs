@@ -1,6 +1,7 @@
 //! Roads as they are built: straights and curves in turn, clothoids between them, a crossfall, superelevated curves.
 
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
+use haptic_sim::worlds::Surface;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -40,23 +41,6 @@ const LEAST_LATERAL_M_PER_S2: f64 = 0.3;
 /// Room behind the leg for the points that are looked at, s.
 const AHEAD_S: f64 = 3.0;
 
-/// How a road lies across.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surface {
-    /// Fall to the right on a straight.
-    pub crossfall: f64,
-    /// Most superelevation of a curve.
-    pub superelevation: f64,
-}
-
-impl Surface {
-    /// No bank anywhere.
-    pub const FLAT: Self = Self {
-        crossfall: 0.0,
-        superelevation: 0.0,
-    };
-}
-
 impl Road {
     /// A course for a leg: a curve about every 20 s, to either side, as sharp as is drawn.
     pub(super) fn course(
@@ -69,21 +53,14 @@ impl Road {
         let v = v_m_per_s;
         let mut segments = Vec::new();
         let mut driven_s = 0.0;
-        // Left edge higher on a straight with a fall to the right.
-        let crossfall_rad = surface.crossfall.atan();
+        let crossfall_rad = surface.straight_rad();
         while driven_s < LEG_S + AHEAD_S {
             let straight_s = rng.random_range(4.0..10.0);
             let [into_s, arc_s] = [rng.random_range(2.0..3.5), rng.random_range(3.0..9.0)];
             let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
             let lateral = rng.random_range(LEAST_LATERAL_M_PER_S2..lateral_m_per_s2);
             let curvature_1pm = side * lateral / (v * v);
-            // As design rules have it: from the crossfall up with the lateral acceleration, the outer edge higher.
-            let share = lateral / lateral_m_per_s2;
-            let steep = surface
-                .crossfall
-                .max(surface.superelevation * share)
-                .min(surface.superelevation);
-            let bank_rad = -side * steep.atan();
+            let bank_rad = surface.curve_rad(side * lateral / lateral_m_per_s2);
             let no_grade = [0.0; 2];
             segments.extend([
                 Segment::straight(v * straight_s).with_surface([crossfall_rad; 2], no_grade),

@@ -1,3 +1,5 @@
+use haptic_sim::worlds::WORLDS;
+
 use super::*;
 
 /// Exact limits of a Poisson count as tables print them (Garwood 1936; Ulm 1990): 0 to 3.689, 0.0253 to 5.572, 4.795 to
@@ -21,9 +23,9 @@ fn intervals_are_those_of_the_tables() {
 }
 
 fn plan(hours: f64) -> Plan {
-    let named = |name: &str| CONDITIONS.iter().find(|c| c.name == name).unwrap();
+    let named = |name: &str| WORLDS.iter().find(|c| c.name == name).unwrap();
     Plan {
-        conditions: vec![named("calibrated"), named("everything")],
+        worlds: vec![named("calibrated"), named("everything")],
         roads: vec![&ROADS[1]],
         hours,
         seed: 1,
@@ -35,21 +37,19 @@ fn legs_fill_the_hours_and_the_first_ones_stay_when_there_are_more() {
     let [few, many] = [plan(0.25), plan(0.5)].map(|plan| plan.legs());
     assert_eq!((few.len(), many.len()), (6, 12));
     for leg in &few {
-        let same = many.iter().find(|other| {
-            other.number == leg.number && other.condition == leg.condition && other.road == leg.road
-        });
+        let same = many
+            .iter()
+            .find(|other| other.number == leg.number && other.world == leg.world && other.road == leg.road);
         assert_eq!(same.unwrap().scenario(1), leg.scenario(1));
     }
 }
 
-/// What is compared must differ in the condition alone.
+/// What is compared must differ in the world alone.
 #[test]
-fn conditions_share_road_driver_and_noise() {
+fn worlds_share_road_driver_and_noise() {
     let legs = plan(0.1).legs();
-    let of = |condition: &str| {
-        let leg = legs
-            .iter()
-            .find(|leg| leg.condition.name == condition && leg.number == 1);
+    let of = |world: &str| {
+        let leg = legs.iter().find(|leg| leg.world.name == world && leg.number == 1);
         leg.unwrap().scenario(3).unwrap()
     };
     let (paper, real) = (of("calibrated"), of("everything"));
@@ -73,7 +73,7 @@ fn roads_are_built_as_they_say() {
     let leg = plan(0.1)
         .legs()
         .into_iter()
-        .find(|leg| leg.condition.name == "everything")
+        .find(|leg| leg.world.name == "everything")
         .unwrap();
     let scenario = leg.scenario(1).unwrap();
     let v = scenario.speed_m_per_s();
@@ -117,7 +117,7 @@ fn an_interrupted_study_goes_on_where_it_was() {
         assert!(
             (0.1..0.5).contains(&cell.sdlp_m),
             "{}: {} m",
-            cell.condition,
+            cell.world,
             cell.sdlp_m
         );
         assert_eq!(cell.diverged, 0);

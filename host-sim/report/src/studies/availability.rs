@@ -6,7 +6,8 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::availability::{Availability, CONDITIONS, Cell as Row, Rate};
+use haptic_batch::availability::{Availability, Cell as Row, Rate};
+use haptic_sim::worlds::{WORLDS, WorldKind};
 
 /// What the study is about.
 pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
@@ -27,7 +28,7 @@ pub fn write(results: &Availability, directory: &Path) -> Result<(), OutputError
         Block::Figure { figure, caption },
         Block::Table(table(results)),
         Block::Table(causes(results)),
-        Block::Table(conditions()),
+        Block::Table(worlds()),
     ];
     write_report(
         directory,
@@ -52,11 +53,11 @@ fn interval(rate: &Rate) -> Cell {
     Cell::Text(format!("{:.2} to {:.2}", rate.interval[0], rate.interval[1]))
 }
 
-/// Every condition on every road.
+/// Every world on every road.
 pub fn table(results: &Availability) -> Table {
     let row = |row: &Row| {
         vec![
-            Cell::Text(row.condition.into()),
+            Cell::Text(row.world.into()),
             Cell::Text(row.road.into()),
             Cell::number(row.hours, 2),
             Cell::number(row.declarations.count as f64, 0),
@@ -73,7 +74,7 @@ pub fn table(results: &Availability) -> Table {
     Table {
         caption: String::new(),
         columns: [
-            "Condition",
+            "World",
             "Road",
             "Hours",
             "False declarations",
@@ -97,7 +98,7 @@ pub fn causes(results: &Availability) -> Table {
     let rows = results.cells.iter().flat_map(|row| {
         row.causes.iter().map(|cause| {
             vec![
-                Cell::Text(row.condition.into()),
+                Cell::Text(row.world.into()),
                 Cell::Text(row.road.into()),
                 Cell::Text(cause.faults.clone()),
                 Cell::number(cause.rate.count as f64, 0),
@@ -109,7 +110,7 @@ pub fn causes(results: &Availability) -> Table {
     Table {
         caption: "By what the ECU named".into(),
         columns: [
-            "Condition",
+            "World",
             "Road",
             "Faults",
             "Declarations",
@@ -122,15 +123,13 @@ pub fn causes(results: &Availability) -> Table {
     }
 }
 
-/// What is real in each condition.
-pub fn conditions() -> Table {
-    let row = |c: &haptic_batch::availability::Condition| {
-        vec![Cell::Text(c.name.into()), Cell::Text(c.what.into())]
-    };
+/// What is real in each world.
+pub fn worlds() -> Table {
+    let row = |c: &WorldKind| vec![Cell::Text(c.name.into()), Cell::Text(c.what.into())];
     Table {
-        caption: "What is real in a condition".into(),
-        columns: ["Condition", "What is real"].map(String::from).to_vec(),
-        rows: CONDITIONS.iter().map(row).collect(),
+        caption: "What is real in each world".into(),
+        columns: ["World", "What is real"].map(String::from).to_vec(),
+        rows: WORLDS.iter().map(row).collect(),
     }
 }
 
@@ -143,7 +142,12 @@ fn figure(results: &Availability) -> Figure {
             .map(|(i, row)| (i as f64 + 1.0, row))
     };
     let rates = places().map(|(x, row)| (x, row.declarations.per_hour)).collect();
-    let ends = places().map(|(_, row)| row.declarations.interval).collect();
+    // A whisker of a figure that lies on its side: a line of its own for each row.
+    let ends = places().flat_map(|(x, row)| {
+        let [low, high] = row.declarations.interval;
+        [(x, low), (x, high), (x, f64::NAN)]
+    });
+    let ends: Vec<(f64, f64)> = ends.collect();
     let away = places()
         .map(|(x, row)| (x, 100.0 * (1.0 - row.available)))
         .collect();
@@ -156,13 +160,16 @@ fn figure(results: &Availability) -> Figure {
         rows: results
             .cells
             .iter()
-            .map(|row| format!("{}, {}", row.condition, row.road))
+            .map(|row| format!("{}, {}", row.world, row.road))
             .collect(),
         panels: vec![
             Panel {
                 title: "False declarations".into(),
                 y: from_zero("1/h", most(|row| row.declarations.interval[1])),
-                series: vec![Series::with_mark("", 1, Mark::Whiskers(ends), rates)],
+                series: vec![
+                    Series::line("95 % interval", 3, ends),
+                    Series::dots("declarations", 1, rates),
+                ],
             },
             Panel {
                 title: "Time without guidance".into(),

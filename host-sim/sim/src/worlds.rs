@@ -1,14 +1,46 @@
-//! What is real about the world: from the one on paper to what roads, winds, cars and cameras are.
+//! Worlds by name: from the one on paper to what roads, winds, cars and cameras are, and beyond.
+//!
+//! A world is a kind: each drive in it meets another car, another wind and another road.
 
-use haptic_sim::models::disturbances::SensorErrors;
-use haptic_sim::models::real::{Tyres, WorldParameters};
-use haptic_sim::models::tolerances::Tolerances;
+use crate::models::disturbances::SensorErrors;
+use crate::models::real::{Tyres, WorldParameters};
+use crate::models::tolerances::Tolerances;
 
-use super::roads::Surface;
+/// How a road lies across.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Fall to the right on a straight.
+    pub crossfall: f64,
+    /// Most superelevation of a curve.
+    pub superelevation: f64,
+}
+
+impl Surface {
+    /// No bank anywhere.
+    pub const FLAT: Self = Self {
+        crossfall: 0.0,
+        superelevation: 0.0,
+    };
+
+    /// Bank of a straight, rad: a fall to the right leaves the left edge higher.
+    pub fn straight_rad(&self) -> f64 {
+        self.crossfall.atan()
+    }
+
+    /// Bank of a curve, rad, whose lateral acceleration (left positive) is that share of the sharpest curve's: as design
+    /// rules have it, from the crossfall up, the outer edge higher.
+    pub fn curve_rad(&self, share: f64) -> f64 {
+        let steep = self
+            .crossfall
+            .max(self.superelevation * share.abs())
+            .min(self.superelevation);
+        -steep.atan().copysign(share)
+    }
+}
 
 /// A world to drive in.
 #[derive(Debug, PartialEq)]
-pub struct Condition {
+pub struct WorldKind {
     /// By which it is asked for.
     pub name: &'static str,
     /// What is real in it, in words.
@@ -45,40 +77,40 @@ enum Part {
 
 use Part::{Assist, Bank, Camera, Friction, Motor, Slippery, Steep, Wind};
 
-/// Every condition, from paper to beyond.
-pub const CONDITIONS: [Condition; 10] = [
-    condition("calibrated", "a calibrated car, flat road, no friction", &[]),
-    condition(
+/// Every world, from paper to beyond.
+pub const WORLDS: [WorldKind; 10] = [
+    world("calibrated", "a calibrated car, flat road, no friction", &[]),
+    world(
         "friction",
         "friction 0.2 to 0.4 N.m, saturating tyres",
         &[Friction, Part::Tyres],
     ),
-    condition(
+    world(
         "tolerances",
         "tyres and trail +-15 %, load to 300 kg, wheel angle 1 deg sd, torque sensor 0.08 N.m sd, camera yaw 1.5 mrad sd",
         &[Part::Tolerances],
     ),
-    condition(
+    world(
         "bank",
         "crossfall 2.5 %, superelevation to 6 %, friction, gusts to 600 N and 300 N.m",
         &[Bank, Friction, Wind],
     ),
-    condition(
+    world(
         "everything",
         "friction, tyres, tolerances, bank and wind together",
         EVERYTHING,
     ),
-    condition(
+    world(
         "motor",
         "everything, and a motor with 2 to 20 ms of lag, 10 % of error, 0.02 N.m of ripple",
         &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Motor],
     ),
-    condition(
+    world(
         "assist",
         "everything, and a power assist of 8 N.m at 3 N.m of driver torque, half of it at 60 km/h",
         &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Assist],
     ),
-    condition(
+    world(
         "camera",
         "everything, and a camera 40 ms late that does not say so, 10 ms of jitter, 0.03 m and 2 mrad of noise",
         &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Camera],
@@ -97,8 +129,8 @@ pub const CONDITIONS: [Condition; 10] = [
 
 const EVERYTHING: &[Part] = &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind];
 
-const fn condition(name: &'static str, what: &'static str, parts: &'static [Part]) -> Condition {
-    Condition {
+const fn world(name: &'static str, what: &'static str, parts: &'static [Part]) -> WorldKind {
+    WorldKind {
         name,
         what,
         judged: true,
@@ -106,14 +138,14 @@ const fn condition(name: &'static str, what: &'static str, parts: &'static [Part
     }
 }
 
-const fn beyond(name: &'static str, what: &'static str, parts: &'static [Part]) -> Condition {
-    Condition {
+const fn beyond(name: &'static str, what: &'static str, parts: &'static [Part]) -> WorldKind {
+    WorldKind {
         judged: false,
-        ..condition(name, what, parts)
+        ..world(name, what, parts)
     }
 }
 
-impl Condition {
+impl WorldKind {
     fn has(&self, part: Part) -> bool {
         self.parts.contains(&part)
     }
@@ -135,7 +167,7 @@ impl Condition {
     }
 
     /// Tyres, wind, motor and assist.
-    pub fn world(&self) -> WorldParameters {
+    pub fn parameters(&self) -> WorldParameters {
         let off = WorldParameters::default();
         WorldParameters {
             tyres: if self.has(Part::Tyres) {
