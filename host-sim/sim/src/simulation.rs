@@ -115,6 +115,7 @@ pub struct Simulation<G = AnyGuidance> {
     target_now_rad: f64,
     motor_torque_nm: f64,
     last_s_m: f64,
+    lateral_error_m: Option<f64>,
     step: u32,
     ending: Option<Ending>,
 }
@@ -161,6 +162,7 @@ impl<G: Guidance> Simulation<G> {
             target_now_rad: 0.0,
             motor_torque_nm: 0.0,
             last_s_m: 0.0,
+            lateral_error_m: None,
             step: 0,
             ending: None,
             road,
@@ -221,6 +223,7 @@ impl<G: Guidance> Simulation<G> {
             match self.road.project(x, y, &mut self.body) {
                 Some(projection) if projection.offset_m.abs() <= DIVERGED_M => {
                     self.last_s_m = projection.s_m;
+                    self.lateral_error_m = Some(projection.offset_m);
                     sample = Some(record(
                         &self.plant,
                         &projection,
@@ -329,6 +332,11 @@ impl<G: Guidance> Simulation<G> {
     /// Who guides, to change something about it in mid-run.
     pub fn guidance_mut(&mut self) -> &mut G {
         &mut self.guidance
+    }
+
+    /// Offset of the centre of gravity from the centreline at the last sample, m, left positive.
+    pub fn lateral_error_m(&self) -> Option<f64> {
+        self.lateral_error_m
     }
 
     /// Position of the centre of gravity, m, and the direction of movement, rad, not wrapped.

@@ -143,11 +143,12 @@ fn figure(results: &Availability) -> Figure {
     };
     let rates = places().map(|(x, row)| (x, row.declarations.per_hour)).collect();
     // A whisker of a figure that lies on its side: a line of its own for each row.
-    let ends = places().flat_map(|(x, row)| {
+    let ends = places().map(|(x, row)| {
         let [low, high] = row.declarations.interval;
-        [(x, low), (x, high), (x, f64::NAN)]
+        Series::line("95 % interval", 0, vec![(x, low), (x, high)])
     });
-    let ends: Vec<(f64, f64)> = ends.collect();
+    let mut rate: Vec<Series> = ends.collect();
+    rate.push(Series::dots("declarations", 1, rates));
     let away = places()
         .map(|(x, row)| (x, 100.0 * (1.0 - row.available)))
         .collect();
@@ -166,10 +167,7 @@ fn figure(results: &Availability) -> Figure {
             Panel {
                 title: "False declarations".into(),
                 y: from_zero("1/h", most(|row| row.declarations.interval[1])),
-                series: vec![
-                    Series::line("95 % interval", 3, ends),
-                    Series::dots("declarations", 1, rates),
-                ],
+                series: rate,
             },
             Panel {
                 title: "Time without guidance".into(),
