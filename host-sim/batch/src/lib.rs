@@ -11,6 +11,7 @@
 //! - [`run`]: one scenario.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
+//! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //!
 //! ```
@@ -28,6 +29,7 @@
 //!
 //! Not here: options and exit codes (the command line), how a metric is computed, which files are left and how they look.
 
+pub mod availability;
 pub mod bus_load;
 pub mod claims;
 pub mod course;

@@ -11,16 +11,19 @@
 
 use std::fmt;
 
+use haptic_sim::models::real::WorldParameters;
 use serde::Serialize;
 
 use super::injection::{Injection, Start};
 use super::residual::Seen;
 
+mod attacks;
 mod build;
 mod bus;
 mod inputs;
 mod memory;
 mod time;
+mod vehicle;
 
 /// Class of a reaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -131,6 +134,21 @@ pub struct FaultCase {
     pub(super) start: Start,
     /// Whether the onset follows a lane preview, and not any instant.
     pub(super) after_sample: bool,
+    /// Where on the road it begins, if not anywhere.
+    pub(super) place_on_road: Option<PlaceOnRoad>,
+    /// What is less than ideal about the car or the road from the start.
+    pub(super) plant: Option<fn(&mut WorldParameters)>,
+}
+
+/// Where on its road a run is when the fault begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PlaceOnRoad {
+    /// On a straight, a curve ahead.
+    Before,
+    /// In a curve.
+    In,
+    /// On a straight behind a curve.
+    After,
 }
 
 /// A list of rows under a heading.
@@ -143,7 +161,7 @@ pub struct Group {
 }
 
 /// Every row.
-pub const GROUPS: [Group; 4] = [
+pub const GROUPS: [Group; 6] = [
     Group {
         name: "Inputs",
         rows: inputs::ROWS,
@@ -159,6 +177,14 @@ pub const GROUPS: [Group; 4] = [
     Group {
         name: "Memory and power",
         rows: memory::ROWS,
+    },
+    Group {
+        name: "Camera, motor and road",
+        rows: vehicle::ROWS,
+    },
+    Group {
+        name: "Attacks by legal frames",
+        rows: attacks::ROWS,
     },
 ];
 
@@ -196,6 +222,8 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
         lasts_ms: None,
         start: Start::Engaged,
         after_sample: false,
+        place_on_road: None,
+        plant: None,
     }
 }
 

@@ -47,6 +47,8 @@ mod preview;
 pub mod scenario;
 pub mod seeds;
 pub mod simulation;
+pub mod stability;
+pub mod worlds;
 
 pub use action::Action;
 pub use scenario::Scenario;

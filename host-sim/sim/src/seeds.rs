@@ -8,10 +8,16 @@ pub enum Stream {
     Remnant,
     /// Noise of the sensors.
     Sensors,
-    /// Wind, road and tolerances.
+    /// Wind.
     World,
     /// When, how and to whom a fault happens.
     Faults,
+    /// Which car of a population.
+    Car,
+    /// Which roads, drivers and winds a population of drives meets.
+    Population,
+    /// Noise of the yaw-rate sensor.
+    Gyro,
 }
 
 impl Stream {
@@ -22,6 +28,9 @@ impl Stream {
             Self::Sensors => 1,
             Self::World => 2,
             Self::Faults => 3,
+            Self::Car => 4,
+            Self::Population => 5,
+            Self::Gyro => 6,
         };
         split_mix(split_mix(root) ^ name)
     }
@@ -51,11 +60,19 @@ mod tests {
 
     #[test]
     fn streams_and_roots_do_not_meet() {
-        let streams = [Stream::Remnant, Stream::Sensors, Stream::World, Stream::Faults];
+        let streams = [
+            Stream::Remnant,
+            Stream::Sensors,
+            Stream::World,
+            Stream::Faults,
+            Stream::Car,
+            Stream::Population,
+            Stream::Gyro,
+        ];
         let seeds: std::collections::BTreeSet<u64> = (0..1000)
             .flat_map(|root| streams.map(|stream| stream.seed(root)))
             .collect();
-        assert_eq!(seeds.len(), 4000);
+        assert_eq!(seeds.len(), 7000);
         assert_eq!(Stream::Remnant.seed(7), 7);
     }
 }

@@ -6,7 +6,9 @@
 //!
 //! One file per subcommand. Not here: anything that a study or a model decides.
 
+mod availability;
 mod bus;
+mod checkpoint;
 mod course;
 mod evaluate;
 mod experiment;
@@ -60,6 +62,8 @@ enum Command {
     Run(run::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
     Faults(faults::Arguments),
+    /// How often guidance leaves for nothing on real roads: many cars, hours of driving, by cause
+    Availability(availability::Arguments),
     /// What a lost input costs if the ECU hands over within 2 s, and if the torque is lost at once: 40 to 120 km/h
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
@@ -107,6 +111,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
+        Some(Command::Availability(arguments)) => availability::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),

@@ -71,6 +71,7 @@ pub fn table(campaign: &Campaign) -> Table {
             value: ms.map(f64::from),
             decimals: 0,
         };
+        let metres = |value: Option<f64>| Cell::Number { value, decimals: 2 };
         let verdict = match row.failures.len() {
             0 => "pass".into(),
             n => format!("FAIL in {n}"),
@@ -85,6 +86,15 @@ pub fn table(campaign: &Campaign) -> Table {
             time(row.deadline_ms),
             Cell::number(row.peak_torque_nm, 3),
             Cell::number(row.torque_bound_nm, 1),
+            count(row.left),
+            Cell::Number {
+                value: row.left_after_ms.map(|[median, _]| f64::from(median)),
+                decimals: 0,
+            },
+            Cell::number(row.deviation_m, 2),
+            metres(row.dropped_m),
+            metres(row.excess_m),
+            count(row.left_lane),
             Cell::Text(verdict),
         ]
     };
@@ -100,6 +110,12 @@ pub fn table(campaign: &Campaign) -> Table {
             "Deadline (ms)",
             "Peak torque (N.m)",
             "Bound (N.m)",
+            "ECU left",
+            "After (ms)",
+            "Deviation (m)",
+            "Dropped (m)",
+            "Excess (m)",
+            "Left lane",
             "Verdict",
         ]
         .map(String::from)

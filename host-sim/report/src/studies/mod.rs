@@ -1,6 +1,7 @@
 //! What each study leaves: its figures, its results, and the report that shows them. Each module makes its tables
 //! once, for the report and for the terminal.
 
+pub mod availability;
 pub mod bus;
 pub mod course;
 mod curves;

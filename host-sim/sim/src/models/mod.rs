@@ -10,6 +10,7 @@ pub mod plant;
 pub mod real;
 pub mod road;
 pub mod sensors;
+pub mod tolerances;
 pub mod vehicle;
 
 /// One step of the simulation, s: the control period of the ECU, and the grid of every delay and hold.
