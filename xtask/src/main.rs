@@ -16,6 +16,7 @@ mod gate;
 mod golden;
 mod identify;
 mod image;
+mod logs;
 mod qemu;
 mod seal;
 mod size;
@@ -89,6 +90,8 @@ enum Command {
     C,
     /// Builds the FMU of the controller (FMI 2.0 co-simulation) into target/dist, and has FMPy check it.
     Fmu,
+    /// Recordings: what `host-sim convert` writes is read by pandas, scipy, asammdf, python-can and mcap, and the other way.
+    Logs,
     /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
     BindingsAgree,
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
@@ -138,6 +141,7 @@ fn main() -> ExitCode {
         Command::Hil(options) => boards::hil(&options),
         Command::C => c_library::check(),
         Command::Fmu => fmu::check(),
+        Command::Logs => logs::check(),
         Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {

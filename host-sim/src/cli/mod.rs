@@ -7,6 +7,7 @@
 //! One file per subcommand. Not here: anything that a study or a model decides.
 
 mod bus;
+mod convert;
 mod course;
 mod evaluate;
 mod experiment;
@@ -18,6 +19,7 @@ mod parameters;
 mod participants;
 mod pil;
 mod progress;
+mod recording;
 mod reliance;
 mod road;
 mod run;
@@ -53,6 +55,8 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// A recording in another format: CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF; or a list of its channels
+    Convert(convert::Arguments),
     /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
     Course(course::Arguments),
     /// One scenario from a TOML file
@@ -101,6 +105,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
