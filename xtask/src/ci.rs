@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, bindings_agree, boards, c_library, gate, trace, wheel};
+use crate::{bench, bindings_agree, boards, c_library, gate, logs, trace, wheel};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -102,6 +102,7 @@ pub(crate) fn run_all() -> Result<()> {
         ("instructions on the host", &|| bench::run(false)),
         ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
         ("C library", &c_library::check),
+        ("recordings", &logs::check),
         ("bindings agree", &bindings_agree::check),
     ]);
     if !failed.is_empty() {

@@ -17,6 +17,7 @@ mod golden;
 mod identify;
 mod image;
 mod longest;
+mod logs;
 mod qemu;
 mod seal;
 mod size;
@@ -90,6 +91,8 @@ enum Command {
     C,
     /// Builds the FMU of the controller (FMI 2.0 co-simulation) into target/dist, and has FMPy check it.
     Fmu,
+    /// Recordings: what `host-sim convert` writes is read by pandas, scipy, asammdf, python-can and mcap, and the other way.
+    Logs,
     /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
     BindingsAgree,
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
@@ -139,6 +142,7 @@ fn main() -> ExitCode {
         Command::Hil(options) => boards::hil(&options),
         Command::C => c_library::check(),
         Command::Fmu => fmu::check(),
+        Command::Logs => logs::check(),
         Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {

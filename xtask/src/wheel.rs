@@ -144,7 +144,7 @@ fn install(wheel: &Path) -> Result<PathBuf> {
 }
 
 /// The interpreter of a virtual environment, made if it is not there.
-fn environment(place: &Path) -> Result<PathBuf> {
+pub(crate) fn environment(place: &Path) -> Result<PathBuf> {
     let python = place.join("bin/python");
     if !python.exists() {
         run(command("python3").args(["-m", "venv"]).arg(place))

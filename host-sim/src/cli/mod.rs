@@ -9,6 +9,7 @@
 mod availability;
 mod bus;
 mod checkpoint;
+mod convert;
 mod course;
 mod evaluate;
 mod experiment;
@@ -21,6 +22,7 @@ mod parameters;
 mod participants;
 mod pil;
 mod progress;
+mod recording;
 mod reliance;
 mod road;
 mod run;
@@ -56,6 +58,8 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// A recording in another format: CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF; or a list of its channels
+    Convert(convert::Arguments),
     /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
     Course(course::Arguments),
     /// One scenario from a TOML file
@@ -108,6 +112,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
