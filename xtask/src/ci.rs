@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, bindings_agree, boards, c_library, gate, logs, trace, wheel};
+use crate::{bench, bindings_agree, boards, by_hand, c_library, evidence, gate, logs, trace, wheel};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -104,6 +104,9 @@ pub(crate) fn run_all() -> Result<()> {
         ("C library", &c_library::check),
         ("recordings", &logs::check),
         ("bindings agree", &bindings_agree::check),
+        ("coverage of the core", &evidence::coverage),
+        ("defects made by hand", &by_hand::run),
+        ("defects in the last change", &evidence::mutants_of_last_commit),
     ]);
     if !failed.is_empty() {
         eprintln!("== failed: {}; the tests follow", failed.join(", "));
