@@ -14,14 +14,14 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use crate::config::Config;
+use crate::config::Setup;
 use crate::params::{PARAMETERS, Params};
 
 /// Length of a copy.
 pub const BYTES: usize = 8 + 8 * VALUES + 4;
 const VALUES: usize = PARAMETERS.len();
 /// Counts up with every change of the list of parameters: a copy of another layout is no copy.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What [`load`] found.
@@ -79,6 +79,6 @@ fn read(bytes: &[u8]) -> Option<(u32, Params)> {
         *si = f64::from_le_bytes(*bytes);
     }
     let params = Params::from_values(&si);
-    (is_whole && is_ours && Config::new(&params).is_ok())
+    (is_whole && is_ours && Setup::new(&params).is_ok())
         .then(|| (u32::from_le_bytes([*s0, *s1, *s2, *s3]), params))
 }
