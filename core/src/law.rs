@@ -118,28 +118,31 @@ impl Since {
 }
 
 impl LawState {
-    /// The errors and rates as they are now, but for what the rates say themselves. Both errors turn with the vehicle;
-    /// the near point moves aside by the way that it is ahead, and drifts at the speed times the heading, of which a
-    /// third of the age counts where the heading grew with the square of the time.
+    /// The state from which [`Law::torque`], which lets the errors go on at their rates, finds the errors and rates of now.
+    /// Both errors turn with the vehicle; the near point moves aside by the way that it is ahead, and drifts at the speed
+    /// times the heading, of which a third of the age counts where the heading grew with the square of the time.
     fn moved_on(&self, age: Micros, since: &Since) -> Self {
-        let to_rate = |bits: i64| saturate(shift_round(bits, 4));
         let turned = i64::from(since.turned.bits());
         let aside = product(since.near.bits(), since.turned.bits());
-        let drift = product(since.speed.bits(), since.turned.bits());
-        let drifted = per_second_times(drift, age) / 3;
-        let near_faster = product(since.near.bits(), since.faster.bits());
+        // What the yaw error's own rate makes of the lateral error's, and the heading beyond it.
+        let going = per_second_times(i64::from(self.e_theta_rate) << 4, age);
+        let drift = product(since.speed.bits(), saturate(turned.saturating_sub(going)));
+        let drifted = per_second_times(product(since.speed.bits(), since.turned.bits()), age) / 3;
+        let bent = per_second_times(product(since.speed.bits(), saturate(going)), age) / 2;
+        let slower_y = drift.saturating_add(product(since.near.bits(), since.faster.bits()));
+        let slower_theta = i64::from(since.faster.bits());
+        let error = |error: i32, away: i64, slower: i64| {
+            // The rates that are taken away below did not act all the time.
+            let ahead = per_second_times(slower, age);
+            i64::from(error).saturating_sub(away).saturating_add(ahead)
+        };
+        let away_y = aside.saturating_add(drifted).saturating_sub(bent);
+        let to_rate = |bits: i64| saturate(shift_round(bits, 4));
         let mut late = *self;
-        let e_y = i64::from(self.last.e_y.bits())
-            .saturating_sub(aside)
-            .saturating_sub(drifted);
-        late.last.e_y = Metres::from_wide(e_y);
-        late.last.e_theta = Radians::from_wide(i64::from(self.last.e_theta.bits()).saturating_sub(turned));
-        late.e_y_rate = self
-            .e_y_rate
-            .saturating_sub(to_rate(drift.saturating_add(near_faster)));
-        late.e_theta_rate = self
-            .e_theta_rate
-            .saturating_sub(to_rate(i64::from(since.faster.bits())));
+        late.last.e_y = Metres::from_wide(error(self.last.e_y.bits(), away_y, slower_y));
+        late.last.e_theta = Radians::from_wide(error(self.last.e_theta.bits(), turned, slower_theta));
+        late.e_y_rate = self.e_y_rate.saturating_sub(to_rate(slower_y));
+        late.e_theta_rate = self.e_theta_rate.saturating_sub(to_rate(slower_theta));
         late
     }
 

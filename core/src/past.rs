@@ -14,6 +14,10 @@ const RING: usize = 32;
 /// Two directions of the line are kept so far apart, so that the ring holds the time between near and far point.
 const APART: Micros = Micros::from_ms(20);
 
+/// The time over which the rate before a sample is taken, and how often it is in a second.
+const BEFORE: Micros = Micros::from_ms(50);
+const BEFORE_PER_S: i64 = 20;
+
 /// The vehicle's heading at an instant, and the rate at which it turned from there.
 #[derive(Debug, Clone, Copy)]
 pub struct Heading {
@@ -81,12 +85,16 @@ impl Past {
         *found.unwrap_or_else(|| place(RING.wrapping_sub(1)))
     }
 
-    /// How far the vehicle turned from an instant until now, and the rate at which it turned then.
+    /// How far the vehicle turned from an instant until now, and the rate at which it turned before then: over 50 ms, the
+    /// middle of which is as old as the law's filtered rates are.
     #[must_use]
     pub fn turned(&self, now: Instant, from: Instant) -> (Radians, TurningRate) {
         let then = self.heading(now, from);
         let turned = self.heading(now, now).psi_at(now).wrapping_sub(then.psi_at(from));
-        (Radians::from_bits(turned), then.rate)
+        let earlier = from.before(BEFORE);
+        let before = self.heading(now, earlier).psi_at(earlier);
+        let rate = i64::from(then.psi_at(from).wrapping_sub(before)).saturating_mul(BEFORE_PER_S);
+        (Radians::from_bits(turned), TurningRate::from_wide(rate))
     }
 
     /// The direction of the line at the far point, `e_theta` from the vehicle's heading at `at`.

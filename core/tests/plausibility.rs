@@ -10,7 +10,7 @@ use haptic_core::past::Past;
 use haptic_core::plausibility::{
     Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
 };
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
 
 const DT: f64 = 1e-3;
 // Table 8.
@@ -77,11 +77,25 @@ fn wanted(course: Course, t: f64) -> (f64, f64) {
 }
 
 /// Drives 12 s. `side` is 1 for a course to the left, -1 to the right.
+fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Sensors, from_s: f64) -> Drive {
+    drive_with(speed, course, side, guidance_share, sensors, from_s, None)
+}
+
+/// The same, with a measured yaw rate that is `yaw_rate_bias` off, and a camera that points 3 mrad aside.
 #[expect(
     clippy::too_many_lines,
+    clippy::too_many_arguments,
     reason = "a whole vehicle with its sensors, step by step"
 )]
-fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Sensors, from_s: f64) -> Drive {
+fn drive_with(
+    speed: f64,
+    course: Course,
+    side: f64,
+    guidance_share: f64,
+    sensors: Sensors,
+    from_s: f64,
+    yaw_rate_bias: Option<f64>,
+) -> Drive {
     let config = Config::PAPER;
     let checks: &Plausibility = &config.plausibility;
     let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
@@ -125,6 +139,11 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
 
         let at = Instant::from_us(u32::MAX - 5_000_000).after(Micros::from_ms(k));
         let wrong = t >= from_s;
+        if let Some(bias) = yaw_rate_bias.filter(|_| k % 10 == 0) {
+            let rate = TurningRate::from_rad_per_s(((r + bias) * 4096.0).round() / 4096.0);
+            checks.motion(&mut state, Speed::from_m_per_s(speed), Some(rate));
+            past.turn(at, rate);
+        }
         if k % 2 == 0 {
             let measured = match sensors {
                 Sensors::DriverFull if wrong => 20.0,
@@ -140,6 +159,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
         }
         if k % 8 == 0 {
             let (e_y, mut e_theta) = errors(0.3, 0.7);
+            e_theta += if yaw_rate_bias.is_some() { 0.003 } else { 0.0 };
             if wrong {
                 let held = *frozen.get_or_insert(e_theta);
                 if sensors == Sensors::YawFrozen {
@@ -206,6 +226,33 @@ fn honest_driving_is_never_declared() {
                 Course::Swerve => 0.37,
             };
             assert!(lane <= documented && column <= 0.1, "{lane} m, {column} N.m.s");
+        }
+    }
+}
+
+/// The same driving with a measured yaw rate: less of the margin is used though the yaw rate is 3 mrad/s off, the camera
+/// points 3 mrad aside, and the wheel's angle is not looked at.
+#[test]
+fn a_measured_yaw_rate_knows_swerves_from_lies() {
+    for (name, course) in [
+        ("abrupt curve", Course::Curve(0.0)),
+        ("clothoid of 2 s", Course::Curve(2.0)),
+        ("lane change", Course::LaneChange),
+        ("swerve", Course::Swerve),
+    ] {
+        for kmh in SPEEDS_KMH {
+            for (side, bias) in [(1.0, 0.003), (-1.0, 0.003), (1.0, -0.003)] {
+                let d = drive_with(kmh / 3.6, course, side, 0.3, Sensors::Honest, 99.0, Some(bias));
+                println!(
+                    "{name}, {kmh} km/h, to {side}, bias {bias}: {:.3} m of 0.4",
+                    d.lane_used_m
+                );
+                assert_eq!(
+                    (d.lane_declared_s, d.column_declared_s),
+                    (None, None),
+                    "{name} {kmh}"
+                );
+            }
         }
     }
 }

@@ -48,6 +48,18 @@ const FRICTION_NM: f64 = 0.5;
 const ALIGNING_SHARE: f64 = 77.0 / 256.0;
 const ASSIST: f64 = 5.0;
 
+/// Whether errors are further from the last than a vehicle can go.
+fn is_a_step(last: [f64; 2], new: [f64; 2]) -> bool {
+    (new[0] - last[0]).abs() > LANE_STEP_M || (new[1] - last[1]).abs() > YAW_STEP_RAD
+}
+
+/// Whether they may be those of a line chosen anew: 0.4 m aside, or a lane's width and no further away than that.
+fn is_another_line(last: [f64; 2], new: [f64; 2]) -> bool {
+    let moved = (new[0] - last[0]).abs();
+    let next_lane = (2.3..=4.3).contains(&moved) && new[0].abs() <= last[0].abs() + 0.4;
+    (new[1] - last[1]).abs() <= YAW_STEP_RAD && (moved <= 0.4 || next_lane)
+}
+
 /// What a fault can be seen by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seen {
@@ -86,6 +98,8 @@ pub(super) struct Residual {
     headings: VecDeque<[f64; 3]>,
     /// When, and the line's direction at the far point in the frame of the headings.
     lines: VecDeque<[f64; 2]>,
+    /// The last pair of errors that was too far from the one before.
+    refused: Option<[f64; 2]>,
     lane_bias_m_per_s: f64,
     column_bias_nm: f64,
     predicted_m: f64,
@@ -122,6 +136,7 @@ impl Residual {
             lane: None,
             headings: VecDeque::new(),
             lines: VecDeque::new(),
+            refused: None,
             lane_bias_m_per_s: 0.0,
             column_bias_nm: 0.0,
             predicted_m: 0.0,
@@ -185,11 +200,23 @@ impl Residual {
     pub(super) fn lane(&mut self, time_s: f64, e_y_m: f64, e_theta_rad: f64) {
         let e_y_m = e_y_m.clamp(-LANE_RANGE_M, LANE_RANGE_M);
         let e_theta_rad = e_theta_rad.clamp(-YAW_RANGE_RAD, YAW_RANGE_RAD);
-        if let Some((before_s, y, theta)) = self.lane {
-            let dt = time_s - before_s;
-            if (e_y_m - y).abs() > LANE_STEP_M || (e_theta_rad - theta).abs() > YAW_STEP_RAD {
-                return;
+        if let Some((_, y, theta)) = self.lane {
+            if is_a_step([y, theta], [e_y_m, e_theta_rad]) {
+                let agrees = self
+                    .refused
+                    .is_some_and(|before| !is_a_step(before, [e_y_m, e_theta_rad]));
+                if !(agrees && is_another_line([y, theta], [e_y_m, e_theta_rad])) {
+                    self.refused = Some([e_y_m, e_theta_rad]);
+                    return;
+                }
+                // What comes next has no past.
+                self.lines.clear();
+                (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
             }
+        }
+        self.refused = None;
+        if let Some((before_s, y, _)) = self.lane {
+            let dt = time_s - before_s;
             let moved = e_y_m - y;
             let predicted = self.line_rate(before_s).map_or(moved, |rate| rate * dt);
             let predicted = predicted + self.lane_bias_m_per_s * dt;
