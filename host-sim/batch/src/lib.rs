@@ -9,6 +9,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`sweep`]: many drives with varied fields.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
@@ -39,5 +40,9 @@ pub mod identify;
 mod record;
 pub mod reliance;
 pub mod run;
+pub mod sweep;
 
 pub use record::{RunRecord, check_window};
+
+/// Version and commit of this program, as results name it.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("HAPTIC_COMMIT"));
