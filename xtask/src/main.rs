@@ -123,7 +123,7 @@ enum Command {
 #[derive(Subcommand)]
 enum Bench {
     /// Simulated seconds per wall second on one core: our closed loop, the same in C and in NumPy.
-    Speed,
+    Speed(speed::Options),
     /// The identification of a recorded drive: ours and SciPy's, to the same loss.
     Identify,
 }
@@ -146,9 +146,9 @@ fn main() -> ExitCode {
         Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
-            what: Some(Bench::Speed),
+            what: Some(Bench::Speed(options)),
             ..
-        } => speed::run(),
+        } => speed::run(&options),
         Command::Bench {
             what: Some(Bench::Identify),
             ..

@@ -27,6 +27,7 @@ mod reliance;
 mod road;
 mod run;
 mod series;
+mod sweep;
 
 use std::fmt::Display;
 use std::process::ExitCode;
@@ -78,6 +79,8 @@ enum Command {
     Live(live::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
+    /// Many drives with varied fields (lists, ranges, distributions), a row of a table each, on threads and shards
+    Sweep(sweep::Arguments),
     /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
     Reliance(reliance::Arguments),
 }
@@ -122,6 +125,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),
         Some(Command::Live(arguments)) => live::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };
     match result {
