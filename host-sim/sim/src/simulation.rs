@@ -320,6 +320,11 @@ impl<G: Guidance> Simulation<G> {
         &self.guidance
     }
 
+    /// Who guides, to be told what to do in the next step.
+    pub fn guidance_mut(&mut self) -> &mut G {
+        &mut self.guidance
+    }
+
     /// Who guided, for what it kept.
     pub fn into_guidance(self) -> G {
         self.guidance
