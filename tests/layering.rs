@@ -52,7 +52,10 @@ const PACKAGES: Arrows = &[
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
     ("bindings/c", &["haptic-core"]),
-    ("bindings/fmu", &["haptic-core"]),
+    // Driver and vehicle are the simulator's.
+    ("bindings/fmu", &["haptic-core", "haptic-sim"]),
+    // The loop and the identification in a page.
+    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
     // The parts that Python hands out; no injector, no serial port, no charts.
     ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
 ];

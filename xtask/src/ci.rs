@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, bindings_agree, boards, c_library, gate, logs, trace, wheel};
+use crate::{bench, bindings_agree, boards, c_library, fmu, gate, logs, trace, web, wheel};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -103,6 +103,8 @@ pub(crate) fn run_all() -> Result<()> {
         ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
         ("C library", &c_library::check),
         ("recordings", &logs::check),
+        ("FMUs", &fmu::check),
+        ("lab in the browser", &web::check),
         ("bindings agree", &bindings_agree::check),
     ]);
     if !failed.is_empty() {
