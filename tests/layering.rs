@@ -308,6 +308,7 @@ const LONGEST: usize = 350;
 const LONGER: &[(&str, &str)] = &[
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("bindings/fmu/src/fmi2.rs", "one C interface, function by function"),
+    ("bindings/fmu/src/fmi3.rs", "one C interface, function by function"),
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
     ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),

@@ -64,8 +64,8 @@ const charts = {};
 function chart(place, series) {
   const style = ["#1f5fa8", "#c2571a"];
   charts[place] = new uPlot({
-    width: Math.max(320, $(place).clientWidth), height: 150, scales: { x: { time: false } }, cursor: { drag: { x: true, y: false } },
-    axes: [{ label: "time (s)", labelSize: 16, size: 40 }, { size: 50 }],
+    width: Math.max(320, $(place).clientWidth), height: 190, scales: { x: { time: false } }, cursor: { drag: { x: true, y: false } },
+    axes: [{ label: "time (s)", labelSize: 16, size: 40 }, { size: 50, space: 22 }],
     series: [{ label: "s" }, ...series.map((label, i) => ({ label, stroke: style[i], width: 1.2 }))],
   }, [[0], ...series.map(() => [0])], $(place));
 }
@@ -251,6 +251,9 @@ load().then(() => {
     slider.addEventListener("input", tell); tell();
   }
   chart("c-error", ["lateral error"]); chart("c-torque", ["driver", "guidance"]); chart("c-wheel", ["wheel"]);
+  // A model drives again at every change; a person says when.
+  for (const control of document.querySelectorAll("main input, main select"))
+    control.addEventListener("input", () => { if ($("person").hidden) begin(); });
   $("start").onclick = begin;
   $("stop").onclick = end;
   $("log").onclick = () => { try { save(); } catch (error) { fail(error); } };
