@@ -5,7 +5,9 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, bindings_agree, boards, by_hand, c_library, evidence, gate, logs, trace, wheel};
+use crate::{
+    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, trace, web, wheel,
+};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -103,6 +105,8 @@ pub(crate) fn run_all() -> Result<()> {
         ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
         ("C library", &c_library::check),
         ("recordings", &logs::check),
+        ("FMUs", &fmu::check),
+        ("lab in the browser", &web::check),
         ("bindings agree", &bindings_agree::check),
         ("coverage of the core", &evidence::coverage),
         ("defects made by hand", &by_hand::run),

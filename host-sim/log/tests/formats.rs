@@ -40,7 +40,11 @@ fn frames() -> Vec<CandumpFrame> {
     let frame = |k: u32| CandumpFrame {
         line: 0,
         time_s: f64::from(k) * 1e-3,
-        id: if k.is_multiple_of(7) { 0x1234_5678 } else { 0x100 + k % 5 },
+        id: if k.is_multiple_of(7) {
+            0x1234_5678
+        } else {
+            0x100 + k % 5
+        },
         extended: k.is_multiple_of(7),
         data: (0..k as u8 % 9).collect(),
     };

@@ -344,7 +344,7 @@ impl<G: Guidance> Simulation<G> {
         &self.guidance
     }
 
-    /// Who guides, to change something about it in mid-run.
+    /// Who guides, to be told what to do in the next step.
     pub fn guidance_mut(&mut self) -> &mut G {
         &mut self.guidance
     }

@@ -16,6 +16,7 @@ mod experiment;
 mod faults;
 mod handover;
 mod identify;
+mod lab;
 mod live;
 mod output;
 mod parameters;
@@ -61,6 +62,8 @@ enum Command {
     Identify(identify::Arguments),
     /// A recording in another format: CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF; or a list of its channels
     Convert(convert::Arguments),
+    /// The lab in the browser: sliders for driver, guidance and failure, and a road to drive yourself
+    Lab(lab::Arguments),
     /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
     Course(course::Arguments),
     /// One scenario from a TOML file
@@ -116,6 +119,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),
+        Some(Command::Lab(arguments)) => lab::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
