@@ -8,6 +8,7 @@ mod step;
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason};
 use crate::faults::{Fault, FaultSet};
+use crate::hands::HandsState;
 use crate::injection::{Injection, NoInjection};
 use crate::law::{LaneSample, LawState};
 use crate::modes::Mode;
@@ -158,6 +159,7 @@ words! {
         law: LawState,
         envelope: EnvelopeState,
         plausibility: PlausibilityState,
+        hands: HandsState,
         ramp: Ramp,
         probe: ProbeState,
         /// The part of the torque applied that is the probe.
@@ -197,6 +199,7 @@ impl Memory {
             law: LawState::NEW,
             envelope: EnvelopeState::new(now),
             plausibility: PlausibilityState::NEW,
+            hands: HandsState::NEW,
             ramp: Ramp::NONE,
             probe: ProbeState::SILENT,
             probe_applied: Torque::ZERO,

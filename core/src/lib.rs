@@ -109,6 +109,7 @@ pub mod ecu;
 pub mod envelope;
 pub mod estimator;
 pub mod faults;
+pub mod hands;
 mod injection;
 pub mod law;
 pub mod modes;

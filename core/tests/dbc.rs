@@ -4,9 +4,9 @@
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, MESSAGES, Message, ParameterStatus, ParameterUnlock,
-    ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle, Warning,
-    WriteOutcome,
+    Column, Demand, FaultRecord, Guidance, Identity, LanePreview, MESSAGES, Message, ParameterStatus,
+    ParameterUnlock, ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle,
+    Warning, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::envelope::LimitReason;
@@ -170,7 +170,7 @@ fn guidance() {
     let dbc = dbc();
     for raw in -20_480..=20_480_i32 {
         let torque = f64::from(raw) / 4096.0;
-        let (code, bits) = (raw.rem_euclid(7), (raw & 0x3_FFFF) as u32);
+        let (code, bits) = (raw.rem_euclid(7), (raw & 0xF_FFFF) as u32);
         let sent = Guidance {
             torque: Torque::from_nm(torque),
             limit: LimitReason::from_code(i64::from(code)).unwrap(),
@@ -185,7 +185,7 @@ fn guidance() {
         assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
         assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code));
-        let classes = [("ClassB", 0x3_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
+        let classes = [("ClassB", 0x7_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
         for (name, mask) in classes {
             assert_eq!(
                 signal(&dbc, &frame, name),
@@ -317,12 +317,18 @@ fn parameters() {
 fn unlock_value_and_rejection() {
     let dbc = dbc();
     let sent = ParameterUnlock {
+        vehicle: 1_048_575,
         sequence: 0xFEDC_BA98,
     };
-    assert_eq!(
-        signal(&dbc, &sent.encode(0), "Sequence"),
-        f64::from(0xFEDC_BA98_u32)
-    );
+    let signals = ["Vehicle", "Sequence"].map(|name| signal(&dbc, &sent.encode(0), name));
+    assert_eq!(signals, [1_048_575.0, f64::from(0xFEDC_BA98_u32)]);
+    assert_eq!(decode(sent), sent);
+    let sent = Identity {
+        vehicle: 654_321,
+        hardware: 0xFEDC_BA98,
+    };
+    let signals = ["Vehicle", "Hardware"].map(|name| signal(&dbc, &sent.encode(0), name));
+    assert_eq!(signals, [654_321.0, f64::from(0xFEDC_BA98_u32)]);
     assert_eq!(decode(sent), sent);
     for (index, value) in [(0, 0.25_f32), (18, 0.7)] {
         let sent = ParameterValue { index, value };

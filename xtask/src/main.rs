@@ -16,6 +16,7 @@ mod gate;
 mod golden;
 mod identify;
 mod image;
+mod longest;
 mod qemu;
 mod seal;
 mod size;

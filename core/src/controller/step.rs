@@ -5,14 +5,17 @@ use super::{Command, Input, Inputs, Memory, Motion, READY, Request};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
+use crate::hands::{END, WARN};
 use crate::injection::Injection;
 use crate::law::LawState;
 use crate::modes::{Event, Events, Mode};
 use crate::plausibility::speeds_agree;
 use crate::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, product};
-use crate::ramp::{HANDOVER, HISTORY, History, Ramp, smaller_of_same_sign};
+use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
+/// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
+const WITHOUT_COLUMN: u32 = 2;
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
 /// A step that comes later than this after the last one missed its deadline.
@@ -45,13 +48,21 @@ impl<I: Injection> Step<'_, I> {
         v.latched |= faults.common(FaultSet::CRITICAL).bits();
 
         let before = Mode::from_code(v.mode).unwrap_or(Mode::Fault);
+        if before == Mode::Active {
+            v.hands.guided(self.applied, self.elapsed);
+        }
+        faults.insert_if(
+            matches!(before, Mode::Active | Mode::Fade) && v.hands.without() >= WARN,
+            Fault::HandsOff,
+        );
         let mode = self.next_mode(v, before, faults);
         if mode != before {
             self.enter(v, mode, faults, history);
         }
-        let (torque, probe, limit) = self.torque(v, mode);
+        let (torque, probe, limit) = self.torque(v, mode, faults);
         v.probe_applied = probe.unwrap_or(Torque::ZERO);
-        let warning = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked);
+        let warning =
+            matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked) || faults.contains(Fault::HandsOff);
         Command {
             torque,
             probe,
@@ -91,6 +102,7 @@ impl<I: Injection> Step<'_, I> {
         v.age.column = self.age(column, v.age.column);
         match column {
             Input::New(c) => {
+                v.hands.feel(c.driver_torque);
                 let plausible = checks.column(
                     &mut v.plausibility,
                     self.now,
@@ -185,7 +197,8 @@ impl<I: Injection> Step<'_, I> {
         raised.insert_if(rising && v.ready >= READY, Event::Engage);
         // Late steps carry the ramp further than the reduction limit lets the torque follow.
         raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
-        let is_over = request == Some(false) || fast_enough == Some(false);
+        let no_hand = v.hands.without() >= END;
+        let is_over = request == Some(false) || fast_enough == Some(false) || no_hand;
         raised.insert_if(is_over, Event::Disengage);
         raised.insert_if(!inputs_ok, Event::InputLost);
         raised.insert_if(faults.intersects(FaultSet::LOCKING), Event::BootRejected);
@@ -199,7 +212,10 @@ impl<I: Injection> Step<'_, I> {
         v.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.
-            Mode::Active => (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now)),
+            Mode::Active => {
+                (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
+                v.hands.begin();
+            }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
@@ -222,10 +238,10 @@ impl<I: Injection> Step<'_, I> {
                 Micros::from_us(0)
             }
         };
-        if faults.intersects(FaultSet::IMPLAUSIBLE) {
-            return HISTORY;
-        }
-        lost_for(Fault::LaneTimeout, v.age.lane)
+        faults
+            .unseen()
+            .max(lost_for(Fault::LaneTimeout, v.age.lane))
+            .max(lost_for(Fault::LaneInvalid, v.age.lane))
             .max(lost_for(Fault::LaneStep, v.age.lane))
             .max(lost_for(Fault::SpeedStep, v.age.speeds))
             .max(lost_for(Fault::ColumnTimeout, v.age.column))
@@ -234,7 +250,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// The torque, the part of it that is the probe, and what limited it.
-    fn torque(&self, v: &mut Memory, mode: Mode) -> (Torque, Option<Torque>, LimitReason) {
+    fn torque(&self, v: &mut Memory, mode: Mode, faults: FaultSet) -> (Torque, Option<Torque>, LimitReason) {
         let (wanted, probe) = match mode {
             Mode::Active => {
                 let guidance = self.guidance(v);
@@ -242,10 +258,17 @@ impl<I: Injection> Step<'_, I> {
                 (with(guidance, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
-            Mode::Fade | Mode::Handover => (
-                smaller_of_same_sign(v.ramp.step(self.elapsed), self.applied),
-                None,
-            ),
+            Mode::Fade | Mode::Handover => {
+                let blind =
+                    faults.contains(Fault::ColumnTimeout) || faults.contains(Fault::ColumnImplausible);
+                let pace = if mode == Mode::Handover && blind {
+                    WITHOUT_COLUMN
+                } else {
+                    1
+                };
+                let passed = Micros::from_us(self.elapsed.us().saturating_mul(pace));
+                (smaller_of_same_sign(v.ramp.step(passed), self.applied), None)
+            }
             // At once: what is behind these modes must not move the wheel for another tick.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
                 return (Torque::ZERO, None, LimitReason::Mode);

@@ -23,10 +23,12 @@ pub(super) const YAW_STEP_RAD: f64 = 0.1;
 /// Ends of the signals' ranges on the bus.
 const LANE_RANGE_M: f64 = 4.0;
 const YAW_RANGE_RAD: f64 = 0.5;
-/// Further than a motor may be from what it was told, N.m.
+/// Further than a motor may be from what it was told, N.m, and as a share of it.
 pub(super) const MOTOR_MARGIN_NM: f64 = 0.1;
-/// For this long a motor may echo an older command, steps.
+const MOTOR_ERROR: f64 = 0.125;
+/// For this long a motor may echo an older command, steps; and its lag, steps.
 const MOTOR_ECHO: usize = 8;
+const MOTOR_LAG: f64 = 64.0 / 3.0;
 /// Slowest speed that is guided, m/s.
 const LEAST_SPEED_M_PER_S: f64 = 5.0;
 const MEMORY_S: f64 = 1.0;
@@ -76,6 +78,8 @@ pub(super) struct Residual {
     column_at_s: Option<f64>,
     momentum_nm_s: f64,
     commands_nm: [f64; MOTOR_ECHO],
+    /// Least and largest torque that an honest motor may deliver.
+    motor_band_nm: [f64; 2],
     motor_nm: f64,
     /// Steps in a row in which the motor was surely away from what it was told.
     astray: u32,
@@ -109,6 +113,7 @@ impl Residual {
             column_at_s: None,
             momentum_nm_s: 0.0,
             commands_nm: [0.0; MOTOR_ECHO],
+            motor_band_nm: [0.0; 2],
             motor_nm: 0.0,
             astray: 0,
         }
@@ -164,7 +169,11 @@ impl Residual {
     /// Takes what the motor was told and what it gave.
     pub(super) fn motor(&mut self, commanded_nm: f64, delivered_nm: f64) {
         self.commands_nm.rotate_right(1);
-        (self.commands_nm[0], self.motor_nm) = (commanded_nm, delivered_nm);
+        let oldest = std::mem::replace(&mut self.commands_nm[0], commanded_nm);
+        let [low, high] = &mut self.motor_band_nm;
+        *low = (*low + (commanded_nm.min(oldest) - *low) / MOTOR_LAG).min(commanded_nm.min(oldest));
+        *high = (*high + (commanded_nm.max(oldest) - *high) / MOTOR_LAG).max(commanded_nm.max(oldest));
+        self.motor_nm = delivered_nm;
         self.astray = if self.used(Seen::Motor) >= SURELY_SEEN {
             self.astray + 1
         } else {
@@ -203,8 +212,12 @@ impl Residual {
             Seen::AtOnce => f64::INFINITY,
             Seen::Contradiction => self.lane_used().max(self.column_used()),
             Seen::Motor => {
-                let away = |commanded: &f64| (self.motor_nm - commanded).abs();
-                self.commands_nm.iter().map(away).fold(f64::INFINITY, f64::min) / MOTOR_MARGIN_NM
+                let [low, high] = self.motor_band_nm;
+                let margin = |end: f64| MOTOR_MARGIN_NM + MOTOR_ERROR * end.abs();
+                f64::max(
+                    (self.motor_nm - high) / margin(high),
+                    (low - self.motor_nm) / margin(low),
+                )
             }
             Seen::Speed => LEAST_SPEED_M_PER_S / self.speeds_m_per_s[0].min(self.speeds_m_per_s[1]).max(1e-9),
         }

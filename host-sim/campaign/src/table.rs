@@ -199,9 +199,11 @@ pub fn rows() -> impl Iterator<Item = &'static FaultCase> {
 const STALE_MS: u32 = 31;
 /// Reaction to a contradiction, from the instant in which it can be seen.
 const CONTRADICTION_MS: u32 = 200;
-/// From the instant in which the motor is 0.1 N.m away from what it was told, if it stays there: 10 ms of patience, two
+/// From the instant in which the motor delivers what no honest one would, if it goes on: 10 ms of patience, two
 /// periods of the column, and the cycle in which it is seen.
 const MOTOR_MS: u32 = 15;
+/// The same where torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it is seen.
+const WEAK_MS: u32 = 55;
 /// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
 /// no fault may draw more.
 const ORDINARY_NM: f64 = 2.0;

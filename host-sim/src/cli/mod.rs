@@ -15,6 +15,7 @@ mod experiment;
 mod faults;
 mod handover;
 mod identify;
+mod live;
 mod output;
 mod parameters;
 mod participants;
@@ -69,6 +70,8 @@ enum Command {
     Pil(pil::Arguments),
     /// What parameters an ECU on a real bus uses; new ones for it to store
     Parameters(parameters::Arguments),
+    /// What goes over the bus of a real ECU as it comes: mode, torques, faults, K_hg; and a recording of it
+    Live(live::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
     /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
@@ -112,6 +115,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),
+        Some(Command::Live(arguments)) => live::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
         Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };
