@@ -12,6 +12,7 @@
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
+//! - [`stability`]: who keeps the lane at which speed and with which delay.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //!
 //! ```
@@ -41,5 +42,7 @@ pub mod identify;
 mod record;
 pub mod reliance;
 pub mod run;
+
+pub mod stability;
 
 pub use record::{RunRecord, check_window};
