@@ -13,6 +13,7 @@
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
+//! - [`stability`]: who keeps the lane at which speed and with which delay.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //!
 //! ```
@@ -43,6 +44,8 @@ mod record;
 pub mod reliance;
 pub mod run;
 pub mod sweep;
+
+pub mod stability;
 
 pub use record::{RunRecord, check_window};
 

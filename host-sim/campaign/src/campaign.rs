@@ -55,6 +55,8 @@ pub struct CaseResult {
     pub torque_bound_nm: f64,
     /// Largest torque seen, N.m.
     pub peak_torque_nm: f64,
+    /// Whether the row asks the ECU to leave.
+    pub asks_to_leave: bool,
     /// Runs in which the ECU left: a handover, a fade, a latched fault.
     pub left: u64,
     /// From the onset until it left, ms: the median of those runs and the longest.
@@ -151,7 +153,7 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
         )),
         None => {
             let left_ms = outcome.onset_ms + outcome.left_after_ms?;
-            let what = too_far(&outcome.deviation)?;
+            let what = too_far(&outcome.deviation).filter(|_| row.obeys())?;
             Some(failed(outcome, FailedBy::Vehicle, left_ms, what))
         }
     });
@@ -169,6 +171,7 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
         worst_reaction_ms: outcomes.iter().filter_map(|o| o.reaction_ms).max(),
         torque_bound_nm: row.torque_nm,
         peak_torque_nm: outcomes.iter().map(|o| o.peak_nm).fold(0.0, f64::max),
+        asks_to_leave: row.asks_to_leave(),
         left: left_after_ms.len() as u64,
         left_after_ms: left_after_ms
             .last()

@@ -14,7 +14,8 @@ use std::fmt;
 use haptic_sim::models::real::WorldParameters;
 use serde::Serialize;
 
-use super::injection::{Injection, Start};
+use super::bytes::{FAULT, HANDOVER};
+use super::injection::{Injection, Motor, Start};
 use super::residual::Seen;
 
 mod attacks;
@@ -228,6 +229,20 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
 }
 
 impl FaultCase {
+    /// Whether guidance has to end: by a handover, or for good.
+    pub fn asks_to_leave(&self) -> bool {
+        match self.expect {
+            Expect::HandsOverOrStops => true,
+            Expect::Reaches { mode, .. } => matches!(mode, HANDOVER | FAULT) && self.start == Start::Engaged,
+            _ => false,
+        }
+    }
+
+    /// Whether the motor does what the ECU says, so that the ECU decides where the vehicle goes.
+    pub(super) fn obeys(&self) -> bool {
+        !self.injections.contains(&Injection::Motor(Motor::Stuck))
+    }
+
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.
     pub fn deadline_ms(&self) -> Option<u32> {
         let asked = !matches!(

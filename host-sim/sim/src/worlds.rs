@@ -73,12 +73,14 @@ enum Part {
     Slippery,
     /// Superelevation to 10 %.
     Steep,
+    /// A camera that sees nothing for half a second, 30 times an hour.
+    Blind,
 }
 
-use Part::{Assist, Bank, Camera, Friction, Motor, Slippery, Steep, Wind};
+use Part::{Assist, Bank, Blind, Camera, Friction, Motor, Slippery, Steep, Wind};
 
 /// Every world, from paper to beyond.
-pub const WORLDS: [WorldKind; 10] = [
+pub const WORLDS: [WorldKind; 11] = [
     world("calibrated", "a calibrated car, flat road, no friction", &[]),
     world(
         "friction",
@@ -124,6 +126,11 @@ pub const WORLDS: [WorldKind; 10] = [
         "steep",
         "everything, superelevation to 10 %",
         &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Steep],
+    ),
+    beyond(
+        "blind",
+        "on paper, but the camera sees nothing for 0.5 s, 30 times an hour",
+        &[Blind],
     ),
 ];
 
@@ -214,6 +221,13 @@ impl WorldKind {
 
     /// What the camera adds.
     pub fn sensor_errors(&self) -> SensorErrors {
+        if self.has(Blind) {
+            return SensorErrors {
+                dropouts: 30.0,
+                dropout: 0.5,
+                ..SensorErrors::default()
+            };
+        }
         if !self.has(Camera) {
             return SensorErrors::default();
         }

@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::availability::{Availability, Leg, Plan, ROADS, study};
-use haptic_report::studies::availability as files;
+use haptic_batch::availability::{Leg, Plan, ROADS, study};
+use haptic_campaign::table::{self, FaultCase, Place};
+use haptic_campaign::{World, campaign};
+use haptic_report::document::Table;
+use haptic_report::studies::availability::{self as files, Balance, Detection};
 use haptic_sim::worlds::WORLDS;
 
 use super::checkpoint::Checkpoint;
@@ -31,6 +34,9 @@ pub(super) struct Arguments {
     /// Fail (exit code 1) if with 95 % confidence the rate of a judged world may be above R an hour
     #[arg(long, value_name = "R")]
     most_per_hour: Option<f64>,
+    /// Runs of each fault of the campaign in the world 'everything' (or the last one asked for); 0: none
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    fault_seeds: u64,
     /// Directory for figures, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -70,6 +76,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             .map_or(Ok(()), |checkpoint| checkpoint.add(leg))
     })?;
     bar.finish_and_clear();
+    let results = Balance {
+        detection: detection(&plan, arguments.fault_seeds),
+        availability: results,
+    };
     if let Some(output) = output {
         output.finish(|place| files::write(&results, place))?;
     }
@@ -78,6 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&readable(&results))?;
     }
+    let results = results.availability;
     let too_many = |most: f64| {
         results
             .cells
@@ -138,11 +149,34 @@ fn heading(seed: u64) -> Result<String, BadInput> {
     }))?)
 }
 
-fn readable(results: &Availability) -> String {
-    let mut text = format!("{}\n\n{}", files::SUMMARY, files::table(results).to_text());
-    let causes = files::causes(results);
-    if !causes.rows.is_empty() {
-        text.push_str(&format!("\n{}", causes.to_text()));
+/// Every fault in the world that is to be as good as real.
+fn detection(plan: &Plan, seeds: u64) -> Option<Detection> {
+    let named = plan.worlds.iter().find(|world| world.name == "everything");
+    let world = named.or(plan.worlds.last()).filter(|_| seeds > 0)?;
+    let rows: Vec<&'static FaultCase> = table::rows().filter(|row| row.place != Place::Target).collect();
+    let bar = progress::bar(rows.len() as u64 * seeds, "faults");
+    let campaign = campaign::run(&World::real(world), &rows, 1..seeds + 1, || bar.inc(1));
+    bar.finish_and_clear();
+    Some(Detection {
+        world: world.name,
+        rows: campaign.rows,
+    })
+}
+
+fn readable(results: &Balance) -> String {
+    let mut text = format!(
+        "{}\n\n{}",
+        files::SUMMARY,
+        files::table(&results.availability).to_text()
+    );
+    let mut add = |table: Table| {
+        if !table.rows.is_empty() {
+            text.push_str(&format!("\n{}\n{}", table.caption, table.to_text()));
+        }
+    };
+    add(files::causes(&results.availability));
+    if let Some(faults) = &results.detection {
+        add(files::detection_table(faults));
     }
     text
 }

@@ -28,6 +28,7 @@ mod reliance;
 mod road;
 mod run;
 mod series;
+mod stability;
 mod sweep;
 
 use std::fmt::Display;
@@ -72,6 +73,8 @@ enum Command {
     Faults(faults::Arguments),
     /// How often guidance leaves for nothing on real roads: many cars, hours of driving, by cause
     Availability(availability::Arguments),
+    /// A map over speed and delay: where a driver keeps the lane, alone and with guidance, and how well
+    Stability(stability::Arguments),
     /// What a lost input costs if the ECU hands over within 2 s, and if the torque is lost at once: 40 to 120 km/h
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
@@ -124,6 +127,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
         Some(Command::Availability(arguments)) => availability::run(&arguments),
+        Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),

@@ -10,10 +10,10 @@ use Change::{Plus, Sliding, Times};
 use Injection::Sensor;
 use Signal::{DriverTorque, LateralError, WheelAngle, YawError, YawRate};
 
-/// The driver overrides within a moment: the command drops at once, and a motor that lags follows.
+/// The driver overrides for a moment: the command drops at once, and a motor that lags follows.
 const OVERRIDES: Injection = Injection::Hand(Hand::Opposes {
     torque_nm: 8.0,
-    ms: 200,
+    ms: 60,
 });
 
 const SLIDES: Injection = Sensor(LateralError, Sliding { by: 3.5, ms: 140 });
@@ -54,6 +54,16 @@ pub(super) const ROWS: &[FaultCase] = &[
         "line-moves",
         "the camera's line moves by 0.29 m between two pictures",
         &[Sensor(LateralError, Plus(0.29))],
+    )
+    .may_hand_over(),
+    // 8 N.m for 0.2 s turn a wheel by 80 deg: the column's model has no inertia, and may take that for a lie.
+    row(
+        "driver-overrides-8",
+        "driver overrides with 8 N.m for 0.2 s",
+        &[Injection::Hand(Hand::Opposes {
+            torque_nm: 8.0,
+            ms: 200,
+        })],
     )
     .may_hand_over(),
     row(

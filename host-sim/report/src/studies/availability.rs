@@ -7,20 +7,125 @@ use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::availability::{Availability, Cell as Row, Rate};
+use haptic_campaign::campaign::CaseResult;
 use haptic_sim::worlds::{WORLDS, WorldKind};
+use serde::Serialize;
 
 /// What the study is about.
 pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
                            The interval is the exact 95 % interval of a Poisson rate.";
 
+/// What is given up for what: false declarations, and faults noticed in the same world.
+#[derive(Debug, Serialize)]
+pub struct Balance {
+    /// Without a fault.
+    #[serde(flatten)]
+    pub availability: Availability,
+    /// With every fault by name.
+    pub detection: Option<Detection>,
+}
+
+/// Faults in a world.
+#[derive(Debug, Serialize)]
+pub struct Detection {
+    /// Name of the world.
+    pub world: &'static str,
+    /// Every row of the campaign.
+    pub rows: Vec<CaseResult>,
+}
+
+impl Detection {
+    /// Rows that ask the ECU to leave, and those in which it did.
+    fn shown(&self) -> impl Iterator<Item = &CaseResult> {
+        self.rows.iter().filter(|row| row.asks_to_leave || row.left > 0)
+    }
+}
+
+/// How often and how soon the ECU leaves when something is wrong.
+pub fn detection_table(faults: &Detection) -> Table {
+    let row = |row: &CaseResult| {
+        let time = |n: usize| Cell::Number {
+            value: row.left_after_ms.map(|times| f64::from(times[n])),
+            decimals: 0,
+        };
+        let metres = |value: Option<f64>| Cell::Number { value, decimals: 2 };
+        vec![
+            Cell::Text(row.name.into()),
+            Cell::Text(row.class.to_string()),
+            Cell::Text(if row.asks_to_leave { "leave" } else { "may go on" }.into()),
+            Cell::number(row.runs as f64, 0),
+            Cell::number(100.0 * row.left as f64 / row.runs as f64, 0),
+            time(0),
+            time(1),
+            metres(Some(row.deviation_m)),
+            metres(row.excess_m),
+        ]
+    };
+    Table {
+        caption: format!("Faults noticed in the world '{}'", faults.world),
+        columns: [
+            "Fault",
+            "Class",
+            "ECU should",
+            "Runs",
+            "Left (%)",
+            "Median (ms)",
+            "Longest (ms)",
+            "Deviation (m)",
+            "Beyond dropping (m)",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: faults.shown().map(row).collect(),
+    }
+}
+
+fn detection_figure(faults: &Detection) -> Figure {
+    let places = || faults.shown().enumerate().map(|(i, row)| (i as f64 + 1.0, row));
+    let left = places()
+        .map(|(x, row)| (x, 100.0 * row.left as f64 / row.runs as f64))
+        .collect();
+    let after = |n: usize| {
+        let times = places().filter_map(|(x, row)| Some((x, 1e-3 * f64::from(row.left_after_ms?[n]))));
+        times.collect::<Vec<_>>()
+    };
+    Figure {
+        rows: faults.shown().map(|row| row.name.into()).collect(),
+        panels: vec![
+            Panel {
+                title: "Runs in which the ECU left".into(),
+                y: Axis {
+                    limits: Some((0.0, 105.0)),
+                    ..Axis::of("%")
+                },
+                series: vec![Series::with_mark("", 2, Mark::Stems, left)],
+            },
+            Panel {
+                title: "From the onset".into(),
+                y: Axis::of("s"),
+                series: vec![
+                    Series::with_mark("longest", 3, Mark::Stems, after(1)),
+                    Series::dots("median", 1, after(0)),
+                ],
+            },
+        ],
+        ..Figure::default()
+    }
+}
+
 /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
 ///
 /// # Errors
 /// What could not be written or drawn.
-pub fn write(results: &Availability, directory: &Path) -> Result<(), OutputError> {
+pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
+    let detection = results.detection.as_ref().map(|faults| detection_figure(faults));
+    if let Some(detection) = &detection {
+        write_figure(directory, "detection", detection)?;
+    }
+    write_json(&directory.join("results.json"), &stamped(results))?;
+    let (results, faults) = (&results.availability, &results.detection);
     let figure = figure(results);
     write_figure(directory, "availability", &figure)?;
-    write_json(&directory.join("results.json"), &stamped(results))?;
     let caption = "False declarations in an hour with their exact 95 % interval, and the time without guidance: two seconds \
                    of handover and five until the driver asks again."
         .into();
@@ -30,22 +135,37 @@ pub fn write(results: &Availability, directory: &Path) -> Result<(), OutputError
         Block::Table(causes(results)),
         Block::Table(worlds()),
     ];
+    let mut sections = vec![Section {
+        heading: "False declarations".into(),
+        blocks,
+    }];
+    if let (Some(figure), Some(faults)) = (detection, faults) {
+        let caption = format!(
+            "Share of the runs in which the ECU left, and the time from the onset, in the world '{}'. Bars at the left would \
+             be faults that nobody notices.",
+            faults.world
+        );
+        sections.push(Section {
+            heading: "Faults noticed in the same world".into(),
+            blocks: vec![
+                Block::Figure { figure, caption },
+                Block::Table(detection_table(faults)),
+            ],
+        });
+    }
     write_report(
         directory,
         &Report {
             title: "Guidance that leaves for nothing".into(),
             summary: SUMMARY.into(),
-            sections: vec![Section {
-                heading: "False declarations".into(),
-                blocks,
-            }],
+            sections,
             provenance: Some(Provenance::of(None)),
         },
     )
 }
 
 /// The results as JSON holds them.
-pub fn stamped(results: &Availability) -> Stamped<'_, Availability> {
+pub fn stamped(results: &Balance) -> Stamped<'_, Balance> {
     Provenance::of(None).stamp(results)
 }
 

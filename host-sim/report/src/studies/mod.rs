@@ -13,6 +13,7 @@ pub mod handover;
 pub mod identify;
 pub mod reliance;
 pub mod run;
+pub mod stability;
 pub mod sweep;
 
 use crate::document::WriteError;
