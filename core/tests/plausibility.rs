@@ -84,7 +84,6 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
 /// The same, with a measured yaw rate that is `yaw_rate_bias` off, and a camera that points 3 mrad aside.
 #[expect(
     clippy::too_many_lines,
-    clippy::too_many_arguments,
     reason = "a whole vehicle with its sensors, step by step"
 )]
 fn drive_with(
