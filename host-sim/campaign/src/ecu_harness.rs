@@ -277,12 +277,8 @@ impl<'a> EcuHarness<'a> {
         }
         let since = self.residual.seen_since(self.row.seen, observation.step);
         // A motor that came back within the ECU's patience has not been astray.
-        let returned = self.row.seen == Seen::Motor
-            && self
-                .record
-                .modes
-                .iter()
-                .all(|(_, m)| !matches!(*m, FAULT | HANDOVER));
+        let returned =
+            self.row.seen == Seen::Motor && self.record.modes.last().is_some_and(|(_, m)| *m == ACTIVE);
         self.record.seen_at = if returned {
             since
         } else {

@@ -209,9 +209,8 @@ impl World {
         self.trial(row, seed, false).0
     }
 
-    /// Runs a row with a seed, and with `traced` keeps what went into the ECU and came out of it.
-    pub(super) fn trial(&self, row: &FaultCase, seed: u64, traced: bool) -> (TrialOutcome, Option<EcuTrace>) {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
+    /// What a seed draws for a row: who drives, in which scenario, and the onset, ms.
+    fn draw(&self, row: &FaultCase, seed: u64, rng: &mut Xoshiro256PlusPlus) -> (&Driver, Scenario, u32) {
         let speed = rng.random_range(0..SPEEDS_KMH.len());
         let able = &self.able[speed];
         let driver = &self.drivers[able[rng.random_range(0..able.len())]];
@@ -260,6 +259,13 @@ impl World {
             less_than_ideal(&mut plant);
         }
         let scenario = scenario.world(plant).build().expect("in range at these speeds");
+        (driver, scenario, onset_ms)
+    }
+
+    /// Runs a row with a seed, and with `traced` keeps what went into the ECU and came out of it.
+    pub(super) fn trial(&self, row: &FaultCase, seed: u64, traced: bool) -> (TrialOutcome, Option<EcuTrace>) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
+        let (driver, scenario, onset_ms) = self.draw(row, seed, &mut rng);
         let mut harness = EcuHarness::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, rng);
         if traced {
             harness.keep_trace();
@@ -379,10 +385,10 @@ fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Deviation {
         }
         match &mut dropped {
             Some(without) => {
-                if step(without, takes_over) {
-                    let apart_m = apart_m(without, twin);
-                    seen.dropped_m = seen.dropped_m.map(|most_m| most_m.max(apart_m));
-                }
+                // Off the road it stays where it is.
+                step(without, takes_over);
+                let apart_m = apart_m(without, twin);
+                seen.dropped_m = seen.dropped_m.map(|most_m| most_m.max(apart_m));
             }
             None if left_at.is_none() && simulation.guidance().left_at().is_some() => {
                 let without = dropped.insert(simulation.clone());

@@ -171,7 +171,7 @@ fn readable(results: &Balance) -> String {
     );
     let mut add = |table: Table| {
         if !table.rows.is_empty() {
-            text.push_str(&format!("\n{}\n{}", table.caption, table.to_text()));
+            text.push_str(&format!("\n{}", table.to_text()));
         }
     };
     add(files::causes(&results.availability));
