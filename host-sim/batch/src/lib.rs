@@ -31,6 +31,7 @@
 pub mod bus_load;
 pub mod claims;
 pub mod course;
+pub mod design;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;

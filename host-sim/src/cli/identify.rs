@@ -1,10 +1,11 @@
 //! `host-sim identify LOG.csv`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::{Options, open_recording};
-use haptic_batch::identify::{IdentifiedDrive, Method, identify};
+use haptic_analysis::identify::{Options, Recording, SingleTrack, open_recording_with};
+use haptic_batch::files::load_scenario;
+use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_several};
 use haptic_report::studies::identify as files;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
@@ -19,9 +20,16 @@ pub(super) struct Arguments {
     /// guidance_torque_nm, driver_torque_nm, or the bus as recorded by candump -L
     #[arg(value_name = "LOG.csv")]
     log: PathBuf,
+    /// One more drive of the same driver, of the same rate: all are one fit; may be repeated
+    #[arg(long, value_name = "LOG")]
+    also: Vec<PathBuf>,
     /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
     #[arg(long, value_name = "FILE")]
     dbc: Option<PathBuf>,
+    /// The vehicle of a candump recording, if not that of table 9: a scenario file whose [vehicle] says what it is. The
+    /// bus does not carry the driver's far point; it is computed with this vehicle
+    #[arg(long, value_name = "FILE.toml")]
+    vehicle: Option<PathBuf>,
     /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
     /// missing
     #[arg(long)]
@@ -43,6 +51,10 @@ pub(super) struct Arguments {
     /// Use the log up to this time, s
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Vec<f64>,
+    /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
+    /// ones; 0 cuts at each
+    #[arg(long, value_name = "S", default_value_t = 0.3, allow_negative_numbers = true)]
+    bridge: f64,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
     exact_lane: bool,
@@ -76,6 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     options.between(&arguments.from, &arguments.to)?;
     options.lane_noise = !arguments.exact_lane;
     options.leave_out = !arguments.whole;
+    in_range("--bridge", arguments.bridge, 0.0..=1.0, "s")?;
+    options.bridge_s = arguments.bridge;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
@@ -83,9 +97,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
-    let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
+    let recording = Recording {
+        dbc: arguments.dbc.as_deref(),
+        vehicle: arguments.vehicle.as_deref().map(vehicle).transpose()?,
+        manual: arguments.manual,
+    };
+    let (log, note) = open_recording_with(&arguments.log, &recording)?;
     let name = arguments.log.display().to_string();
-    let mut drive = identify(&name, &log, &options, method)?;
+    let mut drive = if arguments.also.is_empty() {
+        identify(&name, &log, &options, method)?
+    } else {
+        if method == Method::Paper {
+            return Err("--also: the published method takes one drive".into());
+        }
+        let mut logs = vec![log];
+        for path in &arguments.also {
+            logs.push(open_recording_with(path, &recording)?.0);
+        }
+        identify_several(
+            &format!("{name} and {} more", arguments.also.len()),
+            &logs,
+            &options,
+        )?
+    };
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, note.map(String::from));
     if let Some(course) = course {
@@ -101,6 +135,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     Ok(Outcome::Good)
 }
 
+/// The vehicle of a scenario file, as far as it decides how the vehicle turns.
+fn vehicle(path: &Path) -> Result<SingleTrack, BadInput> {
+    let scenario = load_scenario(path)?;
+    let v = scenario.vehicle();
+    Ok(SingleTrack {
+        m: v.m,
+        i: v.i,
+        l_f: v.l_f,
+        l_r: v.l_r,
+        k_f: v.k_f,
+        k_r: v.k_r,
+        k_t: v.k_t,
+    })
+}
+
 fn readable(drive: &IdentifiedDrive) -> String {
     let found = &drive.results.identification;
     let mut text = format!(
@@ -111,6 +160,10 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.fit_percent,
         files::parameters(found).to_text()
     );
+    for sentence in files::verdicts(found) {
+        text.push_str(&format!("\n{sentence}"));
+    }
+    text.push('\n');
     if let Some(in_the_log) = files::in_the_log(found) {
         text.insert_str(0, &format!("{}\n", in_the_log.to_text()));
     }

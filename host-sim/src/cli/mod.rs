@@ -8,6 +8,8 @@
 
 mod bus;
 mod course;
+mod design;
+mod drivers;
 mod evaluate;
 mod experiment;
 mod faults;
@@ -53,6 +55,10 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// Which experiment tells a driver's parameters: probe, course and length for a given error
+    Design(design::Arguments),
+    /// Several drivers beside each other: what differs between two, and what a group is like
+    Drivers(drivers::Arguments),
     /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
     Course(course::Arguments),
     /// One scenario from a TOML file
@@ -101,6 +107,8 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Design(arguments)) => design::run(&arguments),
+        Some(Command::Drivers(arguments)) => drivers::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),

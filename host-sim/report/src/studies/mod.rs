@@ -4,6 +4,8 @@
 pub mod bus;
 pub mod course;
 mod curves;
+pub mod design;
+pub mod drivers;
 pub mod evaluation;
 pub mod experiment;
 pub mod faults;
