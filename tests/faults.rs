@@ -67,7 +67,11 @@ fn contradictions_are_seen() {
         assert!(seen(name) >= 8, "{name}: {} of 10", seen(name));
     }
     // Half of the onsets lie on a straight, where there is no torque to halve.
-    assert!(seen("motor-half") >= 4, "motor-half: {} of 10", seen("motor-half"));
+    assert!(
+        seen("motor-half") >= 4,
+        "motor-half: {} of 10",
+        seen("motor-half")
+    );
 }
 
 /// The list that a controller has to survive: each of its entries is a row of the table.

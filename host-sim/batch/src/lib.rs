@@ -35,6 +35,7 @@ pub mod availability;
 pub mod bus_load;
 pub mod claims;
 pub mod course;
+pub mod design;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use haptic_analysis::identify::Options;
-use haptic_batch::identify::{IdentifiedDrive, Method, identify};
+use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_several};
 use haptic_report::studies::identify as files;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
@@ -18,6 +18,9 @@ use super::{BadInput, Outcome, print, print_json};
 pub(super) struct Arguments {
     #[command(flatten)]
     recording: RecordingArguments,
+    /// One more drive of the same driver, of the same rate: all are one fit; may be repeated
+    #[arg(long, value_name = "LOG")]
+    also: Vec<PathBuf>,
     /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
     /// missing
     #[arg(long)]
@@ -39,6 +42,10 @@ pub(super) struct Arguments {
     /// Use the log up to this time, s
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Vec<f64>,
+    /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
+    /// ones; 0 cuts at each
+    #[arg(long, value_name = "S", default_value_t = 0.3, allow_negative_numbers = true)]
+    bridge: f64,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
     exact_lane: bool,
@@ -72,6 +79,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     options.between(&arguments.from, &arguments.to)?;
     options.lane_noise = !arguments.exact_lane;
     options.leave_out = !arguments.whole;
+    in_range("--bridge", arguments.bridge, 0.0..=1.0, "s")?;
+    options.bridge_s = arguments.bridge;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
@@ -81,7 +90,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = Output::begin(&arguments.out)?;
     let (log, converted) = arguments.recording.open(arguments.manual)?;
     let name = arguments.recording.log.display().to_string();
-    let mut drive = identify(&name, &log, &options, method)?;
+    let mut drive = if arguments.also.is_empty() {
+        identify(&name, &log, &options, method)?
+    } else {
+        if method == Method::Paper {
+            return Err("--also: the published method takes one drive".into());
+        }
+        let mut logs = vec![log];
+        for path in &arguments.also {
+            logs.push(arguments.recording.open_other(path, arguments.manual)?.0);
+        }
+        identify_several(
+            &format!("{name} and {} more", arguments.also.len()),
+            &logs,
+            &options,
+        )?
+    };
     let notes = &mut drive.results.identification.notes;
     notes.splice(0..0, converted);
     if let Some(course) = course {
@@ -107,6 +131,10 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.fit_percent,
         files::parameters(found).to_text()
     );
+    for sentence in files::verdicts(found) {
+        text.push_str(&format!("\n{sentence}"));
+    }
+    text.push('\n');
     if let Some(in_the_log) = files::in_the_log(found) {
         text.insert_str(0, &format!("{}\n", in_the_log.to_text()));
     }

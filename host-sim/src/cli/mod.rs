@@ -11,6 +11,8 @@ mod bus;
 mod checkpoint;
 mod convert;
 mod course;
+mod design;
+mod drivers;
 mod evaluate;
 mod experiment;
 mod faults;
@@ -65,6 +67,10 @@ enum Command {
     Convert(convert::Arguments),
     /// The lab in the browser: sliders for driver, guidance and failure, and a road to drive yourself
     Lab(lab::Arguments),
+    /// Which experiment tells a driver's parameters: probe, course and length for a given error
+    Design(design::Arguments),
+    /// Several drivers beside each other: what differs between two, and what a group is like
+    Drivers(drivers::Arguments),
     /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
     Course(course::Arguments),
     /// One scenario from a TOML file
@@ -123,6 +129,8 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Identify(arguments)) => identify::run(&arguments),
         Some(Command::Convert(arguments)) => convert::run(&arguments),
         Some(Command::Lab(arguments)) => lab::run(&arguments),
+        Some(Command::Design(arguments)) => design::run(&arguments),
+        Some(Command::Drivers(arguments)) => drivers::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),

@@ -12,6 +12,7 @@
 mod balance;
 mod bus_trace;
 mod diagnostics;
+mod drivers;
 mod lane;
 mod log;
 mod noise_model;
@@ -22,24 +23,29 @@ mod recording;
 mod result;
 mod search;
 mod signals;
+mod together;
 mod tracking;
 mod verdict;
 
 pub use balance::Balance;
-pub use bus_trace::{HAPTIC_DBC, open_recording};
+pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};
 pub use diagnostics::{autocorrelation, fit_percent};
+pub use drivers::{Difference, Population, differences, population};
 pub use lane::LaneNoise;
 pub use log::{COLUMNS, DriveLog, LogError};
-pub use noise_model::{LONGEST_DELAY_S, identify as identify_with_noise_model};
+pub use noise_model::{
+    INFORMED, Information, LONGEST_DELAY_S, Truth, identify as identify_with_noise_model, information,
+};
 pub use options::{FixError, Options};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Mapping, open as open_mapped};
 pub use result::{
-    Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant, Start,
-    Traces, Whiteness,
+    AtTNms, Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant,
+    Start, Traces, Whiteness,
 };
 pub use search::Termination;
 pub use signals::Muscle;
-pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, track};
+pub use together::{identify_together, identify_together_and_track};
+pub use tracking::{History, Tracking, WANDERING_PER_ROOT_S, identify_and_track, track};
 pub use verdict::Refutation;

@@ -67,10 +67,10 @@ impl std::str::FromStr for Mapping {
 /// As [`DriveLog::open`], with the channel; a column that is mapped twice.
 pub fn open(
     path: &Path,
-    dbc: Option<&Path>,
     maps: &[Mapping],
-    manual: bool,
+    how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
+    let manual = how.manual;
     let named = |e: String| LogError::new(format!("{}: {e}", path.display()));
     for (i, map) in maps.iter().enumerate() {
         if maps[..i].iter().any(|other| other.column == map.column) {
@@ -83,7 +83,7 @@ pub fn open(
     // Text files keep their own readers: those name lines, and tell a table from a trace by its looks.
     let format = Format::of(path).ok();
     if maps.is_empty() && matches!(format, None | Some(Format::Csv | Format::Candump)) {
-        let (log, note) = bus_trace::open_recording(path, dbc, manual)?;
+        let (log, note) = bus_trace::open_recording_with(path, how)?;
         return Ok((log, note.map(String::from).into_iter().collect()));
     }
     let time = maps.iter().find(|map| map.column == 0).map(|map| TimeColumn {
@@ -92,11 +92,11 @@ pub fn open(
     });
     match formats::read(path, time.as_ref()).map_err(|e| LogError::new(e.to_string()))? {
         Contents::Frames(frames) if maps.is_empty() => {
-            let (log, note) = bus_trace::of_frames(&frames, dbc, manual).map_err(named)?;
+            let (log, note) = bus_trace::of_frames(&frames, how).map_err(named)?;
             Ok((log, vec![note.into()]))
         }
         Contents::Frames(frames) => {
-            let dbc = bus_trace::dbc_text(dbc)?;
+            let dbc = bus_trace::dbc_text(how.dbc)?;
             let recording = formats::dbc::channels(&frames, &dbc).map_err(|e| named(e.to_string()))?;
             of_channels(&recording, maps, manual).map_err(named)
         }

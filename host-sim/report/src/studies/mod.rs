@@ -5,6 +5,8 @@ pub mod availability;
 pub mod bus;
 pub mod course;
 mod curves;
+pub mod design;
+pub mod drivers;
 pub mod evaluation;
 pub mod experiment;
 pub mod faults;
