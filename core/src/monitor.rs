@@ -216,7 +216,9 @@ impl Monitor {
         let carried = per_m
             .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
             .saturating_div(1000)
-            .saturating_add(per_rad.saturating_mul(e_theta_urps / 1000 * late_ms / 100) / 10_000);
+            .saturating_add(
+                per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
+            );
         let position = position.saturating_add(carried);
         let both = position.saturating_add(rate);
         let probe = if state.probe_left_us > 0 {
