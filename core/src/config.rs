@@ -19,10 +19,11 @@ use crate::params::{ParamError, Params, in_range};
 use crate::plausibility::Plausibility;
 use crate::probe::Probe;
 use crate::quantity::{
-    AngularImpulse, CurvaturePerAngle, Metres, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    AngularImpulse, CurvaturePerAngle, Metres, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
     TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::redundant::words;
+use crate::schedule::Schedule;
 
 words! {
     /// The checked configuration of every block of the controller.
@@ -37,6 +38,8 @@ words! {
         pub least_speed: Speed,
         /// The probe.
         pub probe: Probe,
+        /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
+        pub schedule: Schedule,
     }
 }
 
@@ -109,6 +112,8 @@ impl Config {
                 aligning_gain: TorquePerAcceleration::from_nm_s2_per_m(v.aligning_gain_nm_s2_per_m),
                 column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
                 far_time: Seconds::from_s(v.far_time_s),
+                near_time: Seconds::from_s(v.near_time_s),
+                between: Micros::from_us((f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32),
                 lane_margin: Metres::from_m(0.4),
                 column_margin: AngularImpulse::from_nm_s(0.6),
             },
@@ -117,6 +122,7 @@ impl Config {
                 amplitude: Torque::from_nm(p.probe_amplitude_nm),
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
+            schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::hands::HandsState;
 use crate::injection::{Injection, NoInjection};
 use crate::law::{LaneSample, LawState};
 use crate::modes::Mode;
+use crate::past::Past;
 use crate::plausibility::PlausibilityState;
 use crate::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
@@ -116,6 +117,8 @@ pub struct Inputs {
     pub motion: Input<Motion>,
     /// What the host requests.
     pub request: Input<Request>,
+    /// The new lane sample is of another line than the last.
+    pub line_moved: bool,
     /// Faults found outside: on the bus, by the monitor, at the output.
     pub faults: FaultSet,
 }
@@ -150,6 +153,9 @@ words! {
         age: Ages,
         /// [`Fault`] bits of inputs that were implausible when last new.
         implausible: u32,
+        /// The rate of turn when the last lane sample was true, and what the vehicle has turned since.
+        rate_then: TurningRate,
+        turned: Radians,
         last_step: Instant,
         /// Late and early steps in a row.
         late: u32,
@@ -192,6 +198,8 @@ impl Memory {
                 request: NONE,
             },
             implausible: 0,
+            rate_then: TurningRate::ZERO,
+            turned: Radians::ZERO,
             last_step: now,
             late: 0,
             early: 0,
@@ -216,6 +224,7 @@ impl Memory {
 pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
     history: History,
+    past: Past,
 }
 
 impl ControllerState {
@@ -235,6 +244,7 @@ impl ControllerState {
         Self {
             memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),
+            past: Past::new(),
         }
     }
 
@@ -303,7 +313,7 @@ impl Controller {
         let Some(config) = self.config.get() else {
             return state.lose_memory(now);
         };
-        let history = &mut state.history;
+        let (history, past) = (&mut state.history, &mut state.past);
         let command = state.memory.change(|memory| {
             let step = Step {
                 config,
@@ -314,7 +324,7 @@ impl Controller {
                 injection,
             };
             memory.last_step = now;
-            step.run(memory, history)
+            step.run(memory, history, past)
         });
         let Some(command) = command else {
             return state.lose_memory(now);

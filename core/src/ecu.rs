@@ -259,6 +259,7 @@ impl Ecu {
             column: Input::Lost,
             motion: Input::Lost,
             request: Input::Lost,
+            line_moved: false,
             faults: FaultSet::NONE,
         };
         (Memory::new(faults, now), inputs)

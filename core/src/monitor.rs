@@ -87,8 +87,10 @@ const TOLERANCE_MNM: i32 = 3;
 const PROBE_END_US: i32 = 1_030_000;
 /// For how long the torque may be outside that band.
 const ASTRAY_MS: i32 = 20;
-/// Lane data older than this must not move the wheel in Active: the time-out and a camera period.
-const OLDEST_LANE_US: i32 = 40_000;
+/// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
+const OLDEST_LANE_US: i32 = 360_000;
+/// A sample older than this is continued at its rates.
+const PROMPT_LANE_US: i32 = 40_000;
 /// Override bound: from 0.8 N.m of opposing torque, 3 N.m per N.m, and what two frames' time can change.
 const OVERRIDE_FROM_MNM: i32 = 800;
 const OVERRIDE_SLOPE: i32 = 3;
@@ -209,6 +211,13 @@ impl Monitor {
             .saturating_mul(e_y_mmps)
             .saturating_div(1000)
             .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
+        // What an old sample has become since, at most: the errors went on at their rates.
+        let late_ms = lane.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
+        let carried = per_m
+            .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
+            .saturating_div(1000)
+            .saturating_add(per_rad.saturating_mul(e_theta_urps / 1000 * late_ms / 100) / 10_000);
+        let position = position.saturating_add(carried);
         let both = position.saturating_add(rate);
         let probe = if state.probe_left_us > 0 {
             self.probe_mnm
@@ -264,7 +273,9 @@ impl MonitorState {
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
-                age_us: (field(bytes, 46, 10) & 0x1FF).saturating_mul(100),
+                age_us: (field(bytes, 46, 10) & 0x1FF)
+                    .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
+                    .saturating_mul(100),
             };
             // After a gap there is no rate.
             if self.lane.age_us > OLDEST_LANE_US {

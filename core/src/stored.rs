@@ -6,8 +6,8 @@
 //! | 4..8 | sequence number, u32; the newer of two good copies counts, across a wrap |
 //! | 8..12 | the number of the processor that wrote it, u32 |
 //! | 12..16 | the number of the vehicle that it is for, u32; 0: nobody said |
-//! | 16..168 | the parameters in the order of [`PARAMETERS`], SI, f64 |
-//! | 168..172 | CRC-32 (ISO-HDLC, as in zlib) of all before |
+//! | 16..192 | the parameters in the order of [`PARAMETERS`], SI, f64 |
+//! | 192..196 | CRC-32 (ISO-HDLC, as in zlib) of all before |
 //!
 //! All little-endian. Who writes puts the next sequence number into the copy that was *not* loaded, so that a
 //! write that power cuts short leaves the previous set in use. Not here: the memory itself, and what to do
@@ -16,7 +16,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use crate::config::Config;
+use crate::config::Setup;
 use crate::params::{PARAMETERS, Params};
 
 /// Length of a copy.
@@ -92,5 +92,5 @@ fn read(bytes: &[u8], hardware: u32) -> Option<(u32, Set)> {
         *si = f64::from_le_bytes(*bytes);
     }
     let params = Params::from_values(&si);
-    (is_whole && is_ours && Config::new(&params).is_ok()).then_some((sequence, Set { params, vehicle }))
+    (is_whole && is_ours && Setup::new(&params).is_ok()).then_some((sequence, Set { params, vehicle }))
 }

@@ -280,7 +280,7 @@ fn parameters() {
         .iter()
         .any(|v| v.signal_name == "ParameterWrite_Value");
     assert!(is_float);
-    for (index, value) in [(0, 0.25_f32), (7, 5.0), (15, 0.001_753), (18, 0.0)] {
+    for (index, value) in [(0, 0.25_f32), (7, 5.0), (17, 0.001_753), (21, 0.0)] {
         let sent = ParameterWrite { index, value };
         let frame = sent.encode(index);
         assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
@@ -290,7 +290,7 @@ fn parameters() {
         assert_eq!(decode(sent), sent);
     }
     let beyond = ParameterWrite {
-        index: 19,
+        index: 22,
         value: 1.0,
     };
     assert_eq!(ParameterWrite::unpack(beyond.pack()), None);
@@ -330,7 +330,7 @@ fn unlock_value_and_rejection() {
     let signals = ["Vehicle", "Hardware"].map(|name| signal(&dbc, &sent.encode(0), name));
     assert_eq!(signals, [654_321.0, f64::from(0xFEDC_BA98_u32)]);
     assert_eq!(decode(sent), sent);
-    for (index, value) in [(0, 0.25_f32), (18, 0.7)] {
+    for (index, value) in [(0, 0.25_f32), (20, 0.7)] {
         let sent = ParameterValue { index, value };
         let frame = sent.encode(index);
         assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));

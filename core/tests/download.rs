@@ -24,6 +24,7 @@ const SET: Params = Params {
         aligning_gain_nm_s2_per_m: 1.25,
         column_damping_nm_s: 0.5,
         far_time_s: 0.75,
+        near_time_s: 0.375,
     },
     ..Params::PAPER
 };
@@ -143,7 +144,7 @@ fn a_set_with_a_gap_is_refused() {
         swapped.swap(i, (i + 1) % good.len());
         assert_eq!(receive(&lost, Mode::Standby).0, None, "frame {i} lost");
         // A first field sent again only begins anew, and before a last one came again the set was whole.
-        if i != 0 && i != 18 {
+        if i != 0 && i != 21 {
             assert_eq!(receive(&twice, Mode::Standby).0, None, "frame {i} twice");
         }
         assert_eq!(receive(&swapped, Mode::Standby).0, None, "frame {i} swapped");
@@ -208,7 +209,7 @@ fn a_value_out_of_its_range_spoils_the_set() {
 #[test]
 fn the_ends_of_every_range_are_taken() {
     type Field = fn(&mut Params) -> &mut f64;
-    let fields: [(Field, f64, f64); 19] = [
+    let fields: [(Field, f64, f64); 22] = [
         (|p| &mut p.k_1, 0.0, 4.0),
         (|p| &mut p.a_1, 0.0, 100.0),
         (|p| &mut p.a_2, 0.0, 100.0),
@@ -223,11 +224,14 @@ fn the_ends_of_every_range_are_taken() {
         (|p| &mut p.probe_frequency_hz, 1.0, 5.0),
         (|p| &mut p.t_nms_s, 0.01, 1.0),
         (|p| &mut p.k_nms, 0.0, 10.0),
+        (|p| &mut p.low_speed_share, 0.0, 1.0),
+        (|p| &mut p.high_speed_share, 0.0, 1.0),
         (|p| &mut p.vehicle.curvature_gain_per_m, 0.001, 0.1),
         (|p| &mut p.vehicle.stability_factor_s2_per_m2, 0.0, 0.01),
         (|p| &mut p.vehicle.aligning_gain_nm_s2_per_m, 0.0, 20.0),
         (|p| &mut p.vehicle.column_damping_nm_s, 0.0, 10.0),
         (|p| &mut p.vehicle.far_time_s, 0.1, 3.0),
+        (|p| &mut p.vehicle.near_time_s, 0.0, 5.0),
     ];
     for (i, (field, min, max)) in fields.into_iter().enumerate() {
         for end in [min, max] {
@@ -395,10 +399,10 @@ fn an_ecu_that_is_locked_for_want_of_parameters_alone_takes_some() {
 fn the_values_in_use_go_round_in_their_order() {
     let expected = [0.5, 1.5, 0.25, 20.0];
     for (turn, expected) in (0..).zip(expected) {
-        for round in [0, 19, 190] {
+        for round in [0, 22, 220] {
             let told = value(&SET, turn + round).unwrap();
             assert_eq!((u32::from(told.index), told.value), (turn, expected));
         }
     }
-    assert_eq!(value(&SET, 18).map(|told| told.value), Some(0.75));
+    assert_eq!(value(&SET, 21).map(|told| told.value), Some(0.375));
 }

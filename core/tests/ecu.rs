@@ -173,12 +173,12 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() 
             outputs.push(rig.applied);
         }
         rig.speeds[1] = rig::SPEED + 2.1;
-        let (ms, step) = rig.run_until(10, |step| step.command.mode == Mode::Handover);
+        let (ms, step) = rig.run_until(31, |step| step.command.mode == Mode::Handover);
         assert!(step.command.faults.contains(Fault::SpeedImplausible));
         let declared = outputs.len() + ms as usize - 1;
         let trusted = outputs[declared - 500];
         assert!(
-            (0.4..0.7).contains(&(sign * trusted)) && sign * rig.applied > 1.0,
+            (0.4..0.8).contains(&(sign * trusted)) && sign * rig.applied > 1.0,
             "{trusted} of {}",
             rig.applied
         );
@@ -314,6 +314,9 @@ fn speeds_that_disagree_and_speeds_too_low() {
         }
         // Both round to the bus's 2^-8 m/s.
         rig.speeds = [16.0, 16.0 + apart];
+        // One message may be that of a wheel that slips, and two: the third is a fault.
+        let step = rig.run(10);
+        assert_eq!(step.command.mode, Mode::Active, "{apart}");
         let step = rig.run(10);
         assert_eq!(step.command.mode, expected, "{apart}");
         let implausible = step.command.faults.contains(Fault::SpeedImplausible);
@@ -710,8 +713,8 @@ fn a_lane_preview_that_never_ages_is_stale_to_the_monitor() {
     rig.tick();
     rig.ecu.keep_lane_fresh();
     rig.silent[LANE] = true;
-    let (ms, step) = rig.run_until(100, |step| step.command.mode != Mode::Active);
-    assert_eq!((ms, step.command.mode), (41, Mode::Fault));
+    let (ms, step) = rig.run_until(400, |step| step.command.mode != Mode::Active);
+    assert_eq!((ms, step.command.mode), (361, Mode::Fault));
     assert!(step.command.faults.contains(Fault::Monitor) && !step.permitted);
 }
 

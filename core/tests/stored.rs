@@ -45,8 +45,9 @@ fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
 }
 
 /// A different value in each field.
-const VALUES: [f64; 19] = [
-    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.02, 0.001, 1.25, 0.5, 0.75,
+const VALUES: [f64; 22] = [
+    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.75, 0.25, 0.02, 0.001, 1.25,
+    0.5, 0.75, 0.375,
 ];
 
 fn params() -> Params {
@@ -65,12 +66,15 @@ fn params() -> Params {
         probe_frequency_hz: 2.0,
         t_nms_s: 0.2,
         k_nms: 1.5,
+        low_speed_share: 0.75,
+        high_speed_share: 0.25,
         vehicle: VehicleParams {
             curvature_gain_per_m: 0.02,
             stability_factor_s2_per_m2: 0.001,
             aligning_gain_nm_s2_per_m: 1.25,
             column_damping_nm_s: 0.5,
             far_time_s: 0.75,
+            near_time_s: 0.375,
         },
     }
 }
@@ -88,7 +92,7 @@ fn the_layout_is_the_documented_one() {
     assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     let bytes = save(&params(), 0x0102_0304);
     assert_eq!(bytes.to_vec(), block(2, 0x0102_0304, &VALUES));
-    assert_eq!(bytes.len(), 172);
+    assert_eq!(bytes.len(), 196);
     assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
 }
 
@@ -148,7 +152,7 @@ fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
 #[test]
 fn other_versions_and_values_out_of_range_are_no_good() {
     assert_eq!(load([&block(1, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(2, 1, &VALUES[..18]), &[]]), None);
+    assert_eq!(load([&block(2, 1, &VALUES[..21]), &[]]), None);
     let ranges_end = [
         (0, 4.1),
         (5, 0.4),
@@ -160,11 +164,14 @@ fn other_versions_and_values_out_of_range_are_no_good() {
         (11, 0.9),
         (12, 1.1),
         (13, -0.1),
-        (14, 0.2),
+        (14, 1.1),
         (15, -0.1),
-        (16, 21.0),
-        (17, 10.1),
-        (18, f64::NAN),
+        (16, 0.2),
+        (17, -0.1),
+        (18, 21.0),
+        (19, 10.1),
+        (20, 3.1),
+        (21, f64::NAN),
     ];
     for (index, value) in ranges_end {
         let mut values = VALUES;

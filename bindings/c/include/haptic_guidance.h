@@ -17,11 +17,11 @@ extern "C" {
 #endif
 
 /* Bytes and alignment of an ECU on every target; hg_ecu_size and hg_ecu_align say what this one takes. */
-#define HG_ECU_SIZE 2560
+#define HG_ECU_SIZE 4096
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
-#define HG_PARAMETERS 19
+#define HG_PARAMETERS 22
 
 /* Torque of one count of hg_step.torque_raw: 2^-12 N.m, as on the bus. */
 #define HG_TORQUE_LSB_NM (1.0 / 4096.0)

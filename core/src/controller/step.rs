@@ -1,17 +1,20 @@
 //! One step of the controller: the one place that sees the mode machine, the plausibility checks, the law, the
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
-use super::{Command, Input, Inputs, Memory, Motion, READY, Request};
+use super::{Command, Input, Inputs, Memory, READY, Request};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
 use crate::hands::{END, WARN};
 use crate::injection::Injection;
-use crate::law::LawState;
+use crate::law::{LaneSample, LawState, Since};
 use crate::modes::{Event, Events, Mode};
-use crate::plausibility::speeds_agree;
+use crate::past::Past;
 use crate::probe::ProbeState;
-use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, product};
+use crate::quantity::{
+    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second_times, product,
+    saturate,
+};
 use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
 /// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
@@ -29,6 +32,9 @@ const EARLY: Micros = Micros::from_us(500);
 /// So many early steps in a row are tolerated: they earn no rate limit, but a runaway timer is a fault.
 const EARLY_STEPS: u32 = 3;
 
+/// A lane sample that is no older than this when it comes needs no other making up for than its rates.
+const PROMPT: Micros = Micros::from_ms(10);
+
 /// One step, with what it must not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
@@ -40,8 +46,8 @@ pub(super) struct Step<'a, I> {
 }
 
 impl<I: Injection> Step<'_, I> {
-    pub(super) fn run(&self, v: &mut Memory, history: &mut History) -> Command {
-        let lost = self.look(v);
+    pub(super) fn run(&self, v: &mut Memory, history: &mut History, past: &mut Past) -> Command {
+        let lost = self.look(v, past);
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
@@ -74,7 +80,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
-    fn look(&self, v: &mut Memory) -> FaultSet {
+    fn look(&self, v: &mut Memory, past: &mut Past) -> FaultSet {
         let Inputs {
             lane,
             column,
@@ -87,12 +93,13 @@ impl<I: Injection> Step<'_, I> {
         let mut implausible = FaultSet::from_bits(v.implausible);
 
         v.age.speeds = self.age(motion, v.age.speeds);
-        if let Input::New(Motion { speeds: [a, b], .. }) = motion {
-            let agree = speeds_agree(*a, *b);
-            implausible.set(!agree, Fault::SpeedImplausible);
+        if let Input::New(motion) = motion {
+            let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds);
+            implausible.set(!plausible, Fault::SpeedImplausible);
             if agree {
-                checks.speed(&mut v.plausibility, *a);
+                checks.motion(&mut v.plausibility, motion.speeds[0], motion.yaw_rate());
             }
+            past.turn(self.now, v.plausibility.turning());
         }
         if !self.is_fast_enough().unwrap_or(false) {
             // Neither model holds at a walking pace, let alone at an unknown one.
@@ -121,15 +128,22 @@ impl<I: Injection> Step<'_, I> {
         v.age.lane = self.age(lane, v.age.lane);
         match lane {
             Input::New(sample) => {
-                let plausible = checks.lane(&mut v.plausibility, *sample);
+                if self.inputs.line_moved {
+                    v.plausibility.forget_lane();
+                    past.forget_line();
+                    v.law.relocate(*sample);
+                }
+                let plausible = checks.lane(&mut v.plausibility, past, self.now, *sample);
                 implausible.set(!plausible, Fault::LaneImplausible);
             }
             Input::Held(_) => {}
             Input::Lost => {
                 v.plausibility.forget_lane();
+                past.forget_line();
                 implausible.set(false, Fault::LaneImplausible);
             }
         }
+        self.make_up_for_age(v, past);
         v.age.request = self.age(request, v.age.request);
 
         // A frame that arrives and is refused is no time-out: the fault that says so came with the inputs.
@@ -146,6 +160,42 @@ impl<I: Injection> Step<'_, I> {
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
         v.implausible = implausible.bits();
         lost
+    }
+
+    /// What the vehicle turned since the lane sample in use, if that was old when it came.
+    fn make_up_for_age(&self, v: &mut Memory, past: &Past) {
+        let Some(sample) = self.inputs.lane.value() else {
+            return;
+        };
+        let age = self.now.since(sample.at);
+        if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
+            (v.turned, v.rate_then) = (Radians::ZERO, TurningRate::ZERO);
+        } else if let Input::New(_) = self.inputs.lane {
+            (v.turned, v.rate_then) = past.turned(self.now, sample.at);
+        } else {
+            let turning = i64::from(v.plausibility.turning().bits());
+            let turned = i64::from(v.turned.bits()).saturating_add(per_second_times(turning, self.elapsed));
+            v.turned = Radians::from_wide(turned);
+        }
+    }
+
+    /// How its motion since then differs from going on as it did.
+    fn since(&self, v: &Memory, sample: LaneSample) -> Since {
+        let age = self.now.since(sample.at);
+        if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
+            return Since::NOTHING;
+        }
+        let went_on = per_second_times(i64::from(v.rate_then.bits()), age);
+        let turned = i64::from(v.turned.bits()).saturating_sub(went_on);
+        let faster = i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.rate_then.bits()));
+        let speed = v.plausibility.speed();
+        let near = product(self.config.plausibility.near_time.bits(), speed.bits());
+        Since::new(
+            Radians::from_wide(turned),
+            TurningRate::from_wide(faster),
+            speed,
+            Metres::from_wide(near),
+        )
     }
 
     fn age<T>(&self, input: &Input<T>, so_far: Micros) -> Micros {
@@ -305,13 +355,17 @@ impl<I: Injection> Step<'_, I> {
 
     /// The law's torque, scaled by the authority.
     fn guidance(&self, v: &mut Memory) -> Torque {
-        let law = |sample| self.config.law.step(&mut v.law, self.now, sample);
-        let asked = self.inputs.lane.value().map_or(Torque::ZERO, law);
+        let asked = self.inputs.lane.value().map_or(Torque::ZERO, |sample| {
+            let since = self.since(v, sample);
+            self.config.law.step(&mut v.law, self.now, sample, &since)
+        });
         let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ZERO, share);
-        Torque::from_wide(product(authority.bits(), asked.bits()))
+        let scheduled = self.config.schedule.share(v.plausibility.speed());
+        let share = saturate(product(authority.bits(), scheduled.bits()));
+        Torque::from_wide(product(share, asked.bits()))
     }
 }
 

@@ -165,7 +165,9 @@ impl Rig {
             let driver = (word << 34).cast_signed() >> 46;
             let heard = &mut self.heard;
             match frame.id() {
-                0x100 if word >> 55 & 1 == 1 => heard.lane = Some(((word >> 46 & 0x1FF) * 100, self.t_us)),
+                0x100 if word >> 55 & 1 == 1 => {
+                    heard.lane = Some((((word >> 46 & 0x1FF) + (word >> 56 & 3) * 512) * 100, self.t_us))
+                }
                 0x110 => heard.driver = Some((driver as f64 / 4096.0, self.t_us)),
                 0x120 => heard.speeds = Some(self.t_us),
                 0x130 => heard.engage = Some((word >> 12 & 1 == 1, self.t_us)),

@@ -223,11 +223,15 @@ impl Watch {
         self.by_limit[step.command.limit as usize] += 1;
     }
 
-    /// Whether no input was true longer ago than 30 ms.
+    /// Whether every input is one that the slowest sender may leave behind: three of its periods, and a lane sample that was
+    /// at most 150 ms old when it came. That each sender is waited for no longer than its own period asks, tests of their
+    /// own show.
     fn is_fresh(&self, heard: &Heard, t_us: u64) -> bool {
-        let lane = heard.lane.is_some_and(|(age, t)| t_us - t + age <= 30_000);
+        let lane = heard
+            .lane
+            .is_some_and(|(age, t)| t_us - t <= 200_001 && age <= 150_000);
         let others = [heard.driver.map(|d| d.1), heard.engage.map(|e| e.1), heard.speeds];
-        lane && others.iter().all(|t| t.is_some_and(|t| t_us - t <= 30_000))
+        lane && others.iter().all(|t| t.is_some_and(|t| t_us - t <= 75_000))
     }
 
     /// The largest output that may be trusted: of before the silence that the faults tell of, or of 250 ms ago.

@@ -9,6 +9,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`sweep`]: many drives with varied fields.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
@@ -42,7 +43,11 @@ pub mod identify;
 mod record;
 pub mod reliance;
 pub mod run;
+pub mod sweep;
 
 pub mod stability;
 
 pub use record::{RunRecord, check_window};
+
+/// Version and commit of this program, as results name it.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("HAPTIC_COMMIT"));

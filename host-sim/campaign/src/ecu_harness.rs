@@ -255,7 +255,8 @@ impl<'a> EcuHarness<'a> {
         let time_s = f64::from(observation.step) * 1e-3;
         self.residual.at(time_s);
         if let Some(speeds) = readings.speeds_m_per_s {
-            self.residual.speeds(speeds);
+            let yaw_rate = readings.yaw_rate_rad_per_s.unwrap_or(0.0);
+            self.residual.motion(time_s, speeds, yaw_rate);
         }
         if let Some((driver_nm, wheel_rad)) = readings.column {
             self.residual

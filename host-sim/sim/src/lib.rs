@@ -39,6 +39,7 @@
 
 pub mod action;
 pub mod ecu_events;
+pub mod fork;
 pub mod guidance;
 pub mod input;
 pub mod models;

@@ -28,7 +28,7 @@ use crate::models::road::{Centreline, Projection, Tracker};
 use crate::models::tolerances::Car;
 use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::{PreviewPoints, wrapped};
-use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
+use crate::scenario::{FAILURE_REACTION_S, Failure, FailureKind, Scenario};
 use crate::seeds::Stream;
 
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
@@ -309,6 +309,21 @@ impl<G: Guidance> Simulation<G> {
         }
     }
 
+    /// A clone that fails as `failure` has it in the place of what the scenario plans, if this is the step in which it
+    /// fails (it then differs from here on) or nothing fails; `None` in any other step.
+    pub fn fork_at(&self, failure: Failure) -> Option<Self>
+    where
+        G: Clone,
+    {
+        let failure_step = failure.at_s().map_or(self.step, step_of);
+        (self.step == failure_step && self.failed_at.is_none()).then(|| {
+            let mut fork = self.clone();
+            fork.plan.failure = failure.kind;
+            fork.plan.failure_step = failure.at_s().map_or(u32::MAX, step_of);
+            fork
+        })
+    }
+
     /// How the run ended, if it has.
     pub fn ending(&self) -> Option<Ending> {
         self.ending
@@ -329,7 +344,7 @@ impl<G: Guidance> Simulation<G> {
         &self.guidance
     }
 
-    /// Who guides, to change something about it in mid-run.
+    /// Who guides, to be told what to do in the next step.
     pub fn guidance_mut(&mut self) -> &mut G {
         &mut self.guidance
     }

@@ -1,27 +1,23 @@
-//! `host-sim identify LOG.csv`.
+//! `host-sim identify LOG`.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::{Options, open_recording};
+use haptic_analysis::identify::Options;
 use haptic_batch::identify::{IdentifiedDrive, Method, identify};
 use haptic_report::studies::identify as files;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
+use super::recording::RecordingArguments;
 use super::road::CourseArguments;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recorded drive: a CSV file with time_s, e_y_m, e_theta_rad (the driver's points), wheel_angle_rad,
-    /// guidance_torque_nm, driver_torque_nm, or the bus as recorded by candump -L
-    #[arg(value_name = "LOG.csv")]
-    log: PathBuf,
-    /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
-    #[arg(long, value_name = "FILE")]
-    dbc: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArguments,
     /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
     /// missing
     #[arg(long)]
@@ -83,11 +79,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
-    let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
-    let name = arguments.log.display().to_string();
+    let (log, converted) = arguments.recording.open(arguments.manual)?;
+    let name = arguments.recording.log.display().to_string();
     let mut drive = identify(&name, &log, &options, method)?;
     let notes = &mut drive.results.identification.notes;
-    notes.splice(0..0, note.map(String::from));
+    notes.splice(0..0, converted);
     if let Some(course) = course {
         drive.drive_again(course, arguments.speed, &options)?;
     }

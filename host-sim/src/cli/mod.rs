@@ -9,23 +9,27 @@
 mod availability;
 mod bus;
 mod checkpoint;
+mod convert;
 mod course;
 mod evaluate;
 mod experiment;
 mod faults;
 mod handover;
 mod identify;
+mod lab;
 mod live;
 mod output;
 mod parameters;
 mod participants;
 mod pil;
 mod progress;
+mod recording;
 mod reliance;
 mod road;
 mod run;
 mod series;
 mod stability;
+mod sweep;
 
 use std::fmt::Display;
 use std::process::ExitCode;
@@ -57,6 +61,10 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// A recording in another format: CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF; or a list of its channels
+    Convert(convert::Arguments),
+    /// The lab in the browser: sliders for driver, guidance and failure, and a road to drive yourself
+    Lab(lab::Arguments),
     /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
     Course(course::Arguments),
     /// One scenario from a TOML file
@@ -77,6 +85,8 @@ enum Command {
     Live(live::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
+    /// Many drives with varied fields (lists, ranges, distributions), a row of a table each, on threads and shards
+    Sweep(sweep::Arguments),
     /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
     Reliance(reliance::Arguments),
 }
@@ -111,6 +121,8 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Convert(arguments)) => convert::run(&arguments),
+        Some(Command::Lab(arguments)) => lab::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
@@ -121,6 +133,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),
         Some(Command::Live(arguments)) => live::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };
     match result {

@@ -10,7 +10,8 @@ pub struct LanePreview {
     pub e_y: Metres,
     /// e_theta' at the far point, +-0.5 rad, LSB 2^-16 rad.
     pub e_theta: Radians,
-    /// Age of the sample when the frame was sent, 0 to 51.1 ms, LSB 0.1 ms.
+    /// Age of the sample when the frame was sent, 0 to 204.7 ms, LSB 0.1 ms. In two signals: what is less than 51.2 ms, which
+    /// is all that senders of version 2.1 and before know, and how often 51.2 ms come to that.
     pub age: Micros,
     /// Whether the sender vouches for the errors.
     pub valid: bool,
@@ -24,7 +25,7 @@ impl LanePreview {
     /// +-0.5 rad, likewise.
     const E_THETA_MAX: i64 = 1 << (Self::E_THETA_LSB - 1);
     const AGE_LSB_US: u32 = 100;
-    const AGE_MAX: u32 = 511;
+    const AGE_MAX: u32 = 2047;
 }
 
 impl Message for LanePreview {
@@ -39,10 +40,11 @@ impl Message for LanePreview {
                 17,
             )
             | put(i64::from(age), 46, 9)
+            | put(i64::from(age >> 9), 56, 2)
             | put(i64::from(self.valid), 55, 1)
     }
 
-    #[expect(clippy::as_conversions, reason = "masked to nine bits")]
+    #[expect(clippy::as_conversions, reason = "masked to eleven bits")]
     fn unpack(word: u64) -> Option<Self> {
         let e_y = signed(word, 12, 17);
         let e_theta = signed(word, 29, 17);
@@ -50,7 +52,9 @@ impl Message for LanePreview {
         in_range.then(|| Self {
             e_y: Metres::from_wide(from_lsb(e_y, Self::E_Y_LSB)),
             e_theta: Radians::from_wide(from_lsb(e_theta, Self::E_THETA_LSB)),
-            age: Micros::from_us((unsigned(word, 46, 9) as u32).wrapping_mul(Self::AGE_LSB_US)),
+            age: Micros::from_us(
+                ((unsigned(word, 46, 9) | unsigned(word, 56, 2) << 9) as u32).wrapping_mul(Self::AGE_LSB_US),
+            ),
             valid: unsigned(word, 55, 1) != 0,
         })
     }

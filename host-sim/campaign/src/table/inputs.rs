@@ -476,7 +476,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "second speed drifts away at 5 m/s2: 2 m/s apart after 400 ms",
         &[Sensor(Speed2, Drifting(5.0))],
     )
-    .hands_over(420),
+    .hands_over(440),
     row("heading-wraps", "the road's heading passes +-pi: no jump", &[]).from(Start::HeadingWraps),
     // The host's request.
     row(

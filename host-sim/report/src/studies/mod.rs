@@ -14,6 +14,7 @@ pub mod identify;
 pub mod reliance;
 pub mod run;
 pub mod stability;
+pub mod sweep;
 
 use crate::document::WriteError;
 use crate::plot::PlotError;

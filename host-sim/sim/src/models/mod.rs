@@ -4,6 +4,7 @@
 //! and knows nothing of the controller, of studies or of the command line. Equation and table numbers are
 //! those of Wang, Zheng, Nacpil and Nakano, DOI 10.1049/itr2.12163.
 
+pub mod arm;
 pub mod disturbances;
 pub mod driver;
 pub mod plant;

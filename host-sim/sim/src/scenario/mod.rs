@@ -471,11 +471,12 @@ impl Values {
 
     /// The vehicle as the controller's plausibility checks know it: the true one, from tables 8 and 9.
     fn vehicle_for_plausibility(&self) -> VehicleParams {
-        let far_time_s = self.guidance.t_f;
+        let (near_time_s, far_time_s) = (self.guidance.t_n, self.guidance.t_f);
         if self.vehicle == VehicleParameters::default() {
             // The constants of the shipped image, so that host and target hold the same bits.
             return VehicleParams {
                 far_time_s,
+                near_time_s,
                 ..Params::PAPER.vehicle
             };
         }
@@ -498,6 +499,7 @@ impl Values {
             aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
             column_damping_nm_s: b_s,
             far_time_s,
+            near_time_s,
         }
     }
 }

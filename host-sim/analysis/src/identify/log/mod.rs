@@ -98,6 +98,14 @@ impl LogError {
     pub(crate) fn new(message: String) -> Self {
         Self(message)
     }
+
+    /// Of a file without lines: counted are the rows.
+    fn in_a_row(self) -> Self {
+        Self(match self.0.strip_prefix("line ") {
+            Some(rest) => format!("row {rest}"),
+            None => self.0,
+        })
+    }
 }
 
 fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
@@ -180,6 +188,35 @@ impl DriveLog {
                 });
             }
         }
+        Self::checked(columns, &lines)
+    }
+
+    /// A log of a table's columns in the order of [`COLUMNS`], checked as a file is; the first is not looked at. Of a `manual`
+    /// drive the guidance may be missing.
+    pub(crate) fn from_rows(
+        time_s: Vec<f64>,
+        columns: [Option<Vec<f64>>; 6],
+        manual: bool,
+    ) -> Result<Self, LogError> {
+        let mut checked: [Vec<f64>; 6] = Default::default();
+        for (c, (column, checked)) in columns.into_iter().zip(&mut checked).enumerate() {
+            *checked = match column {
+                _ if c == 0 => time_s.clone(),
+                Some(values) => values,
+                None => vec![0.0; time_s.len()],
+            };
+            for (row, value) in (1..).zip(checked) {
+                match within(*value, &value.to_string(), row, c) {
+                    Err(_) if manual && c == GUIDANCE_COLUMN => *value = 0.0,
+                    result => result.map_err(|e| e.in_a_row())?,
+                }
+            }
+        }
+        let rows: Vec<u64> = (1..=time_s.len() as u64).collect();
+        Self::checked(checked, &rows).map_err(LogError::in_a_row)
+    }
+
+    fn checked(columns: [Vec<f64>; 6], lines: &[u64]) -> Result<Self, LogError> {
         let [
             time,
             e_y_m,
@@ -188,8 +225,8 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
         ] = columns;
-        let (start_s, dt_s) = check_time(&time, &lines)?;
-        check_wheel_resolution(&wheel_angle_rad, &lines)?;
+        let (start_s, dt_s) = check_time(&time, lines)?;
+        check_wheel_resolution(&wheel_angle_rad, lines)?;
         check_sensor(&driver_torque_nm)?;
         Ok(Self {
             start_s,
@@ -256,6 +293,13 @@ fn field(text: &str, line: u64, c: usize) -> Result<f64, LogError> {
     let Ok(value) = text.parse::<f64>() else {
         return refuse(format!("line {line}: {name} is {text:?}, which is not a number"));
     };
+    within(value, text, line, c)?;
+    Ok(value)
+}
+
+/// Whether a value can be one of its column.
+fn within(value: f64, text: &str, line: u64, c: usize) -> Result<(), LogError> {
+    let name = COLUMNS[c];
     let (limit, hint) = LIMITS[c];
     if !value.is_finite() {
         return refuse(format!(
@@ -267,7 +311,7 @@ fn field(text: &str, line: u64, c: usize) -> Result<f64, LogError> {
             "line {line}: {name} is {value}, outside -{limit:.4} to {limit:.4}: {hint}"
         ));
     }
-    Ok(value)
+    Ok(())
 }
 
 /// Checks the time stamps and returns start and period of the even grid that fits them best, s.

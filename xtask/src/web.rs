@@ -1,0 +1,93 @@
+//! The lab in the browser: WebAssembly and page in one file, tried in a headless Chromium.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::tool::{cargo, command, ensure, exists, output, root, run};
+
+const TARGET: &str = "wasm32-unknown-unknown";
+const LARGEST_BYTES: u64 = 1_000_000;
+/// What the page's test drives too.
+const SCENARIO: &str = "speed = 60\ncondition = \"mid\"\n[driver]\nt_p = 0.3\n";
+/// Milliseconds of the page's own clock: the machine's speed does not matter.
+const BUDGET_MS: u32 = 60_000;
+
+/// Builds `target/dist/haptic-lab.html`, and tries it.
+pub(crate) fn check() -> Result<()> {
+    let wasm = build()?;
+    let page = root().join("target/dist/haptic-lab.html");
+    std::fs::create_dir_all(root().join("target/dist"))?;
+    run(command("python3")
+        .arg("bindings/web/pack.py")
+        .arg(&wasm)
+        .arg(&page))?;
+    let bytes = std::fs::metadata(&page)?.len();
+    if bytes > LARGEST_BYTES {
+        bail!("the page has {bytes} bytes, more than {LARGEST_BYTES}");
+    }
+    try_it(&wasm)
+}
+
+fn build() -> Result<PathBuf> {
+    run(cargo()
+        .args(["build", "--release", "-p", "haptic-web", "--target", TARGET])
+        .env("CARGO_PROFILE_RELEASE_DEBUG", "0")
+        .env("CARGO_PROFILE_RELEASE_STRIP", "symbols")
+        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "s")
+        .env("CARGO_PROFILE_RELEASE_PANIC", "abort"))
+    .with_context(|| format!("rustup target add {TARGET} brings what is missing"))?;
+    Ok(root().join("target").join(TARGET).join("release/haptic_web.wasm"))
+}
+
+/// The page with its test in it: what the test writes into the page, and a picture of it.
+fn try_it(wasm: &Path) -> Result<()> {
+    if !exists("chromium") {
+        ensure(&[("chromium", "chromium")])?;
+    }
+    let place = root().join("target/web");
+    std::fs::create_dir_all(&place)?;
+    let scenario = place.join("scenario.toml");
+    std::fs::write(&scenario, SCENARIO)?;
+    run(cargo()
+        .args(["run", "-q", "--release", "-p", "host-sim", "--", "run"])
+        .arg(&scenario)
+        .arg("--out")
+        .arg(place.join("run"))
+        .stdout(std::process::Stdio::null()))?;
+    let page = place.join("test.html");
+    run(command("python3")
+        .arg("bindings/web/pack.py")
+        .args([wasm, &page, Path::new("bindings/web/test.js")])
+        .arg(place.join("run/run.csv")))?;
+    let chromium = || {
+        let mut chromium = command("chromium");
+        chromium
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--window-size=1200,1500",
+            ])
+            .arg(format!("--virtual-time-budget={BUDGET_MS}"))
+            .stderr(std::process::Stdio::null());
+        chromium
+    };
+    let dom = output(chromium().arg("--dump-dom").arg(&page))?;
+    let report = dom
+        .split_once("<pre id=\"report\"")
+        .and_then(|(_, rest)| rest.split_once("</pre>"));
+    let report = report
+        .and_then(|(report, _)| report.split_once('>'))
+        .map_or("", |(_, report)| report);
+    println!("{}", report.trim_end_matches("end").trim_end());
+    let picture = place.join("lab.png");
+    run(chromium()
+        .arg(format!("--screenshot={}", picture.display()))
+        .arg(&page))?;
+    println!("{}", picture.display());
+    if !report.ends_with("end") || report.contains("FAILED") || report.matches("ok ").count() < 5 {
+        bail!("the page's test did not pass");
+    }
+    Ok(())
+}
