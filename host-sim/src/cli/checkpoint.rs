@@ -33,13 +33,11 @@ impl Checkpoint {
         };
         let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
         let mut lines = whole.lines();
-        if let Some(found) = lines.next() {
-            if found != heading {
-                let what = format!(
-                    "belongs to another study; name another file, or delete it\n  it has {found}\n  this is {heading}"
-                );
-                return Err(fail(&what));
-            }
+        if let Some(found) = lines.next().filter(|found| *found != heading) {
+            let what = format!(
+                "belongs to another study; name another file, or delete it\n  it has {found}\n  this is {heading}"
+            );
+            return Err(fail(&what));
         }
         let parts = lines
             .enumerate()

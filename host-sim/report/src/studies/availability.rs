@@ -118,7 +118,7 @@ fn detection_figure(faults: &Detection) -> Figure {
 /// # Errors
 /// What could not be written or drawn.
 pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
-    let detection = results.detection.as_ref().map(|faults| detection_figure(faults));
+    let detection = results.detection.as_ref().map(detection_figure);
     if let Some(detection) = &detection {
         write_figure(directory, "detection", detection)?;
     }
