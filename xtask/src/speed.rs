@@ -14,6 +14,9 @@ use crate::{callgrind, tool};
 /// Runs of a loop within a round; the fastest of them counts.
 const REPEAT: &str = "5";
 
+/// C's options for the drive that ours makes.
+const SAME_DRIVE: [&str; 8] = ["--t-p", "0.1", "--k-d", "3", "--k-hg", "0.5", "--repeat", REPEAT];
+
 /// What `cargo xtask bench speed` is asked for.
 #[derive(Debug, Args)]
 pub(crate) struct Options {
@@ -52,9 +55,9 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let [mut full, mut light, mut peer, mut peer_with_ours, mut numpy] = [const { Vec::new() }; 5];
     for _ in 0..options.rounds {
         full.push(times_real_time(&ours, &["--repeat", REPEAT])?);
-        peer.push(times_real_time(&c, &["--repeat", REPEAT])?);
+        peer.push(times_real_time(&c, &SAME_DRIVE)?);
         light.push(times_real_time(&ours, &["--ecu", "c", "--repeat", REPEAT])?);
-        peer_with_ours.push(times_real_time(&c_with_ours, &["--repeat", REPEAT])?);
+        peer_with_ours.push(times_real_time(&c_with_ours, &SAME_DRIVE)?);
         numpy.push(times_real_time(
             &python,
             &["bench/closed_loop.py", "--duration", "2"],
