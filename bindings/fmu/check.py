@@ -184,4 +184,5 @@ def main(directory, run_csv):
 # Those of the scenario of `cargo xtask fmu`.
 DRIVER = dict(t_p_s=0.3, k_d_nm_per_rad=3.0, k_hg=0.5)
 
-main(Path(sys.argv[1]), sys.argv[2])
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2])

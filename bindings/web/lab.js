@@ -25,13 +25,14 @@ const answer = () => {
 };
 
 // What a test and the page itself use.
+function give(text) {
+  const bytes = new TextEncoder().encode(text);
+  const at = wasm.take(bytes.length);
+  new Uint8Array(wasm.memory.buffer, at, bytes.length).set(bytes);
+}
 const lab = {
-  begin(toml) {
-    const bytes = new TextEncoder().encode(toml);
-    const at = wasm.take(bytes.length);
-    new Uint8Array(wasm.memory.buffer, at, bytes.length).set(bytes);
-    if (!wasm.begin()) throw new Error(answer());
-  },
+  begin(toml) { give(toml); if (!wasm.begin()) throw new Error(answer()); },
+  replay(bus) { give(bus); if (!wasm.replay()) throw new Error(answer()); return answer(); },
   play: steps => wasm.play(steps),
   step: (hand_nm, { steps = 1, engage = true, authority = 1, torque_lost = false, lane_lost = false } = {}) =>
     wasm.step(steps, hand_nm, +engage, authority, +torque_lost, +lane_lost),

@@ -69,7 +69,7 @@ fn binaries() -> Result<Vec<(PathBuf, [&'static str; 2], &'static str)>> {
     Ok(made)
 }
 
-fn build() -> Result<Vec<PathBuf>> {
+pub(crate) fn build() -> Result<Vec<PathBuf>> {
     let binaries = binaries()?;
     let describe = root().join("target/release/model-description");
     let describe = describe.to_string_lossy();

@@ -1,6 +1,7 @@
 //! The lab in the browser: WebAssembly and page in one file, tried in a headless Chromium.
 
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
@@ -42,9 +43,6 @@ fn build() -> Result<PathBuf> {
 
 /// The page with its test in it: what the test writes into the page, and a picture of it.
 fn try_it(wasm: &Path) -> Result<()> {
-    if !exists("chromium") {
-        ensure(&[("chromium", "chromium")])?;
-    }
     let place = root().join("target/web");
     std::fs::create_dir_all(&place)?;
     let scenario = place.join("scenario.toml");
@@ -54,40 +52,63 @@ fn try_it(wasm: &Path) -> Result<()> {
         .arg(&scenario)
         .arg("--out")
         .arg(place.join("run"))
-        .stdout(std::process::Stdio::null()))?;
+        .stdout(Stdio::null()))?;
     let page = place.join("test.html");
-    run(command("python3")
-        .arg("bindings/web/pack.py")
-        .args([wasm, &page, Path::new("bindings/web/test.js")])
-        .arg(place.join("run/run.csv")))?;
-    let chromium = || {
-        let mut chromium = command("chromium");
-        chromium
-            .args([
-                "--headless",
-                "--no-sandbox",
-                "--disable-gpu",
-                "--window-size=1200,1500",
-            ])
-            .arg(format!("--virtual-time-budget={BUDGET_MS}"))
-            .stderr(std::process::Stdio::null());
-        chromium
-    };
-    let dom = output(chromium().arg("--dump-dom").arg(&page))?;
-    let report = dom
-        .split_once("<pre id=\"report\"")
-        .and_then(|(_, rest)| rest.split_once("</pre>"));
-    let report = report
-        .and_then(|(report, _)| report.split_once('>'))
-        .map_or("", |(_, report)| report);
-    println!("{}", report.trim_end_matches("end").trim_end());
+    let report = report(wasm, &page, "bindings/web/test.js", &place.join("run/run.csv"))?;
+    println!("{}", report.trim_end());
     let picture = place.join("lab.png");
-    run(chromium()
+    run(chromium()?
         .arg(format!("--screenshot={}", picture.display()))
         .arg(&page))?;
     println!("{}", picture.display());
-    if !report.ends_with("end") || report.contains("FAILED") || report.matches("ok ").count() < 5 {
+    if report.contains("FAILED") || report.matches("ok ").count() < 5 {
         bail!("the page's test did not pass");
     }
     Ok(())
+}
+
+/// A headless Chromium with the page's own clock.
+fn chromium() -> Result<Command> {
+    if !exists("chromium") {
+        ensure(&[("chromium", "chromium")])?;
+    }
+    let mut chromium = command("chromium");
+    chromium
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--window-size=1200,1500",
+        ])
+        .arg(format!("--virtual-time-budget={BUDGET_MS}"))
+        .stderr(Stdio::null());
+    Ok(chromium)
+}
+
+/// What a script in the page reports; `expected` is a text that it is given.
+fn report(wasm: &Path, page: &Path, script: &str, expected: &Path) -> Result<String> {
+    run(command("python3")
+        .args([
+            Path::new("bindings/web/pack.py"),
+            wasm,
+            page,
+            Path::new(script),
+            expected,
+        ])
+        .stdout(Stdio::null()))?;
+    let dom = output(chromium()?.arg("--dump-dom").arg(page))?;
+    let report = dom
+        .split_once("<pre id=\"report\"")
+        .and_then(|(_, rest)| rest.split_once("</pre>")?.0.split_once('>'));
+    match report.and_then(|(_, report)| report.strip_suffix("end")) {
+        Some(report) => Ok(report.to_owned()),
+        None => bail!("{script} did not come to its end in the page"),
+    }
+}
+
+/// What the ECU in WebAssembly sends on a bus.
+pub(crate) fn replayed(bus: &Path) -> Result<String> {
+    let place = root().join("target/web");
+    std::fs::create_dir_all(&place)?;
+    report(&build()?, &place.join("agree.html"), "bindings/web/agree.js", bus)
 }

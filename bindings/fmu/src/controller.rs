@@ -5,6 +5,7 @@ use haptic_core::config::Setup;
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_sim::models::sensors::camera_looks;
 
 use crate::variable::{About, Kind, Model, Role, Variable, variable};
 
@@ -188,7 +189,8 @@ impl Model for Controller {
             // The ECU judges by itself, and reports what it misses.
             let _ = self.ecu.receive(&frame, now);
         };
-        if step as f64 >= self.pictures as f64 * LanePreview::INFO.period_ms {
+        // 25 steps hold three pictures, so the grid of the rest is that of all.
+        if camera_looks((step % 25) as u32) {
             let preview = LanePreview {
                 e_y: Metres::from_m(e_y),
                 e_theta: Radians::from_rad(e_theta),

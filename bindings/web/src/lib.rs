@@ -3,6 +3,8 @@
 //! Plain functions of WebAssembly, without a bundler or generated glue. Text goes through one buffer each way: the page writes
 //! UTF-8 where [`take`] says and reads the answer at [`text`]. There is one run at a time. No model and no maths is here.
 
+mod replay;
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use haptic_analysis::identify::{DriveLog, Options, identify_with_noise_model};
@@ -274,5 +276,15 @@ pub extern "C" fn identify(manual: u32) -> u32 {
     let mut lab = lab();
     let run = lab.run.as_ref().ok_or_else(|| "there is no run".to_owned());
     let result = run.and_then(|run| run.identified(manual != 0));
+    lab.answer(result)
+}
+
+/// What the shipping ECU sends on the bus that was written; 0 and a sentence if it cannot be read.
+#[unsafe(no_mangle)]
+pub extern "C" fn replay() -> u32 {
+    let mut lab = lab();
+    let result = std::str::from_utf8(&lab.input)
+        .map_err(|e| e.to_string())
+        .and_then(replay::replay);
     lab.answer(result)
 }
