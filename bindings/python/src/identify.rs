@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{COLUMNS, DriveLog, Options, open_mapped};
+use haptic_analysis::identify::{COLUMNS, DriveLog, Options, Recording, open_mapped};
 use haptic_batch::identify::Method;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -36,7 +36,11 @@ pub(crate) fn identify<'py>(
         .map_err(|error| errors::input(py, error))?;
     let (name, (log, converted)) = match (path, columns) {
         (Some(path), _) => {
-            let opened = open_mapped(&path, None, &[], manual).map_err(|error| errors::input(py, error))?;
+            let how = Recording {
+                manual,
+                ..Recording::default()
+            };
+            let opened = open_mapped(&path, &[], &how).map_err(|error| errors::input(py, error))?;
             (path.display().to_string(), opened)
         }
         (None, Some(columns)) => ("columns".to_owned(), (log_of(py, columns, manual)?, Vec::new())),

@@ -211,20 +211,15 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     )
 }
 
-fn report(drive: &IdentifiedDrive, figures: [Figure; 6]) -> Report {
-    let found = &drive.results.identification;
-    let [
-        torque,
-        residuals,
-        correlogram,
-        over_time,
-        delay_profile,
-        intervals,
-    ] = figures;
-    let figure = |figure, caption: &str| Block::Figure {
+fn figure(figure: Figure, caption: &str) -> Block {
+    Block::Figure {
         figure,
         caption: caption.into(),
-    };
+    }
+}
+
+/// What was found, in words, tables and pictures.
+fn of_parameters(found: &Identification, intervals: Figure, delay_profile: Figure) -> Vec<Block> {
     let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
     verdict.extend(verdicts(found).into_iter().map(Block::Text));
     verdict.push(Block::Table(parameters(found)));
@@ -247,6 +242,20 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 6]) -> Report {
         verdict.push(Block::Table(combinations(found)));
     }
     verdict.push(Block::Table(correlation(found)));
+    verdict
+}
+
+fn report(drive: &IdentifiedDrive, figures: [Figure; 6]) -> Report {
+    let found = &drive.results.identification;
+    let [
+        torque,
+        residuals,
+        correlogram,
+        over_time,
+        delay_profile,
+        intervals,
+    ] = figures;
+    let verdict = of_parameters(found, intervals, delay_profile);
     let mut sections: Vec<Section> = in_the_log(found)
         .map(|table| Section {
             heading: "In the log".into(),
