@@ -200,19 +200,19 @@ impl Residual {
     pub(super) fn lane(&mut self, time_s: f64, e_y_m: f64, e_theta_rad: f64) {
         let e_y_m = e_y_m.clamp(-LANE_RANGE_M, LANE_RANGE_M);
         let e_theta_rad = e_theta_rad.clamp(-YAW_RANGE_RAD, YAW_RANGE_RAD);
-        if let Some((_, y, theta)) = self.lane {
-            if is_a_step([y, theta], [e_y_m, e_theta_rad]) {
-                let agrees = self
-                    .refused
-                    .is_some_and(|before| !is_a_step(before, [e_y_m, e_theta_rad]));
-                if !(agrees && is_another_line([y, theta], [e_y_m, e_theta_rad])) {
-                    self.refused = Some([e_y_m, e_theta_rad]);
-                    return;
-                }
-                // What comes next has no past.
-                self.lines.clear();
-                (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
+        if let Some((_, y, theta)) = self.lane
+            && is_a_step([y, theta], [e_y_m, e_theta_rad])
+        {
+            let agrees = self
+                .refused
+                .is_some_and(|before| !is_a_step(before, [e_y_m, e_theta_rad]));
+            if !(agrees && is_another_line([y, theta], [e_y_m, e_theta_rad])) {
+                self.refused = Some([e_y_m, e_theta_rad]);
+                return;
             }
+            // What comes next has no past.
+            self.lines.clear();
+            (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
         }
         self.refused = None;
         if let Some((before_s, y, _)) = self.lane {
