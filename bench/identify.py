@@ -110,6 +110,7 @@ def main():
         "k_hg": ours["k_hg"], "scipy_k_hg": None if problem.manual else fit.x[3],
         "seconds": ours["noise_model_seconds"], "scipy_seconds": seconds,
         "times_faster": seconds / ours["noise_model_seconds"],
+        "with_camera_noise_seconds": ours["noise_model_with_camera_noise_seconds"],
         "paper_method_seconds": ours["paper_seconds"],
     }, indent=2))
     return 0 if abs(fit.cost / ours["loss"] - 1) < 1e-4 else 1

@@ -1,8 +1,9 @@
 //! The fourteen participants as drivers with a known truth: what the identification must find, what it must
 //! refuse, and whether its standard errors are right.
 
-use haptic_analysis::identify::{Identification, Options, Parameter, identify_with_noise_model};
+use haptic_analysis::identify::{DriveLog, Identification, Options, Parameter, identify_with_noise_model};
 use haptic_batch::experiment::{Plan, Recorder, experiment, repeat};
+use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::{PublishedDriver, participants};
 use haptic_sim::scenario::{GuidanceParameters, Scenario, Sensors};
 use haptic_sim::simulation;
@@ -137,4 +138,68 @@ fn without_a_probe_k_hg_is_not_identified() {
         let error = drive.noise_model.trajectory_error_m.unwrap();
         assert!(error < 0.366, "{}: {error}", drive.participant);
     }
+}
+
+/// A drive recorded at instants that limp by up to a fifth of a step: resampled by its stamps it is not refuted, and the
+/// truth lies in the intervals of all that is identified.
+#[test]
+fn a_drive_with_uneven_stamps_is_resampled_and_identified() {
+    let driver = participants()[1].guided;
+    let mut guidance = GuidanceParameters {
+        probe: true,
+        ..Default::default()
+    };
+    guidance.controller.probe_amplitude_nm = 0.2;
+    let scenario = Scenario::builder()
+        .driver(DriverParameters {
+            remnant_sd_nm: 0.07,
+            ..driver.parameters()
+        })
+        .gains(driver.gains())
+        .guidance(guidance)
+        .seed(4)
+        .build()
+        .unwrap();
+    let mut steps: Vec<[f64; 5]> = Vec::new();
+    simulation::observe(&scenario, |o| {
+        let seen = &o.observation;
+        let lane = [o.preview.e_y_m, o.preview.e_theta_rad];
+        steps.push([
+            lane[0],
+            lane[1],
+            seen.wheel_angle_rad,
+            o.applied_torque_nm,
+            seen.driver_torque_nm,
+        ]);
+    });
+    let mut columns: [Vec<f64>; 6] = Default::default();
+    for k in 1.. {
+        let time_s = (k as f64 + 0.2 * (12.9898 * k as f64).sin()) / 120.0;
+        let (whole, share) = ((time_s * 1e3) as usize, (time_s * 1e3).fract());
+        let Some([now, next]) = steps
+            .get(whole..whole + 2)
+            .and_then(|w| <&[[f64; 5]; 2]>::try_from(w).ok())
+        else {
+            break;
+        };
+        columns[0].push(time_s);
+        for (c, column) in columns[1..].iter_mut().enumerate() {
+            // T_h is held for its millisecond.
+            let held = c == 3;
+            column.push(if held {
+                now[c]
+            } else {
+                now[c] + share * (next[c] - now[c])
+            });
+        }
+    }
+    let log = DriveLog::from_columns(columns, false).unwrap();
+    assert!(log.findings[0][1].starts_with("uneven"), "{:?}", log.findings);
+    let found = identify_with_noise_model(&log, &Options::default());
+    assert!(found.refuted.is_empty(), "{:?}", found.refuted);
+    for (parameter, truth) in with_truth(&found, &driver) {
+        let [low, high] = parameter.interval_95.unwrap();
+        assert!(low <= truth && truth <= high, "{parameter:?} against {truth}");
+    }
+    assert!(found.parameters.k_hg.identified);
 }

@@ -52,7 +52,10 @@ const PACKAGES: Arrows = &[
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
     ("bindings/c", &["haptic-core"]),
-    ("bindings/fmu", &["haptic-core"]),
+    // Driver and vehicle are the simulator's.
+    ("bindings/fmu", &["haptic-core", "haptic-sim"]),
+    // The loop and the identification in a page.
+    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
     // The parts that Python hands out; no injector, no serial port, no charts.
     ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
 ];
@@ -305,11 +308,14 @@ const LONGEST: usize = 350;
 const LONGER: &[(&str, &str)] = &[
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("bindings/fmu/src/fmi2.rs", "one C interface, function by function"),
+    ("bindings/fmu/src/fmi3.rs", "one C interface, function by function"),
+    ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
     ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),
     ("firmware/src/boards/sam_e54_xpro.rs", "one file for each board"),
     ("firmware/src/reset.rs", "the record that crosses a reset, with what writes, reads and repairs it"),
+    ("host-sim/analysis/src/identify/bus_trace/mod.rs", "one reader, from the trace's text to a log"),
     ("host-sim/analysis/src/identify/log/mod.rs", "every refusal of a log beside the others"),
     ("host-sim/analysis/src/identify/noise_model/mod.rs", "one model: its states, their sensitivities, their tests"),
     ("host-sim/analysis/src/identify/noise_model/report.rs", "everything that a fit is reported by"),
@@ -317,7 +323,10 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/analysis/src/identify/paper.rs", "one published method, as it stands in the paper"),
     ("host-sim/analysis/src/identify/result.rs", "one document: the fields of a result"),
     ("host-sim/analysis/src/identify/search.rs", "one algorithm with its tests"),
+    ("host-sim/batch/src/design.rs", "one study: question, designs, confirmation"),
+    ("host-sim/batch/src/experiment/mod.rs", "one study of drivers with a known truth"),
     ("host-sim/batch/src/experiment/spoiled.rs", "one study of one kind of spoiled log after the other"),
+    ("host-sim/batch/src/reliance/mod.rs", "one study: drives, sessions, errors"),
     ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/experiment.rs", "one report, section by section"),
     ("host-sim/report/src/studies/identify.rs", "one report, section by section"),

@@ -1,10 +1,11 @@
 //! The driver's reliance, read live by the ECU from its probe, against the truth of the driver model. (Whether the
 //! envelope clips the probe is `unclipped`'s question.)
 
-use haptic_batch::reliance::{Plan, study};
-use haptic_sim::models::driver::ArmGains;
+use haptic_batch::reliance::{Plan, Readings, study};
+use haptic_sim::guidance::OverBus;
+use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::scenario::{GuidanceParameters, Scenario};
-use haptic_sim::simulation;
+use haptic_sim::{Action, Simulation, simulation};
 
 /// 14 drivers x 2 seeds, four sessions each, against the required bounds. (`host-sim reliance` has 20 seeds.)
 #[test]
@@ -14,6 +15,7 @@ fn all_participants_are_read_live() {
         seeds: 2,
         amplitude_nm: 0.2,
         frequency_hz: 2.5,
+        t_nms_s: 0.1,
     };
     let found = study(&plan, || {}).unwrap();
     assert_eq!(found.diverged, 0);
@@ -24,7 +26,8 @@ fn all_participants_are_read_live() {
             pooled.bias.abs() <= 0.02 && pooled.rms <= largest_rms,
             "{pooled:?}"
         );
-        assert!((0.90..=0.99).contains(&pooled.coverage), "{pooled:?}");
+        // With the very arm that is assumed; the deviation is wider than the noise, for other arms.
+        assert!(pooled.coverage >= 0.90, "{pooled:?}");
     }
     // After the driver has become another.
     assert!(
@@ -50,4 +53,85 @@ fn the_probe_is_off_by_default() {
         torque
     };
     assert_eq!(torque(0.0), torque(0.2));
+}
+
+/// Drivers whose arm is another than the ECU assumes: the error that this makes is inside the deviation that the ECU
+/// states, at both ends of the range, and the deviation is no excuse: it stays below 0.6.
+#[test]
+fn another_arm_is_inside_the_stated_deviation() {
+    for t_nms_s in [0.06, 0.15] {
+        let plan = Plan {
+            participants: (1..=14).collect(),
+            seeds: 1,
+            amplitude_nm: 0.2,
+            frequency_hz: 2.5,
+            t_nms_s,
+        };
+        let found = study(&plan, || {}).unwrap();
+        for participant in &found.participants {
+            let late = participant.accuracy.iter().find(|a| a.after_s == 40.0).unwrap();
+            // The mean of four sessions has half of a session's noise.
+            assert!(
+                late.bias.abs() <= 1.3 * late.deviation,
+                "{t_nms_s} s: {participant:?}"
+            );
+            assert!(late.deviation < 0.6, "{participant:?}");
+        }
+        let pooled = found.pooled.iter().find(|a| a.after_s == 40.0).unwrap();
+        assert!(pooled.coverage >= 0.95 && pooled.within_one >= 0.68, "{pooled:?}");
+    }
+}
+
+/// A driver who gives way fully has K_hg 0 and is read so; nobody's hands have no K_hg.
+#[test]
+fn hands_off_is_told_from_full_reliance() {
+    let readings = |driver: DriverParameters, gains: ArmGains| {
+        let scenario = Scenario::builder()
+            .driver(driver)
+            .gains(gains)
+            .guidance(GuidanceParameters {
+                probe: true,
+                ..Default::default()
+            })
+            .seed(3)
+            .build()
+            .unwrap();
+        let mut simulation = Simulation::with(&scenario, OverBus::new(scenario.setup()));
+        let mut readings = Readings::default();
+        while let Some(outcome) = simulation.step(&Action {
+            probe: Some(true),
+            ..Action::default()
+        }) {
+            readings.observe(&outcome);
+            if simulation.steps() >= 40_000 {
+                break;
+            }
+        }
+        readings
+    };
+    let relying = DriverParameters {
+        remnant_sd_nm: 0.07,
+        ..DriverParameters::default()
+    };
+    let gives_way = readings(relying, ArmGains { k_d: 3.0, k_hg: 0.0 });
+    let [k_hg, deviation] = gives_way.at(39.0).and_then(|r| r.estimate).unwrap();
+    assert!(
+        k_hg.abs() < 3.0 * deviation && deviation < 0.1,
+        "{k_hg} {deviation}"
+    );
+    // No arm, no eyes, no reflex: T_d is zero.
+    let nobody = DriverParameters {
+        remnant_sd_nm: 0.0,
+        k_nms: 0.0,
+        ..DriverParameters::default()
+    };
+    let nobody = DriverParameters {
+        a_1: 0.0,
+        a_2: 0.0,
+        a_3: 0.0,
+        ..nobody
+    };
+    let hands_off = readings(nobody, ArmGains { k_d: 0.0, k_hg: 0.0 });
+    assert!(hands_off.readings.iter().all(|r| r.estimate.is_none()));
+    assert!(hands_off.readings.len() > 100, "telemetry came");
 }

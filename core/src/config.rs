@@ -12,7 +12,7 @@
 )]
 
 use crate::envelope::Envelope;
-use crate::estimator::{BLOCK_S, Estimator};
+use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
 use crate::monitor::Monitor;
 use crate::params::{ParamError, Params, in_range};
@@ -193,12 +193,22 @@ impl Estimator {
     #[must_use]
     const fn new(p: &Params) -> Self {
         let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
+        // T_d = -K T_h/(1 + j x) read with another lag y is K (1 + x y)/(1 + x^2): off by x (x - y)/(1 + x y) of itself.
+        let assumed = turns * p.t_nms_s;
+        let [shortest, longest] = [turns * T_NMS_RANGE_S[0], turns * T_NMS_RANGE_S[1]];
+        let [below, above] = [
+            shortest * (shortest - assumed) / (1.0 + shortest * assumed),
+            longest * (longest - assumed) / (1.0 + longest * assumed),
+        ];
+        let below = if below < 0.0 { -below } else { below };
+        let above = if above < 0.0 { -above } else { above };
         Self {
             phase_per_us: phase_per_us(p.probe_frequency_hz),
             periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
             amplitude_nm: p.probe_amplitude_nm as f32,
             lag: (turns * p.t_nms_s) as f32,
             k_nms: p.k_nms as f32,
+            muscle: if below > above { below as f32 } else { above as f32 },
         }
     }
 }

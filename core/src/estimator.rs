@@ -18,6 +18,11 @@
 //!
 //! (`host-sim reliance` makes this table; `tests/reliance.rs` asserts a part of it.)
 //!
+//! What is assumed: K_nms, and t_nms. An arm with another t_nms, 0.06 to 0.15 s, makes an error in proportion to K_hg; the
+//! deviation that is reported is that of the noise plus the largest such error. So it is wide for drivers who resist: 0.39 of K_hg at
+//! 2.5 Hz. (An identification from a whole record tells t_nms too.) A driver who relies on the guidance fully, K_hg 0,
+//! is told from hands off by T_d itself: where it stays within 0.03 N.m for a block there are no hands, and no reading.
+//!
 //! Advisory, and outside the torque path: it computes in f32, with additions, multiplications and divisions
 //! only, none of which is fused, so that host and target agree to the last bit. The work at the end of a
 //! block is spread over later steps without a sample, one comparison each: with a sample in every other step no
@@ -50,7 +55,15 @@ pub struct Estimator {
     pub(crate) lag: f32,
     /// K_nms, N.m/rad.
     pub(crate) k_nms: f32,
+    /// Largest error of K_hg, as a share of it, that another t_nms of [`T_NMS_RANGE_S`] makes.
+    pub(crate) muscle: f32,
 }
+
+/// What t_nms drivers' arms have, s: the deviation that is reported holds the error that any of them makes.
+pub const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
+
+/// T_d that stays within this band for a whole block is of nobody's hands: 0.03 N.m in units of 2^-24 N.m.
+const QUIET: i32 = 503_316;
 
 /// One sample of the column with the torque that was applied until then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +94,8 @@ pub struct EstimatorState {
     /// Place in the first block's window, in 2^-32 of its length; the second is half a window apart.
     window: u32,
     blocks: [Block; 2],
+    /// Lowest and highest T_d of this half of a block, and of the one before.
+    bands: [[i32; 2]; 2],
     work: Work,
     /// The last step left the work alone.
     spared: bool,
@@ -88,9 +103,12 @@ pub struct EstimatorState {
     reading: Option<Reading>,
 }
 
+/// Before the first sample.
+const NO_BAND: [i32; 2] = [i32::MAX, i32::MIN];
+
 /// Sums of one block, with its window.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Block {
+pub(crate) struct Block {
     /// Whether it was there from the beginning of its window.
     whole: bool,
     weight: f32,
@@ -100,7 +118,7 @@ struct Block {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Complex {
+pub(crate) struct Complex {
     re: f32,
     im: f32,
 }
@@ -131,6 +149,7 @@ impl Estimator {
                 },
                 Block::default(),
             ],
+            bands: [NO_BAND; 2],
             work: Work::Nothing,
             spared: false,
             average: Average::new(self.amplitude_nm),
@@ -145,6 +164,7 @@ impl Estimator {
         state.work = match state.work {
             work if state.spared => work,
             Work::Nothing => Work::Nothing,
+            Work::Read(block) => self.reading(&block).map_or(Work::Nothing, Work::Average),
             Work::Average(reading) => {
                 state.average.take(reading);
                 Work::Compare {
@@ -155,17 +175,28 @@ impl Estimator {
             }
             Work::Compare { length, sum, best } => state.average.compare(length, sum, best),
             Work::Conclude(change) => {
-                state.reading = state.average.conclude(change);
+                state.reading = state.average.conclude(change, self.muscle);
                 Work::Nothing
             }
         };
-        let ended = sample.and_then(|sample| self.add(state, sample));
-        if let Some(reading) = ended.and_then(|block| self.reading(&block)) {
-            state.work = Work::Average(reading);
+        let Some(ended) = sample.and_then(|sample| self.add(state, sample)) else {
+            return;
+        };
+        let [[low, high], [low_before, high_before]] = state.bands;
+        let band = high.max(high_before).saturating_sub(low.min(low_before));
+        state.bands = [NO_BAND, [low, high]];
+        if band < QUIET {
+            // A driver who relies on the guidance fully moves the wheel all the same; nobody's hands do not. What was
+            // read before is no evidence of who takes it next.
+            state.average = Average::new(self.amplitude_nm);
+            state.reading = None;
+            state.work = Work::Nothing;
+        } else if ended.whole {
+            state.work = Work::Read(ended);
         }
     }
 
-    /// Adds a sample to both blocks; returns the one that ended before it.
+    /// Adds a sample to both blocks; returns the one that ended before it, whole or not.
     fn add(&self, state: &mut EstimatorState, sample: &Sample) -> Option<Block> {
         // 2^32 us are a whole number of turns, so that the clock's wrap is none of the phase.
         let phase = self.phase_per_us.wrapping_mul(sample.at.us());
@@ -200,7 +231,10 @@ impl Estimator {
             block.wheel.add(weight, wheel);
             block.applied.add(weight, applied);
         }
-        ended.filter(|block| block.whole)
+        let torque = sample.driver_torque.bits();
+        let [[low, high], _] = &mut state.bands;
+        (*low, *high) = ((*low).min(torque), (*high).max(torque));
+        ended
     }
 
     /// What a whole block says, if there was enough of a probe in it.

@@ -205,7 +205,7 @@ fn parameters_are_refused_at_any_speed_but_standstill() {
             now_ms: 700,
         };
         let mut download = Download::NEW;
-        download.receive(&unlock(0), &conditions);
+        download.receive(&unlock(0, 0), &conditions);
         for frame in frames(&strong) {
             let _ = download.receive(&frame, &conditions);
         }

@@ -4,9 +4,9 @@
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, MESSAGES, Message, ParameterStatus, ParameterUnlock,
-    ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle, Warning,
-    WriteOutcome,
+    Column, Demand, FaultRecord, Guidance, Identity, LanePreview, MESSAGES, Message, ParameterStatus,
+    ParameterUnlock, ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle,
+    Warning, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::envelope::LimitReason;
@@ -317,12 +317,18 @@ fn parameters() {
 fn unlock_value_and_rejection() {
     let dbc = dbc();
     let sent = ParameterUnlock {
+        vehicle: 1_048_575,
         sequence: 0xFEDC_BA98,
     };
-    assert_eq!(
-        signal(&dbc, &sent.encode(0), "Sequence"),
-        f64::from(0xFEDC_BA98_u32)
-    );
+    let signals = ["Vehicle", "Sequence"].map(|name| signal(&dbc, &sent.encode(0), name));
+    assert_eq!(signals, [1_048_575.0, f64::from(0xFEDC_BA98_u32)]);
+    assert_eq!(decode(sent), sent);
+    let sent = Identity {
+        vehicle: 654_321,
+        hardware: 0xFEDC_BA98,
+    };
+    let signals = ["Vehicle", "Hardware"].map(|name| signal(&dbc, &sent.encode(0), name));
+    assert_eq!(signals, [654_321.0, f64::from(0xFEDC_BA98_u32)]);
     assert_eq!(decode(sent), sent);
     for (index, value) in [(0, 0.25_f32), (20, 0.7)] {
         let sent = ParameterValue { index, value };

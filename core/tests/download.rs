@@ -7,7 +7,7 @@ use haptic_core::download::{Conditions, Download, UNLOCK_MS, frames, mode_for_pa
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
-use haptic_core::stored::Stored;
+use haptic_core::stored::{Set, Stored};
 
 /// Every value is a binary32, so that the bus rounds nothing.
 const SET: Params = Params {
@@ -29,6 +29,15 @@ const SET: Params = Params {
     ..Params::PAPER
 };
 
+/// The vehicle that it is for.
+const VEHICLE: u32 = 654_321;
+
+/// What comes of it.
+const TAKEN: Set = Set {
+    params: SET,
+    vehicle: VEHICLE,
+};
+
 /// Where a set is taken.
 const READY: Conditions = Conditions {
     mode: Mode::Standby,
@@ -45,12 +54,12 @@ const fn in_mode(mode: Mode) -> Conditions {
 /// A receiver that was unlocked.
 fn unlocked() -> Download {
     let mut download = Download::NEW;
-    assert_eq!(download.receive(&unlock(7), &READY), None);
+    assert_eq!(download.receive(&unlock(7, VEHICLE), &READY), None);
     download
 }
 
 /// What such a receiver makes of frames.
-fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
+fn receive(frames: &[Frame], mode: Mode) -> (Option<Set>, WriteOutcome) {
     let mut download = unlocked();
     let taken = frames
         .iter()
@@ -63,7 +72,7 @@ fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
 fn a_whole_set_in_standby_is_taken() {
     assert_eq!(
         receive(&frames(&SET), Mode::Standby),
-        (Some(SET), WriteOutcome::Taken)
+        (Some(TAKEN), WriteOutcome::Taken)
     );
 }
 
@@ -119,7 +128,7 @@ fn other_messages_between_the_fields_do_no_harm() {
         .into_iter()
         .flat_map(|frame| [other, frame])
         .collect();
-    assert_eq!(receive(&mixed, Mode::Standby), (Some(SET), WriteOutcome::Taken));
+    assert_eq!(receive(&mixed, Mode::Standby), (Some(TAKEN), WriteOutcome::Taken));
 }
 
 /// Each frame lost, sent twice, or swapped with its neighbour.
@@ -237,7 +246,7 @@ fn the_ends_of_every_range_are_taken() {
             *field(&mut sent) = end;
             let (taken, outcome) = receive(&frames(&sent), Mode::Standby);
             assert_eq!(outcome, WriteOutcome::Taken, "field {i} = {end}");
-            let got = *field(&mut taken.unwrap());
+            let got = *field(&mut taken.unwrap().params);
             assert!((got - end).abs() <= 6e-8 * end, "field {i}: {got} for {end}");
             for (beyond, by) in [(min, -1e-6), (max, 1e-6)] {
                 *field(&mut sent) = beyond + by * max;
@@ -263,15 +272,15 @@ fn a_refused_set_can_be_sent_again() {
     // An unlock is for one attempt.
     assert_eq!(again(&mut download), None);
     assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
-    download.receive(&unlock(7), &READY);
-    assert_eq!(again(&mut download), Some(SET));
+    download.receive(&unlock(7, VEHICLE), &READY);
+    assert_eq!(again(&mut download), Some(TAKEN));
     assert_eq!(again(&mut download), None, "and for one set");
 }
 
 #[test]
 fn the_status_names_the_set_in_use() {
     let stored = Stored {
-        params: SET,
+        set: TAKEN,
         sequence: 7,
         copy: 1,
     };
@@ -340,7 +349,7 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
         now_ms: u32::MAX - 5,
         ..READY
     };
-    download.receive(&unlock(7), &begin);
+    download.receive(&unlock(7, VEHICLE), &begin);
     let end = Conditions {
         now_ms: UNLOCK_MS - 6,
         ..READY
@@ -354,7 +363,7 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
 /// A download that was recorded unlocks with the number of a set that is no longer in use.
 #[test]
 fn a_recorded_download_is_none() {
-    let recorded: Vec<Frame> = [unlock(7)].into_iter().chain(frames(&SET)).collect();
+    let recorded: Vec<Frame> = [unlock(7, VEHICLE)].into_iter().chain(frames(&SET)).collect();
     for in_use in [8, 6, 0] {
         let mut download = Download::NEW;
         let conditions = Conditions { in_use, ..READY };

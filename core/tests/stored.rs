@@ -2,7 +2,7 @@
 
 use haptic_core::config::Setup;
 use haptic_core::params::{Params, VehicleParams};
-use haptic_core::stored::{BYTES, Stored, load, save};
+use haptic_core::stored::{BYTES, Set, Stored};
 
 /// CRC-32 bit by bit (ISO-HDLC).
 fn crc32(bytes: &[u8]) -> u32 {
@@ -16,9 +16,29 @@ fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
+/// The processor that writes and reads, and the vehicle.
+const HARDWARE: u32 = 0x0506_0708;
+const VEHICLE: u32 = 654_321;
+
+const fn set(params: Params) -> Set {
+    Set {
+        params,
+        vehicle: VEHICLE,
+    }
+}
+
+fn save(params: &Params, sequence: u32) -> [u8; BYTES] {
+    haptic_core::stored::save(&set(*params), sequence, HARDWARE)
+}
+
+fn load(copies: [&[u8]; 2]) -> Option<Stored> {
+    haptic_core::stored::load(copies, HARDWARE)
+}
+
 /// A block by the table in `stored.rs`.
 fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
-    let mut bytes = [version.to_le_bytes(), sequence.to_le_bytes()].concat();
+    let head = [version, sequence, HARDWARE, VEHICLE];
+    let mut bytes = head.map(u32::to_le_bytes).concat();
     bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     bytes.extend(crc32(&bytes).to_le_bytes());
     bytes
@@ -61,7 +81,7 @@ fn params() -> Params {
 
 fn found(params: Params, sequence: u32, copy: usize) -> Option<Stored> {
     Some(Stored {
-        params,
+        set: set(params),
         sequence,
         copy,
     })
@@ -72,7 +92,7 @@ fn the_layout_is_the_documented_one() {
     assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     let bytes = save(&params(), 0x0102_0304);
     assert_eq!(bytes.to_vec(), block(2, 0x0102_0304, &VALUES));
-    assert_eq!(bytes.len(), 188);
+    assert_eq!(bytes.len(), 196);
     assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
 }
 
@@ -160,12 +180,21 @@ fn other_versions_and_values_out_of_range_are_no_good() {
     }
 }
 
+/// The memory of one ECU in another: its limits may be those of another vehicle.
+#[test]
+fn what_another_processor_wrote_is_no_good() {
+    let copy = save(&params(), 1);
+    for other in [0, HARDWARE + 1, HARDWARE ^ 1 << 31] {
+        assert_eq!(haptic_core::stored::load([&copy, &copy], other), None);
+    }
+}
+
 #[test]
 fn absurd_values_within_range_are_accepted() {
     let mut values = VALUES;
     values[..5].fill(0.0);
     values[6] = 0.1;
     let stored = load([&block(2, 1, &values), &[]]).unwrap();
-    assert_eq!(stored.params.torque_limit_nm, 0.1);
-    assert!(Setup::new(&stored.params).is_ok());
+    assert_eq!(stored.set.params.torque_limit_nm, 0.1);
+    assert!(Setup::new(&stored.set.params).is_ok());
 }

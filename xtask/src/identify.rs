@@ -29,8 +29,8 @@ pub(crate) fn run() -> Result<()> {
             ]),
     )?;
     println!(
-        "{:<16}{:>8}{:>12}{:>12}{:>10}{:>14}{:>14}",
-        "one fit", "rows", "ours, ms", "SciPy, ms", "faster", "loss, ours", "loss, SciPy"
+        "{:<16}{:>8}{:>12}{:>18}{:>12}{:>10}{:>14}{:>14}",
+        "one fit", "rows", "ours, ms", "camera noise, ms", "SciPy, ms", "faster", "loss, ours", "loss, SciPy"
     );
     for name in ["guided", "manual"] {
         let log = format!("{OUT}/logs/participant-05-{name}.csv");
@@ -42,9 +42,10 @@ pub(crate) fn run() -> Result<()> {
                 .with_context(|| format!("bench/identify.py names no {key}"))
         };
         println!(
-            "{name:<16}{:>8}{:>12.1}{:>12.0}{:>9.0}x{:>14.6}{:>14.6}",
+            "{name:<16}{:>8}{:>12.1}{:>18.1}{:>12.0}{:>9.0}x{:>14.6}{:>14.6}",
             figure("rows")?,
             1000.0 * figure("seconds")?,
+            1000.0 * figure("with_camera_noise_seconds")?,
             1000.0 * figure("scipy_seconds")?,
             figure("times_faster")?,
             figure("loss")?,

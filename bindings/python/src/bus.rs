@@ -125,7 +125,8 @@ impl Bus {
 
     /// Whether the next frame of a sender is due, `elapsed_us` after the start.
     fn is_due(&mut self, sender: usize, period_ms: f64, elapsed_us: u64) -> bool {
-        let due = elapsed_us as f64 >= f64::from(self.sent[sender]) * period_ms * 1e3;
+        // Half a microsecond, because 15 times 8.333 ms is a little more than 125 ms in floating point.
+        let due = elapsed_us as f64 + 0.5 >= f64::from(self.sent[sender]) * period_ms * 1e3;
         self.sent[sender] += u32::from(due);
         due
     }

@@ -10,13 +10,15 @@
 
 use heapless::Deque;
 
-use super::Reading;
+use super::{Block, Reading};
 use crate::quantity::Ratio;
 
 /// What is left to do for the last block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Work {
     Nothing,
+    /// Make a reading of the block that ended.
+    Read(Block),
     /// Take a reading into the average.
     Average(f32),
     /// Look for a change before the last `length` readings, whose sum is `sum`; the best so far.
@@ -149,13 +151,16 @@ impl Average {
         Work::Compare { length, sum, best }
     }
 
-    pub(super) fn conclude(&mut self, change: Change) -> Option<Reading> {
+    /// The report; by the share `muscle` of K_hg it may be wrong because of the arm's t_nms.
+    pub(super) fn conclude(&mut self, change: Change, muscle: f32) -> Option<Reading> {
         if change.significance > 1.0 {
             (self.mean, self.count) = (change.mean, change.count);
         }
         let variance = OVERLAP_MEAN * self.variance() / f32::from(self.count) + FLOOR;
         // An integer root is exact, and the same everywhere: 2^-28 in, 2^-14 out.
-        let deviation = ((variance * 268_435_456.0) as u32).isqrt();
+        let noise = ((variance * 268_435_456.0) as u32).isqrt();
+        // The other error is no noise: it is added to it, not to its square.
+        let deviation = noise.saturating_add((muscle * self.mean.abs() * 16_384.0) as u32);
         (self.total >= FIRST_REPORT).then(|| Reading {
             k_hg: Ratio::from_f32(self.mean),
             deviation: Ratio::from_wide(i64::from(deviation) << 10),

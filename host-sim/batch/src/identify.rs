@@ -1,13 +1,15 @@
 //! One recorded drive, identified: what was found, and on request how the identified driver drives a course.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::RunRecord;
 use super::experiment::identified_driver;
 use super::record::default_window;
 use haptic_analysis::identify::{
-    DriveLog, FixError, Identification, Options, Tracking, identify_as_published, identify_with_noise_model,
-    track,
+    Difference, DriveLog, FixError, Identification, Options, Population, Tracking, differences,
+    identify_and_track, identify_as_published, identify_together_and_track, identify_with_noise_model,
+    population, track,
 };
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Scenario};
@@ -55,21 +57,71 @@ pub fn identify(
     options: &Options,
     method: Method,
 ) -> Result<IdentifiedDrive, FixError> {
-    let identification = match method {
+    let (identification, tracking) = match method {
         Method::NoiseModel => {
             options.check()?;
-            identify_with_noise_model(log, options)
+            identify_and_track(log, options)
         }
-        Method::Paper => identify_as_published(log, options)?,
+        Method::Paper => (identify_as_published(log, options)?, track(log, options)),
     };
     Ok(IdentifiedDrive {
         name: name.into(),
-        tracking: track(log, options),
+        tracking,
         results: IdentificationResults {
             identification,
             drives_again: None,
         },
     })
+}
+
+/// One driver in several drives, in one fit.
+///
+/// # Errors
+/// As [`identify`]; drives of different rates.
+pub fn identify_several(name: &str, logs: &[DriveLog], options: &Options) -> Result<IdentifiedDrive, String> {
+    options.check().map_err(|e| e.to_string())?;
+    let (identification, tracking) = identify_together_and_track(logs, options).map_err(|e| e.to_string())?;
+    Ok(IdentifiedDrive {
+        name: name.into(),
+        tracking,
+        results: IdentificationResults {
+            identification,
+            drives_again: None,
+        },
+    })
+}
+
+/// Several drivers beside each other.
+#[derive(Debug, Clone, Serialize)]
+pub struct Drivers {
+    /// Name of the drive and what was made of it.
+    pub drivers: Vec<(String, Identification)>,
+    /// Of two drivers, the first less the second; empty otherwise.
+    pub differences: Vec<Difference>,
+    /// Of three drivers or more, what the group is like; empty otherwise.
+    pub population: Vec<Population>,
+}
+
+/// Identifies the driver of each log, and compares them; `done` is called after each, from any thread.
+pub fn compare_drivers(logs: Vec<(String, DriveLog)>, options: &Options, done: impl Fn() + Sync) -> Drivers {
+    let drivers: Vec<(String, Identification)> = logs
+        .into_par_iter()
+        .map(|(name, log)| {
+            let found = identify_with_noise_model(&log, options);
+            done();
+            (name, found)
+        })
+        .collect();
+    let fits: Vec<&Identification> = drivers.iter().map(|d| &d.1).collect();
+    let (differences, population) = match fits[..] {
+        [first, second] => (differences(first, second), Vec::new()),
+        _ => (Vec::new(), population(&fits)),
+    };
+    Drivers {
+        drivers,
+        differences,
+        population,
+    }
 }
 
 impl IdentifiedDrive {
@@ -88,7 +140,11 @@ impl IdentifiedDrive {
             .speed_kmh(speed_kmh)
             .condition(condition)
             .build()?;
-        let scenario = identified_driver(&base, &self.results.identification, options.muscle)?;
+        let scenario = identified_driver(
+            &base,
+            &self.results.identification,
+            self.results.identification.muscle(options.muscle),
+        )?;
         let run = simulate(&scenario);
         let window = default_window(scenario.course());
         self.results.drives_again = Some(RunRecord::new(&scenario, &run, window, None));

@@ -11,16 +11,20 @@
 
 use std::fmt;
 
+use haptic_sim::models::real::WorldParameters;
 use serde::Serialize;
 
-use super::injection::{Injection, Start};
+use super::bytes::{FAULT, HANDOVER};
+use super::injection::{Injection, Motor, Start};
 use super::residual::Seen;
 
+mod attacks;
 mod build;
 mod bus;
 mod inputs;
 mod memory;
 mod time;
+mod vehicle;
 
 /// Class of a reaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -131,6 +135,21 @@ pub struct FaultCase {
     pub(super) start: Start,
     /// Whether the onset follows a lane preview, and not any instant.
     pub(super) after_sample: bool,
+    /// Where on the road it begins, if not anywhere.
+    pub(super) place_on_road: Option<PlaceOnRoad>,
+    /// What is less than ideal about the car or the road from the start.
+    pub(super) plant: Option<fn(&mut WorldParameters)>,
+}
+
+/// Where on its road a run is when the fault begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PlaceOnRoad {
+    /// On a straight, a curve ahead.
+    Before,
+    /// In a curve.
+    In,
+    /// On a straight behind a curve.
+    After,
 }
 
 /// A list of rows under a heading.
@@ -143,7 +162,7 @@ pub struct Group {
 }
 
 /// Every row.
-pub const GROUPS: [Group; 4] = [
+pub const GROUPS: [Group; 6] = [
     Group {
         name: "Inputs",
         rows: inputs::ROWS,
@@ -159,6 +178,14 @@ pub const GROUPS: [Group; 4] = [
     Group {
         name: "Memory and power",
         rows: memory::ROWS,
+    },
+    Group {
+        name: "Camera, motor and road",
+        rows: vehicle::ROWS,
+    },
+    Group {
+        name: "Attacks by legal frames",
+        rows: attacks::ROWS,
     },
 ];
 
@@ -196,10 +223,26 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
         lasts_ms: None,
         start: Start::Engaged,
         after_sample: false,
+        place_on_road: None,
+        plant: None,
     }
 }
 
 impl FaultCase {
+    /// Whether guidance has to end: by a handover, or for good.
+    pub fn asks_to_leave(&self) -> bool {
+        match self.expect {
+            Expect::HandsOverOrStops => true,
+            Expect::Reaches { mode, .. } => matches!(mode, HANDOVER | FAULT) && self.start == Start::Engaged,
+            _ => false,
+        }
+    }
+
+    /// Whether the motor does what the ECU says, so that the ECU decides where the vehicle goes.
+    pub(super) fn obeys(&self) -> bool {
+        !self.injections.contains(&Injection::Motor(Motor::Stuck))
+    }
+
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.
     pub fn deadline_ms(&self) -> Option<u32> {
         let asked = !matches!(

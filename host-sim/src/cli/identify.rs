@@ -1,27 +1,26 @@
-//! `host-sim identify LOG.csv`.
+//! `host-sim identify LOG`.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::{Options, open_recording};
-use haptic_batch::identify::{IdentifiedDrive, Method, identify};
+use haptic_analysis::identify::Options;
+use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_several};
 use haptic_report::studies::identify as files;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
+use super::recording::RecordingArguments;
 use super::road::CourseArguments;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recorded drive: a CSV file with time_s, e_y_m, e_theta_rad (the driver's points), wheel_angle_rad,
-    /// guidance_torque_nm, driver_torque_nm, or the bus as recorded by candump -L
-    #[arg(value_name = "LOG.csv")]
-    log: PathBuf,
-    /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
-    #[arg(long, value_name = "FILE")]
-    dbc: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArguments,
+    /// One more drive of the same driver, of the same rate: all are one fit; may be repeated
+    #[arg(long, value_name = "LOG")]
+    also: Vec<PathBuf>,
     /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
     /// missing
     #[arg(long)]
@@ -43,6 +42,10 @@ pub(super) struct Arguments {
     /// Use the log up to this time, s
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Vec<f64>,
+    /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
+    /// ones; 0 cuts at each
+    #[arg(long, value_name = "S", default_value_t = 0.3, allow_negative_numbers = true)]
+    bridge: f64,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
     exact_lane: bool,
@@ -76,6 +79,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     options.between(&arguments.from, &arguments.to)?;
     options.lane_noise = !arguments.exact_lane;
     options.leave_out = !arguments.whole;
+    in_range("--bridge", arguments.bridge, 0.0..=1.0, "s")?;
+    options.bridge_s = arguments.bridge;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,
@@ -83,11 +88,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
-    let (log, note) = open_recording(&arguments.log, arguments.dbc.as_deref(), arguments.manual)?;
-    let name = arguments.log.display().to_string();
-    let mut drive = identify(&name, &log, &options, method)?;
+    let (log, converted) = arguments.recording.open(arguments.manual)?;
+    let name = arguments.recording.log.display().to_string();
+    let mut drive = if arguments.also.is_empty() {
+        identify(&name, &log, &options, method)?
+    } else {
+        if method == Method::Paper {
+            return Err("--also: the published method takes one drive".into());
+        }
+        let mut logs = vec![log];
+        for path in &arguments.also {
+            logs.push(arguments.recording.open_other(path, arguments.manual)?.0);
+        }
+        identify_several(
+            &format!("{name} and {} more", arguments.also.len()),
+            &logs,
+            &options,
+        )?
+    };
     let notes = &mut drive.results.identification.notes;
-    notes.splice(0..0, note.map(String::from));
+    notes.splice(0..0, converted);
     if let Some(course) = course {
         drive.drive_again(course, arguments.speed, &options)?;
     }
@@ -111,6 +131,10 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.fit_percent,
         files::parameters(found).to_text()
     );
+    for sentence in files::verdicts(found) {
+        text.push_str(&format!("\n{sentence}"));
+    }
+    text.push('\n');
     if let Some(in_the_log) = files::in_the_log(found) {
         text.insert_str(0, &format!("{}\n", in_the_log.to_text()));
     }

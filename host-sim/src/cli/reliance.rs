@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use haptic_batch::reliance::{Plan, RelianceResults, study};
 use haptic_report::studies::reliance as files;
+use haptic_sim::input::in_range;
 
 use super::output::Output;
 use super::participants::Participants;
@@ -24,6 +25,9 @@ pub(super) struct Arguments {
     /// Amplitude of the probe, N.m
     #[arg(long, value_name = "NM", default_value_t = 0.2, allow_negative_numbers = true)]
     amplitude: f64,
+    /// The drivers' t_nms, s (0.02 to 0.5); the ECU goes on assuming 0.1
+    #[arg(long, value_name = "S", default_value_t = 0.1, allow_negative_numbers = true)]
+    t_nms: f64,
     /// Directory for a figure, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -33,11 +37,13 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    in_range("--t-nms", arguments.t_nms, 0.02..=0.5, "s")?;
     let plan = Plan {
         participants: arguments.participants.0.clone(),
         seeds: arguments.seeds,
         amplitude_nm: arguments.amplitude,
         frequency_hz: arguments.frequency,
+        t_nms_s: arguments.t_nms,
     };
     let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let drives = plan.participants.len() as u64 * u64::from(plan.seeds);

@@ -21,8 +21,10 @@ impl std::error::Error for FixError {}
 pub struct Options {
     /// A drive without guidance: K_hg is not part of the model.
     pub manual: bool,
-    /// Known muscle.
+    /// The muscle, known or assumed.
     pub muscle: Muscle,
+    /// Whether t_nms is known exactly: otherwise it is freed where the record draws it away.
+    pub t_nms_known: bool,
     /// Known a_1, a_2, a_3.
     pub a: [Option<f64>; 3],
     /// Known (K_d + K_nms)*a_i.
@@ -39,17 +41,26 @@ pub struct Options {
     pub estimate: [Option<[f64; 2]>; 4],
     /// The stretches to use, from and to, s of the log's time; all if empty.
     pub stretches: Vec<(f64, f64)>,
+    /// Pauses of a signal up to so long are bridged, s; longer ones cut the drive. Zero cuts at each.
+    pub bridge_s: f64,
     /// Whether the camera's noise is estimated and removed.
     pub lane_noise: bool,
+    /// Whether a lane signal is taken as a smooth course alone, without the vehicle's answer to the wheel angle: for
+    /// comparison.
+    pub plain_smoother: bool,
     /// Whether hands-off, standstill and lane changes are looked for and left out.
     pub leave_out: bool,
 }
+
+/// Longest pause of a signal that is bridged unless the caller says otherwise, s: the delay's own size.
+const LONGEST_BRIDGE_S: f64 = 0.3;
 
 impl Default for Options {
     fn default() -> Self {
         Self {
             manual: false,
             muscle: Muscle::default(),
+            t_nms_known: false,
             a: [None; 3],
             gain: [None; 3],
             t_p_s: None,
@@ -58,7 +69,9 @@ impl Default for Options {
             late_s: [0.0; 2],
             estimate: [None; 4],
             stretches: Vec::new(),
+            bridge_s: LONGEST_BRIDGE_S,
             lane_noise: true,
+            plain_smoother: false,
             leave_out: true,
         }
     }
@@ -158,7 +171,7 @@ impl Options {
             "k_nms" => self.muscle.k_nms = value,
             "t_h_late" => self.late_s[0] = value,
             "t_d_late" => self.late_s[1] = value,
-            _ => self.muscle.t_nms_s = value,
+            _ => (self.muscle.t_nms_s, self.t_nms_known) = (value, true),
         }
         Ok(name)
     }
@@ -192,6 +205,7 @@ impl Options {
             return refuse(format!("a range within {least} to {most} is wanted"));
         }
         self.estimate[i] = Some([low, high]);
+        self.t_nms_known |= i == 1;
         let within = |x: &mut f64| *x = x.clamp(low, high);
         match i {
             0 => within(&mut self.muscle.k_nms),

@@ -231,6 +231,7 @@ impl<'a> Problem<'a> {
                 target.into_iter(),
             )),
             parameters,
+            at_t_nms: None,
             combinations: Vec::new(),
             correlation: Correlation::new(&NAMES, &errors, &free),
             remnant: None,
@@ -273,7 +274,7 @@ impl<'a> Problem<'a> {
                 } else {
                     f64::INFINITY
                 };
-                Parameter::estimated(p[i], 0.0, variance, self.bounds[i], high - low)
+                Parameter::estimated(p[i], 0.0, variance, 0.0, self.bounds[i], high - low)
             }
         };
         let sum = p[K_D] + self.k_nms;
@@ -283,7 +284,8 @@ impl<'a> Problem<'a> {
                 + 2.0 * sum * p[i] * errors[(i, K_D)]
                 + p[i] * p[i] * errors[(K_D, K_D)];
             let (_, low, high) = TABLE_4[i];
-            let mut g = Parameter::estimated(sum * p[i], 0.0, variance, Bounds::FREE, 4.0 * (high - low));
+            let mut g =
+                Parameter::estimated(sum * p[i], 0.0, variance, 0.0, Bounds::FREE, 4.0 * (high - low));
             let (a, k_d) = (parameter(i), parameter(K_D));
             g.identified &= a.identified && k_d.identified;
             g.estimate = g.estimate.filter(|_| g.identified);

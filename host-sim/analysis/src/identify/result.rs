@@ -19,6 +19,7 @@ use serde::Serialize;
 use super::balance::Balance;
 use super::prepare::Preflight;
 use super::search::{Bounds, Termination};
+use super::signals::Muscle;
 use super::verdict::Refutation;
 
 /// One parameter of the driver.
@@ -64,12 +65,13 @@ impl Parameter {
         }
     }
 
-    /// From where the search ended, how much farther it would have gone without bounds (to first order) and the
-    /// variance there.
+    /// From where the search ended, how much farther it would have gone without bounds (to first order), the variance
+    /// there, and by how much what else the record says draws it.
     pub(crate) fn estimated(
         optimum: f64,
         pull: f64,
         variance: f64,
+        drawn: f64,
         bounds: Bounds,
         variation_width: f64,
     ) -> Self {
@@ -77,9 +79,10 @@ impl Parameter {
         if !variance.is_finite() || !pull.is_finite() {
             return not;
         }
-        let standard_error = variance.max(0.0).sqrt();
-        let margin = STANDARD_NORMAL_95 * standard_error;
-        let identified = margin <= 0.5 * WIDEST_INTERVAL_SHARE * variation_width;
+        let margin = STANDARD_NORMAL_95 * variance.max(0.0).sqrt();
+        // The mean square of what the estimate misses: the variance about where the record draws it, and the way there.
+        let standard_error = (variance.max(0.0) + drawn * drawn).sqrt();
+        let identified = STANDARD_NORMAL_95 * standard_error <= 0.5 * WIDEST_INTERVAL_SHARE * variation_width;
         let towards_optimum = margin.hypot(pull);
         let (below, above) = if pull > 0.0 {
             (towards_optimum, margin)
@@ -87,12 +90,12 @@ impl Parameter {
             (margin, towards_optimum)
         };
         let unbounded = optimum + pull;
+        let ends = [unbounded - below, unbounded + above].map(|end| end + drawn);
+        let holding = [ends[0].min(optimum), ends[1].max(optimum)];
         Self {
             estimate: identified.then_some(optimum),
             standard_error: Some(standard_error),
-            interval_95: Some(
-                [unbounded - below, unbounded + above].map(|end| end.clamp(bounds.low, bounds.high)),
-            ),
+            interval_95: Some(holding.map(|end| end.clamp(bounds.low, bounds.high))),
             identified,
             ..not
         }
@@ -197,6 +200,15 @@ pub struct Combination {
     pub estimate: f64,
     /// Standard error of the combination.
     pub standard_error: f64,
+}
+
+/// What the intervals would be if t_nms were known to be what is assumed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AtTNms {
+    /// t_nms, s.
+    pub t_nms_s: f64,
+    /// By key.
+    pub intervals_95: Vec<(&'static str, [f64; 2])>,
 }
 
 /// Correlation of the estimation errors.
@@ -309,6 +321,8 @@ pub struct Identification {
     pub fit_percent_wheel_angle: Option<f64>,
     /// The driver.
     pub parameters: Parameters,
+    /// The narrower intervals that hold if t_nms is what is assumed; none if it was given or estimated.
+    pub at_t_nms: Option<AtTNms>,
     /// What is determined where single parameters are not.
     pub combinations: Vec<Combination>,
     /// Correlation of the errors of the free parameters.
@@ -346,6 +360,20 @@ pub struct Identification {
     pub traces: Traces,
 }
 
+impl Identification {
+    /// The muscle that the estimate rests on: `assumed`, with what was estimated of it in its place.
+    pub fn muscle(&self, assumed: Muscle) -> Muscle {
+        let found = |name: &str| {
+            let (_, parameter) = self.beyond.iter().find(|b| b.0 == name)?;
+            parameter.optimum
+        };
+        Muscle {
+            k_nms: found("k_nms").unwrap_or(assumed.k_nms),
+            t_nms_s: found("t_nms").unwrap_or(assumed.t_nms_s),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,12 +382,12 @@ mod tests {
     /// below the peak; 95 % is 1.96^2/2 farther down, at 1.2 -+ 0.1 sqrt(4 + 1.96^2) = 1.2 - 0.28002 downwards.
     #[test]
     fn the_interval_of_a_parameter_on_its_bound_reaches_down_by_the_likelihood_ratio() {
-        let p = Parameter::estimated(1.0, 0.2, 0.01, Bounds::new(0.0, 1.0), 1.0);
+        let p = Parameter::estimated(1.0, 0.2, 0.01, 0.0, Bounds::new(0.0, 1.0), 1.0);
         let [low, high] = p.interval_95.unwrap();
         assert!((low - 0.919_98).abs() < 1e-4 && high == 1.0, "{low} {high}");
         assert!(p.on_bound && p.identified && p.estimate == Some(1.0));
         // Off any bound: 1.96 standard errors to both sides.
-        let p = Parameter::estimated(0.5, 0.0, 0.01, Bounds::new(0.0, 1.0), 1.0);
+        let p = Parameter::estimated(0.5, 0.0, 0.01, 0.0, Bounds::new(0.0, 1.0), 1.0);
         let [low, high] = p.interval_95.unwrap();
         assert!((low - 0.304).abs() < 1e-4 && (high - 0.696).abs() < 1e-4);
     }

@@ -171,10 +171,6 @@ impl Signals {
         }
     }
 
-    pub(crate) fn len(&self) -> usize {
-        self.target.len()
-    }
-
     /// Whole samples of the delay, rounded up, and the weights of the rest.
     pub(crate) fn delay(&self, t_p_s: f64) -> Delay {
         let samples = (t_p_s / self.dt_s).ceil().max(0.0);
@@ -255,6 +251,7 @@ mod tests {
                 .map(|k| if k / 120 % 2 == 0 { 0.2 } else { -0.2 })
                 .collect(),
             driver_torque_nm: vec![0.0; 4800],
+            findings: Vec::new(),
         }
     }
 

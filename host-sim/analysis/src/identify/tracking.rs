@@ -18,6 +18,8 @@ use serde::Serialize;
 use super::log::DriveLog;
 use super::noise_model::{self, LONGEST_DELAY_S};
 use super::options::Options;
+use super::prepare::{Prepared, prepare};
+use super::result::Identification;
 use super::signals::{LagWeights, Signals};
 
 const ARM: usize = 0;
@@ -61,12 +63,28 @@ pub struct Tracking {
     pub t_p: History,
 }
 
-/// Follows the driver of `log`. Parameters fixed in `options` stay fixed; of a manual drive K_hg stays zero.
+/// Follows the driver of `log`, which goes through the same preflight as for an identification: what is left out there is
+/// left out here. Parameters fixed in `options` stay fixed; of a manual drive K_hg stays zero.
 pub fn track(log: &DriveLog, options: &Options) -> Tracking {
-    let whole = noise_model::identify(log, options);
+    let prepared = prepare(log, options);
+    let whole = noise_model::identify_prepared(&prepared, options);
+    follow(&prepared, options, &whole)
+}
+
+/// Identifies the driver of `log` by the noise model, and follows that driver through it.
+pub fn identify_and_track(log: &DriveLog, options: &Options) -> (Identification, Tracking) {
+    let prepared = prepare(log, options);
+    let whole = noise_model::identify_prepared(&prepared, options);
+    let tracking = follow(&prepared, options, &whole);
+    (whole, tracking)
+}
+
+/// Follows the driver of a log that was prepared, from what was found over the whole of it.
+pub(crate) fn follow(prepared: &Prepared, options: &Options, whole: &Identification) -> Tracking {
+    let log = &prepared.log;
     let p = &whole.parameters;
     let found = [&p.gain_1, &p.gain_2, &p.gain_3, &p.k_hg, &p.t_p];
-    let signals = Signals::new(log, options.muscle);
+    let signals = Signals::new(log, whole.muscle(options.muscle));
     let first = (LONGEST_DELAY_S / signals.dt_s).ceil() as usize + 1;
     let dt = signals.dt_s;
 
@@ -83,11 +101,6 @@ pub fn track(log: &DriveLog, options: &Options) -> Tracking {
     let mut x = State::zeros();
     let mut covariance = Covariance::zeros();
     let mut wandering = State::zeros();
-    // The target is T_d + K_nms L[phi]: at the first row it is all arm, give or take the remnant.
-    x[ARM] = signals.target[first - 1];
-    covariance[(ARM, ARM)] = remnant_variance;
-    covariance[(REMNANT, REMNANT)] = remnant_variance;
-    covariance[(OFFSET, OFFSET)] = 1.0;
     wandering[REMNANT] = remnant_variance * (1.0 - rho * rho);
     for (i, parameter) in found.into_iter().enumerate() {
         x[GAIN + i] = parameter.optimum.unwrap_or(0.0);
@@ -98,24 +111,52 @@ pub fn track(log: &DriveLog, options: &Options) -> Tracking {
     }
     let lag = LagWeights::after(dt, dt, signals.t_nms_s);
     let mut out = Tracking::default();
-    for k in first..signals.len() {
-        predict(&signals, lag, rho, k, &mut x, &mut covariance);
-        for i in 0..COUNT {
-            covariance[(i, i)] += wandering[i];
+    for stretch in &prepared.stretches {
+        let from = stretch.start + first;
+        if from >= stretch.end {
+            continue;
         }
-        update(signals.target[k], sensor_variance, &mut x, &mut covariance);
-        confine(K_HG, 0.0, 1.0, &mut x, &covariance);
-        confine(T_P, 0.0, LONGEST_DELAY_S, &mut x, &covariance);
-        out.time_s.push(log.time_s(k));
-        let [g1, g2, g3] = &mut out.gain;
-        for (i, course) in [g1, g2, g3, &mut out.k_hg, &mut out.t_p].into_iter().enumerate() {
+        // Over a gap the driver stays about the same; arm, remnant and the integral of e_y are anybody's guess.
+        for (i, variance) in [
+            (ARM, remnant_variance),
+            (REMNANT, remnant_variance),
+            (OFFSET, 1.0),
+        ] {
+            x[i] = 0.0;
+            covariance.row_mut(i).fill(0.0);
+            covariance.column_mut(i).fill(0.0);
+            covariance[(i, i)] = variance;
+        }
+        // The target is T_d + K_nms L[phi]: at the first row it is all arm, give or take the remnant.
+        x[ARM] = signals.target[from - 1];
+        for k in from..stretch.end {
+            predict(&signals, lag, rho, k, &mut x, &mut covariance);
+            for i in 0..COUNT {
+                covariance[(i, i)] += wandering[i];
+            }
+            update(signals.target[k], sensor_variance, &mut x, &mut covariance);
+            confine(K_HG, 0.0, 1.0, &mut x, &covariance);
+            confine(T_P, 0.0, LONGEST_DELAY_S, &mut x, &covariance);
+            out.push(log.time_s(k), &x, &covariance);
+        }
+    }
+    out
+}
+
+impl Tracking {
+    fn push(&mut self, time_s: f64, x: &State, covariance: &Covariance) {
+        self.time_s.push(time_s);
+        let [g1, g2, g3] = &mut self.gain;
+        for (i, course) in [g1, g2, g3, &mut self.k_hg, &mut self.t_p]
+            .into_iter()
+            .enumerate()
+        {
             course.estimate.push(x[GAIN + i]);
             course
                 .standard_deviation
                 .push(covariance[(GAIN + i, GAIN + i)].max(0.0).sqrt());
         }
     }
-    out
 }
 
 /// Moves state and covariance from row `k - 1` to row `k`.

@@ -12,6 +12,7 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
+mod methods;
 mod recorder;
 mod repetitions;
 mod spoiled;
@@ -19,12 +20,14 @@ mod spoiled;
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use methods::{METHODS, MethodLine, methods};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
 pub use spoiled::{POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
 
 use haptic_analysis::identify::{
-    DriveLog, Identification, Muscle, Options, TABLE_4, identify_as_published, identify_with_noise_model,
+    DriveLog, Identification, Muscle, Options, TABLE_4, Truth, identify_as_published,
+    identify_with_noise_model,
 };
 use haptic_log::trace::Trace;
 use haptic_sim::models::STEP_S;
@@ -193,7 +196,7 @@ fn one_drive(plan: &Plan, number: u32, truth: PublishedDriver) -> Result<Drive, 
         ..Options::default()
     };
     let finding = |identification: Identification| -> Result<Finding, String> {
-        let driver = identified_driver(&scenario, &identification, options.muscle)?;
+        let driver = identified_driver(&scenario, &identification, identification.muscle(options.muscle))?;
         let again = simulation::simulate(&driver);
         let again_path = path_of(&again.trace);
         Ok(Finding {
@@ -214,6 +217,78 @@ fn one_drive(plan: &Plan, number: u32, truth: PublishedDriver) -> Result<Drive, 
         path,
         log,
     })
+}
+
+/// A probe of the controller's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Probe {
+    /// N.m.
+    pub amplitude_nm: f64,
+    /// Hz.
+    pub frequency_hz: f64,
+}
+
+impl Probe {
+    /// The guidance with this probe.
+    fn guidance(self) -> GuidanceParameters {
+        let mut guidance = GuidanceParameters {
+            probe: true,
+            ..GuidanceParameters::default()
+        };
+        guidance.controller.probe_amplitude_nm = self.amplitude_nm;
+        guidance.controller.probe_frequency_hz = self.frequency_hz;
+        guidance
+    }
+
+    /// Whether the controller takes it.
+    pub fn is_accepted(self) -> bool {
+        let scenario = Scenario::builder()
+            .condition(Condition::Custom)
+            .guidance(self.guidance());
+        scenario.build().is_ok()
+    }
+}
+
+/// A guided drive of a published driver with the remnant and the paper's sensors, on any course (the built-in one if
+/// none), as it is logged.
+///
+/// # Errors
+/// A course that is too short; a probe that the controller refuses.
+pub fn recorded(
+    driver: &PublishedDriver,
+    course: Option<&Course>,
+    probe: Option<Probe>,
+    seed: u64,
+) -> Result<DriveLog, String> {
+    let mut scenario = Scenario::builder()
+        .driver(DriverParameters {
+            remnant_sd_nm: REMNANT_GUIDED_NM,
+            ..driver.parameters()
+        })
+        .condition(Condition::Custom)
+        .gains(driver.gains())
+        .guidance(probe.map_or_else(GuidanceParameters::default, Probe::guidance))
+        .seed(seed);
+    if let Some(course) = course {
+        scenario = scenario.course(course.clone());
+    }
+    let mut recorder = Recorder::new(true);
+    simulation::observe(&scenario.build()?, |outcome| recorder.observe(outcome));
+    Ok(recorder.into_log())
+}
+
+/// What a published driver and the remnant of the guided drives are, for the information bound.
+pub fn truth_of(driver: &PublishedDriver) -> Truth {
+    let sum = driver.k_d + Muscle::default().k_nms;
+    Truth {
+        gain: [sum * driver.a_1, sum * driver.a_2, sum * driver.a_3],
+        k_hg: driver.k_hg.unwrap_or(0.0),
+        t_p_s: driver.t_p,
+        remnant_sd_nm: REMNANT_GUIDED_NM,
+        remnant_corner_hz: driver.parameters().remnant_corner_hz,
+        // The torque sensor's rounding to 0.005 N.m.
+        sensor_sd_nm: 0.005 / 12.0_f64.sqrt(),
+    }
 }
 
 /// The drive of a published driver, without remnant.

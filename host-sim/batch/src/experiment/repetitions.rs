@@ -6,8 +6,10 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Plan, PublishedDriver, chosen, driven};
-use haptic_analysis::identify::{Muscle, Options, Parameter, Parameters, identify_with_noise_model};
+use super::{Plan, PublishedDriver, chosen, driven, truth_of};
+use haptic_analysis::identify::{
+    DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
+};
 
 /// What is compared with the truth: the parameters that a torque record can carry.
 pub(super) const COMPARED: usize = 5;
@@ -40,6 +42,8 @@ pub struct Repeated {
     pub identified: f64,
     /// Coverage of the 95 % interval.
     pub coverage: f64,
+    /// Coverage of the narrower interval that is given for t_nms as assumed, which it is in these drives.
+    pub coverage_at_t_nms: f64,
     /// Mean error; none if never identified.
     pub bias: Option<f64>,
     /// Standard deviation of the error about zero; none if never identified.
@@ -48,6 +52,8 @@ pub struct Repeated {
     pub largest: Option<f64>,
     /// Mean of the standard errors that the method gives; none where it gave none.
     pub standard_error: Option<f64>,
+    /// Least RMS error of an unbiased estimator: the information bound of these drives.
+    pub bound: f64,
 }
 
 /// Repeats the guided drives of `plan` and identifies each by the default method; `done` is called after each, from
@@ -60,7 +66,7 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
         .into_iter()
         .flat_map(|p| (0..u64::from(repetitions)).map(move |r| (p.number, p.guided, r)))
         .collect();
-    let found: Vec<[Compared; COMPARED]> = jobs
+    let found: Vec<Judged> = jobs
         .into_par_iter()
         .map(|(number, truth, repetition)| {
             let plan = Plan {
@@ -70,16 +76,13 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
             let log = driven(&plan, number, &truth)?.log;
             let identification = identify_with_noise_model(&log, &Options::default());
             done();
-            Ok(compared(&truth, &identification.parameters))
+            Ok(Judged::new(&truth, &identification, bound_of(&log, &truth)))
         })
         .collect::<Result<_, String>>()?;
-    let lines = |participant: Option<u32>, drives: &[[Compared; COMPARED]]| {
+    let lines = |participant: Option<u32>, drives: &[Judged]| {
         (0..COMPARED)
             .filter(|_| !drives.is_empty())
-            .map(|i| {
-                let of_one: Vec<Compared> = drives.iter().map(|d| d[i]).collect();
-                Repeated::new(participant, &of_one)
-            })
+            .map(|i| Repeated::new(participant, i, drives))
             .collect::<Vec<_>>()
     };
     let each = plan
@@ -95,6 +98,39 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
             .collect(),
         pooled: lines(None, &found),
     })
+}
+
+/// What was made of one drive.
+struct Judged {
+    values: [Compared; COMPARED],
+    bound: [f64; COMPARED],
+    held_at_t_nms: [bool; COMPARED],
+}
+
+impl Judged {
+    fn new(truth: &PublishedDriver, found: &Identification, bound: [f64; COMPARED]) -> Self {
+        let values = compared(truth, &found.parameters);
+        let held = |(name, p, truth): Compared| {
+            let narrow = found.at_t_nms.as_ref().and_then(|at| {
+                let of = at.intervals_95.iter().find(|(n, _)| *n == name);
+                of.map(|(_, interval)| *interval)
+            });
+            let interval = narrow.filter(|_| p.interval_95.is_some()).or(p.interval_95);
+            interval.is_none_or(|[low, high]| low <= truth && truth <= high)
+        };
+        Self {
+            values,
+            bound,
+            held_at_t_nms: values.map(held),
+        }
+    }
+}
+
+/// The information bound of a guided drive: gain_1, gain_2, gain_3, t_p and K_hg, with t_nms known.
+pub(super) fn bound_of(log: &DriveLog, truth: &PublishedDriver) -> [f64; COMPARED] {
+    let least = information(log, &Options::default(), &truth_of(truth));
+    let [gain_1, gain_2, gain_3, k_hg, t_p, _] = least.standard_errors(true);
+    [gain_1, gain_2, gain_3, t_p, k_hg]
 }
 
 /// A parameter's key, what was found, and the truth.
@@ -113,7 +149,10 @@ pub(super) fn compared(truth: &PublishedDriver, found: &Parameters) -> [Compared
 
 impl Repeated {
     /// Of at least one drive.
-    fn new(participant: Option<u32>, drives: &[Compared]) -> Self {
+    fn new(participant: Option<u32>, i: usize, judged: &[Judged]) -> Self {
+        let drives: Vec<Compared> = judged.iter().map(|j| j.values[i]).collect();
+        let bound = judged.iter().map(|j| j.bound[i].powi(2)).sum::<f64>() / judged.len() as f64;
+        let at_t_nms = judged.iter().filter(|j| j.held_at_t_nms[i]).count();
         let errors: Vec<f64> = drives
             .iter()
             .filter_map(|(_, found, truth)| Some(found.estimate? - truth))
@@ -139,6 +178,8 @@ impl Repeated {
             rms: mean(&squares).map(f64::sqrt),
             largest: errors.iter().map(|e| e.abs()).reduce(f64::max),
             standard_error: mean(&standard_errors),
+            bound: bound.sqrt(),
+            coverage_at_t_nms: share(at_t_nms),
         }
     }
 }

@@ -5,14 +5,14 @@
 //! 10 % (15 ms of t_p, 0.05 of K_hg) from the truth. A value that is taken back is no lie; so the clean drives
 //! beside it show what was given up.
 
-use haptic_analysis::identify::{DriveLog, Identification, Options, identify_with_noise_model};
+use haptic_analysis::identify::{DriveLog, Identification, Options, Traces, identify_with_noise_model};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::repetitions::{COMPARED, Compared, compared};
+use super::repetitions::{COMPARED, Compared, bound_of, compared};
 use super::{Plan, PublishedDriver, chosen, driven_by};
 
 /// One way to spoil a log.
@@ -152,6 +152,8 @@ pub struct Spoiled {
     pub identified: usize,
     /// Lies in all.
     pub lies: usize,
+    /// Least RMS errors of an unbiased estimator from the clean logs, in the order of the lines' own.
+    pub bound: [f64; COMPARED],
     /// What was promised and is not kept.
     pub broken: Vec<String>,
 }
@@ -162,46 +164,77 @@ pub struct Spoiled {
 /// # Errors
 /// As [`super::experiment`].
 pub fn spoiled(plan: &Plan, seeds: u32, only: &str, done: impl Fn() + Sync) -> Result<Spoiled, String> {
-    let drivers = chosen(&plan.participants)?;
-    let mut lines = Vec::new();
-    for (name, ways) in POPULATION.iter().filter(|(name, _)| name.contains(only)) {
-        let jobs: Vec<(u32, PublishedDriver, u64)> = drivers
-            .iter()
-            .flat_map(|p| (0..u64::from(seeds)).map(move |s| (p.number, p.guided, s)))
-            .collect();
-        let found = jobs
-            .into_par_iter()
-            .map(|(number, truth, seed)| {
-                let plan = Plan {
-                    seed: plan.seed.wrapping_add(seed),
-                    ..plan.clone()
-                };
+    let ways: Vec<(&'static str, &[Spoiling])> = POPULATION
+        .iter()
+        .filter(|(name, _)| name.contains(only))
+        .copied()
+        .collect();
+    let jobs: Vec<(u32, PublishedDriver, u64)> = chosen(&plan.participants)?
+        .iter()
+        .flat_map(|p| (0..u64::from(seeds)).map(move |s| (p.number, p.guided, s)))
+        .collect();
+    // What is driven differs by the driver's muscle alone: each muscle drives once, and its log is spoiled in all ways.
+    let found = jobs
+        .into_par_iter()
+        .map(|(number, truth, seed)| {
+            let plan = Plan {
+                seed: plan.seed.wrapping_add(seed),
+                ..plan.clone()
+            };
+            let mut clean: Vec<(f64, DriveLog)> = Vec::new();
+            let mut fits = Vec::with_capacity(ways.len());
+            for (_, ways) in &ways {
                 let mut driver = truth.parameters();
                 for way in *ways {
                     if let Spoiling::OtherMuscle(t_nms) = way {
                         driver.t_nms = *t_nms;
                     }
                 }
-                let drive = driven_by(&plan, number, &truth, driver)?;
-                let mut random = Xoshiro256PlusPlus::seed_from_u64(
-                    plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)),
-                );
-                let mut log = drive.log;
-                for way in *ways {
-                    spoil(&mut log, *way, &mut random);
+                if !clean.iter().any(|c| c.0 == driver.t_nms) {
+                    clean.push((driver.t_nms, driven_by(&plan, number, &truth, driver)?.log));
                 }
+                let Some((_, log)) = clean.iter().find(|c| c.0 == driver.t_nms) else {
+                    unreachable!("it was driven")
+                };
+                let log = spoiled_log(log, ways, &plan, number);
                 let options = Options {
                     manual: ways.contains(&Spoiling::CalledManual),
                     ..Options::default()
                 };
-                let identification = identify_with_noise_model(&log, &options);
+                let mut fit = identify_with_noise_model(&log, &options);
+                fit.traces = Traces::default();
+                fits.push((compared(&truth, &fit.parameters), fit));
                 done();
-                Ok((compared(&truth, &identification.parameters), identification))
-            })
-            .collect::<Result<Vec<_>, String>>()?;
-        lines.push(SpoiledLine::new(name, &found));
+            }
+            let bound = clean.first().map(|(_, log)| bound_of(log, &truth));
+            Ok((fits, bound.unwrap_or_default()))
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    let count = found.len().max(1) as f64;
+    let bound = std::array::from_fn(|i| (found.iter().map(|f| f.1[i].powi(2)).sum::<f64>() / count).sqrt());
+    let mut fits: Vec<Vec<_>> = ways.iter().map(|_| Vec::new()).collect();
+    for (each, _) in found {
+        for (line, fit) in fits.iter_mut().zip(each) {
+            line.push(fit);
+        }
     }
-    Ok(Spoiled::new(seeds, lines))
+    let lines = ways
+        .iter()
+        .zip(&fits)
+        .map(|((name, _), found)| SpoiledLine::new(name, found))
+        .collect();
+    Ok(Spoiled::new(seeds, lines, bound))
+}
+
+/// `log` as these ways leave it; the same for the same plan and participant.
+pub(super) fn spoiled_log(log: &DriveLog, ways: &[Spoiling], plan: &Plan, number: u32) -> DriveLog {
+    let mut random =
+        Xoshiro256PlusPlus::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)));
+    let mut log = log.clone();
+    for way in ways {
+        spoil(&mut log, *way, &mut random);
+    }
+    log
 }
 
 /// How far from the truth a value may be without being wrong.
@@ -274,7 +307,7 @@ fn in_words(cause: &str) -> String {
 }
 
 impl Spoiled {
-    fn new(seeds: u32, lines: Vec<SpoiledLine>) -> Self {
+    fn new(seeds: u32, lines: Vec<SpoiledLine>, bound: [f64; COMPARED]) -> Self {
         let identified: usize = lines.iter().map(|l| l.identified).sum();
         let lies: usize = lines.iter().map(|l| l.lies).sum();
         let mut broken = Vec::new();
@@ -305,6 +338,7 @@ impl Spoiled {
             lines,
             identified,
             lies,
+            bound,
             broken,
         }
     }

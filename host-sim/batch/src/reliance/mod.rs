@@ -52,6 +52,8 @@ pub struct Plan {
     pub amplitude_nm: f64,
     /// Frequency of the probe, Hz.
     pub frequency_hz: f64,
+    /// The drivers' t_nms, s: the ECU assumes what its parameters say.
+    pub t_nms_s: f64,
 }
 
 /// Estimates at one time of a session against the truth.
@@ -69,6 +71,8 @@ pub struct Accuracy {
     pub deviation: f64,
     /// Share of truths within 1.96 deviations.
     pub coverage: f64,
+    /// Share of truths within one deviation.
+    pub within_one: f64,
 }
 
 /// One participant's line.
@@ -297,6 +301,7 @@ fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenari
         .driver(DriverParameters {
             remnant_sd_nm: REMNANT.0,
             remnant_corner_hz: REMNANT.1,
+            t_nms: plan.t_nms_s,
             ..driver.parameters()
         })
         .guidance(guidance)
@@ -309,15 +314,19 @@ impl Accuracy {
     fn new(after_s: f64, points: &[Point]) -> Option<Self> {
         let count = points.len();
         let mean = |f: &dyn Fn(&Point) -> f64| points.iter().map(f).sum::<f64>() / count as f64;
+        let within = |deviations: f64| {
+            mean(&|([estimate, deviation], truth)| {
+                f64::from(u8::from((estimate - truth).abs() <= deviations * deviation))
+            })
+        };
         (count > 0).then(|| Self {
             after_s,
             count,
             bias: mean(&|([estimate, _], truth)| estimate - truth),
             rms: mean(&|([estimate, _], truth)| (estimate - truth).powi(2)).sqrt(),
             deviation: mean(&|([_, deviation], _)| *deviation),
-            coverage: mean(&|([estimate, deviation], truth)| {
-                f64::from(u8::from((estimate - truth).abs() <= 1.96 * deviation))
-            }),
+            coverage: within(1.96),
+            within_one: within(1.0),
         })
     }
 }

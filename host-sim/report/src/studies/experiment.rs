@@ -8,7 +8,9 @@ use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
-use haptic_batch::experiment::{Drive, Experiment, Finding, Repeated, Repetitions, Spoiled, SpoiledLine};
+use haptic_batch::experiment::{
+    Drive, Experiment, Finding, MethodLine, Repeated, Repetitions, Spoiled, SpoiledLine,
+};
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
@@ -360,6 +362,59 @@ pub fn spoiled_table(result: &Spoiled) -> Table {
     }
 }
 
+/// Shares of the truth that 95 % intervals have to hold.
+const KEPT: std::ops::RangeInclusive<f64> = 0.93..=0.97;
+
+/// The parameters whose intervals, for t_nms as it is in these drives, hold the truth too seldom or too often, in words.
+pub fn off_coverage(result: &Repetitions) -> Vec<String> {
+    let off = result
+        .pooled
+        .iter()
+        .filter(|p| !KEPT.contains(&p.coverage_at_t_nms));
+    off.map(|p| {
+        format!(
+            "{}: the 95 % intervals hold the truth in {:.1} % of the drives, 93 to 97 are wanted",
+            p.parameter,
+            100.0 * p.coverage_at_t_nms
+        )
+    })
+    .collect()
+}
+
+/// What each way to treat camera noise is worth.
+pub fn methods_table(lines: &[MethodLine]) -> Table {
+    let row = |l: &MethodLine| {
+        let mut cells = vec![
+            Cell::Text(l.noise.into()),
+            Cell::Text(l.method.into()),
+            Cell::number(l.drives as f64, 0),
+        ];
+        cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
+        cells.push(Cell::Number {
+            value: l.coverage,
+            decimals: 3,
+        });
+        cells
+    };
+    let bound = lines.first().map(|l| {
+        let mut cells = vec![
+            Cell::Text("none".into()),
+            Cell::Text("information bound".into()),
+            Cell::Text("-".into()),
+        ];
+        cells.extend(l.bound.iter().map(|&x| Cell::number(x, 4)));
+        cells.push(Cell::Text("-".into()));
+        cells
+    });
+    Table {
+        caption: "RMS errors by noise on the lane signals and way to treat it, and the share of 95 % intervals that hold.".into(),
+        columns: ["Noise", "Method", "Drives", "RMS gain_1", "gain_2", "gain_3", "t_p", "K_hg", "Coverage"]
+            .map(String::from)
+            .to_vec(),
+        rows: lines.iter().map(row).chain(bound).collect(),
+    }
+}
+
 /// Estimates of repeated drives against the truth.
 pub fn repetitions_table(result: &Repetitions) -> Table {
     let row = |line: &Repeated| {
@@ -370,10 +425,12 @@ pub fn repetitions_table(result: &Repetitions) -> Table {
             Cell::number(line.drives as f64, 0),
             number(Some(line.identified), 3),
             number(Some(line.coverage), 3),
+            number(Some(line.coverage_at_t_nms), 3),
             number(line.bias, 4),
             number(line.rms, 4),
             number(line.largest, 4),
             number(line.standard_error, 4),
+            number(Some(line.bound), 4),
         ]
     };
     Table {
@@ -384,10 +441,12 @@ pub fn repetitions_table(result: &Repetitions) -> Table {
             "Drives",
             "Identified",
             "Coverage of 95 %",
+            "same, t_nms known",
             "Bias",
             "RMS error",
             "Largest error",
             "Mean standard error",
+            "Information bound",
         ]
         .map(String::from)
         .to_vec(),

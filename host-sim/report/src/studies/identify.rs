@@ -6,8 +6,8 @@ use std::path::Path;
 use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_analysis::identify::{History, Identification, autocorrelation};
+use crate::plot::{Axis, Band, Figure, Mark, Panel, Series};
+use haptic_analysis::identify::{History, Identification, Reason, autocorrelation};
 use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
 
 /// Lags of the autocorrelation drawn.
@@ -27,6 +27,7 @@ pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputErro
         ("autocorrelation", correlogram(&drive.results.identification)),
         ("over_time", over_time(drive)),
         ("delay_profile", delay_profile(&drive.results.identification)),
+        ("intervals", intervals(&drive.results.identification)),
     ];
     for (name, figure) in &figures {
         write_figure(directory, name, figure)?;
@@ -69,16 +70,71 @@ fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Series> {
 /// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %.
 fn delay_profile(found: &Identification) -> Figure {
     let profile = &found.delay_profile;
-    let (x, y): (Vec<f64>, Vec<f64>) = profile.iter().map(|&[t_p, d]| (t_p, d.min(HIGHEST))).unzip();
+    let (x, y): (Vec<f64>, Vec<f64>) = profile
+        .iter()
+        .map(|&[t_p, d]| (t_p, if d > HIGHEST { f64::NAN } else { d }))
+        .unzip();
     let ends = [
         x.first().copied().unwrap_or(0.0),
         x.last().copied().unwrap_or(1.0),
     ];
-    let series = vec![line("profile", 0, &x, &y), line("95 %", 1, &ends, &[3.84, 3.84])];
-    over(
-        "t_p (s)",
-        vec![panel("", "-2 log likelihood above the optimum", series)],
-    )
+    let mut series = Vec::new();
+    if let Some([low, high]) = found.parameters.t_p.interval_95 {
+        series.push(Series::interval(
+            "95 % interval",
+            5,
+            &[low, high],
+            &[[0.0, HIGHEST]; 2],
+        ));
+    }
+    series.push(line("profile", 0, &x, &y));
+    series.push(line("95 %", 1, &ends, &[3.84, 3.84]));
+    let mut panel = panel("", "-2 log L above optimum", series);
+    panel.y.limits = Some((0.0, HIGHEST));
+    over("t_p (s)", vec![panel])
+}
+
+/// Every parameter with its interval and, inside it, the narrower one for t_nms as assumed.
+fn intervals(found: &Identification) -> Figure {
+    let list: Vec<_> = found
+        .parameters
+        .list()
+        .into_iter()
+        .filter(|(_, _, p)| !p.fixed && p.interval_95.is_some())
+        .collect();
+    let panels = list.into_iter().map(|(name, unit, p)| {
+        let mut series = Vec::new();
+        if let Some(wide) = p.interval_95 {
+            series.push(Series::interval("95 % interval", 5, &[0.6, 1.4], &[wide; 2]));
+        }
+        let narrow = found
+            .at_t_nms
+            .as_ref()
+            .and_then(|at| at.intervals_95.iter().find(|i| i.0 == name));
+        let at = p.optimum.unwrap_or(f64::NAN);
+        match narrow {
+            Some((_, ends)) => {
+                let mark = Mark::Whiskers(vec![*ends]);
+                series.push(Series::with_mark(
+                    "if t_nms is as assumed",
+                    1,
+                    mark,
+                    vec![(1.0, at)],
+                ));
+            }
+            None => series.push(Series::dots("optimum", 1, vec![(1.0, at)])),
+        }
+        Panel {
+            title: name.to_owned(),
+            y: Axis::of(&format!("({unit})")),
+            series,
+        }
+    });
+    Figure {
+        rows: vec![String::new()],
+        panels: panels.collect(),
+        ..Figure::default()
+    }
 }
 
 fn over(x: &str, panels: Vec<Panel>) -> Figure {
@@ -93,12 +149,17 @@ fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
     let mut series = pieces("measured", 0, &t.time_s, &t.measured_nm);
     series.extend(pieces("simulated", 3, &t.time_s, &t.simulated_nm));
-    // What was left out, on the zero line, with its reason.
-    for l in found.preflight.iter().flat_map(|p| &p.left_out) {
-        let label = format!("left out: {}", l.reason);
-        series.push(line(&label, 1, &[l.from_s, l.to_s], &[0.0, 0.0]));
-    }
-    over("Time (s)", vec![panel("", "Driver torque (N.m)", series)])
+    let mut figure = over("Time (s)", vec![panel("", "Driver torque (N.m)", series)]);
+    let left_out = found.preflight.iter().flat_map(|p| &p.left_out);
+    figure.bands = left_out
+        .map(|l| Band {
+            label: format!("left out: {}", l.reason),
+            from: l.from_s,
+            to: l.to_s,
+            dark: l.reason != Reason::Asked,
+        })
+        .collect();
+    figure
 }
 
 fn residuals(found: &Identification) -> Figure {
@@ -150,15 +211,27 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     )
 }
 
-fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
+fn report(drive: &IdentifiedDrive, figures: [Figure; 6]) -> Report {
     let found = &drive.results.identification;
-    let [torque, residuals, correlogram, over_time, delay_profile] = figures;
+    let [
+        torque,
+        residuals,
+        correlogram,
+        over_time,
+        delay_profile,
+        intervals,
+    ] = figures;
     let figure = |figure, caption: &str| Block::Figure {
         figure,
         caption: caption.into(),
     };
     let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
+    verdict.extend(verdicts(found).into_iter().map(Block::Text));
     verdict.push(Block::Table(parameters(found)));
+    verdict.push(figure(
+        intervals,
+        "The 95 % intervals as bands; the whiskers are what they would be if t_nms were known.",
+    ));
     verdict.push(figure(
         delay_profile,
         "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
@@ -191,7 +264,7 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 5]) -> Report {
             blocks: vec![
                 figure(
                     torque,
-                    "Driver torque, measured and simulated from the inputs alone.",
+                    "Driver torque, measured and simulated from the inputs alone. Shaded: what was left out, and why.",
                 ),
                 Block::Table(Table::of_pairs(["", ""], facts(found))),
             ],
@@ -253,6 +326,49 @@ pub fn refutations(found: &Identification) -> Vec<String> {
     found.refuted.iter().map(sentence).collect()
 }
 
+/// What is known of each parameter that a torque can tell, in words.
+pub fn verdicts(found: &Identification) -> Vec<String> {
+    let meaning = |name: &str| match name {
+        "gain_1" => "torque per lateral error",
+        "gain_2" => "torque per integral of the lateral error",
+        "gain_3" => "torque per yaw error",
+        "t_p" => "the driver's delay",
+        _ => "how much the driver resists the guidance (0 gives way, 1 resists)",
+    };
+    let told = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
+    let list = found
+        .parameters
+        .list()
+        .into_iter()
+        .filter(|l| told.contains(&l.0));
+    list.filter_map(|(name, unit, p)| {
+        let unit = if unit == "-" {
+            String::new()
+        } else {
+            format!(" {unit}")
+        };
+        let what = meaning(name);
+        if p.fixed {
+            return Some(format!("{name}, {what}, was given: {:.4}{unit}.", p.estimate?));
+        }
+        let within = p
+            .interval_95
+            .map(|[low, high]| format!("between {low:.4} and {high:.4}{unit} (95 %)"));
+        Some(match (p.estimate, within) {
+            (Some(x), Some(within)) => format!("{name}, {what}, is {x:.4}{unit}: {within}."),
+            (_, Some(within)) => {
+                format!("{name}, {what}, is not identified: {within}, which is too wide to name a value.")
+            }
+            (_, None) if p.optimum.is_none() => return None,
+            (_, None) if !found.refuted.is_empty() => {
+                format!("{name}, {what}, is not known: the model is refuted.")
+            }
+            _ => format!("{name}, {what}, is not known: the record does not bound it."),
+        })
+    })
+    .collect()
+}
+
 /// How the identified driver drives a course, if asked.
 pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
     let again = drive.results.drives_again.as_ref()?;
@@ -281,6 +397,10 @@ fn number(value: Option<f64>) -> Cell {
 
 /// Every parameter with its interval and verdict.
 pub fn parameters(found: &Identification) -> Table {
+    let narrow = |name: &str| {
+        let at = found.at_t_nms.as_ref().filter(|_| found.refuted.is_empty())?;
+        at.intervals_95.iter().find(|i| i.0 == name).map(|i| i.1)
+    };
     let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
     let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
     let rows = found
@@ -304,6 +424,8 @@ pub fn parameters(found: &Identification) -> Table {
                 number(p.standard_error),
                 number(low),
                 number(high),
+                number(narrow(name).map(|i| i[0])),
+                number(narrow(name).map(|i| i[1])),
                 Cell::Text(verdict.into()),
             ]
         });
@@ -315,6 +437,8 @@ pub fn parameters(found: &Identification) -> Table {
             "Estimate",
             "Standard error",
             "95 % from",
+            "to",
+            "t_nms known: from",
             "to",
             "Verdict",
         ]

@@ -8,18 +8,26 @@
 use nalgebra::SMatrix;
 
 /// What of a vehicle decides how it turns under a wheel angle: equations (1) and (2). Stiffnesses are per tyre.
-pub(super) struct SingleTrack {
-    m: f64,
-    i: f64,
-    l_f: f64,
-    l_r: f64,
-    k_f: f64,
-    k_r: f64,
-    k_t: f64,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SingleTrack {
+    /// Mass, kg.
+    pub m: f64,
+    /// Yaw inertia, kg.m^2.
+    pub i: f64,
+    /// Front axle to centre of gravity, m.
+    pub l_f: f64,
+    /// Rear axle to centre of gravity, m.
+    pub l_r: f64,
+    /// Cornering stiffness of a front tyre, N/rad.
+    pub k_f: f64,
+    /// Cornering stiffness of a rear tyre, N/rad.
+    pub k_r: f64,
+    /// Front wheel angle per steering wheel angle.
+    pub k_t: f64,
 }
 
 /// Table 9.
-const TABLE_9: SingleTrack = SingleTrack {
+pub(super) const TABLE_9: SingleTrack = SingleTrack {
     m: 1100.0,
     i: 2940.0,
     l_f: 1.0,
@@ -37,10 +45,11 @@ pub(super) const AHEAD_S: f64 = 0.3;
 pub(super) fn driver_yaw_error(
     yaw_error_rad: &[f64],
     wheel_angle_rad: &[f64],
+    vehicle: &SingleTrack,
     speed_m_per_s: f64,
     dt_s: f64,
 ) -> Vec<f64> {
-    let direction = direction(wheel_angle_rad, speed_m_per_s, dt_s);
+    let direction = direction(wheel_angle_rad, vehicle, speed_m_per_s, dt_s);
     let road: Vec<f64> = yaw_error_rad.iter().zip(&direction).map(|(e, d)| e + d).collect();
     let (whole, share) = ((AHEAD_S / dt_s).floor(), (AHEAD_S / dt_s).fract());
     let whole = whole as usize;
@@ -52,9 +61,9 @@ pub(super) fn driver_yaw_error(
         .collect()
 }
 
-/// chi over time, rad, from zero, of the vehicle of table 9 at rest in yaw at first; the wheel angle is straight
-/// between samples.
-fn direction(wheel_angle_rad: &[f64], speed_m_per_s: f64, dt_s: f64) -> Vec<f64> {
+/// chi over time, rad, from zero, of a vehicle at rest in yaw at first; the wheel angle is straight between samples, and
+/// stays where it is missing.
+fn direction(wheel_angle_rad: &[f64], vehicle: &SingleTrack, speed_m_per_s: f64, dt_s: f64) -> Vec<f64> {
     let SingleTrack {
         m,
         i,
@@ -63,7 +72,7 @@ fn direction(wheel_angle_rad: &[f64], speed_m_per_s: f64, dt_s: f64) -> Vec<f64>
         k_f,
         k_r,
         k_t,
-    } = TABLE_9;
+    } = *vehicle;
     let v = speed_m_per_s;
     let moment = l_f * k_f - l_r * k_r;
     // States beta, r, psi; inputs the wheel angle and its slope, held over a step.
@@ -79,9 +88,16 @@ fn direction(wheel_angle_rad: &[f64], speed_m_per_s: f64, dt_s: f64) -> Vec<f64>
     let step = (a * dt_s).exp();
     let mut x = nalgebra::SVector::<f64, 5>::zeros();
     let mut out = vec![0.0];
-    for pair in wheel_angle_rad.windows(2) {
-        x[3] = pair[0];
-        x[4] = (pair[1] - pair[0]) / dt_s;
+    let mut angle = wheel_angle_rad
+        .iter()
+        .copied()
+        .find(|a| a.is_finite())
+        .unwrap_or(0.0);
+    for &next in wheel_angle_rad.get(1..).unwrap_or_default() {
+        let next = if next.is_finite() { next } else { angle };
+        x[3] = angle;
+        x[4] = (next - angle) / dt_s;
+        angle = next;
         x = step * x;
         out.push(x[2] + x[0]);
     }
@@ -100,11 +116,11 @@ mod tests {
         let (v, dt) = (60.0 / 3.6, 1.0 / 120.0);
         let wheel = vec![0.17; 2400];
         let rate = 4.25386 * 0.17 / 17.0;
-        let chi = direction(&wheel, v, dt);
+        let chi = direction(&wheel, &TABLE_9, v, dt);
         let turned = chi[2399] - chi[2279];
         assert!((turned - rate).abs() < 1e-5, "{turned} {rate}");
         let guidance = vec![0.7 * rate; 2400];
-        let driver = driver_yaw_error(&guidance, &wheel, v, dt);
+        let driver = driver_yaw_error(&guidance, &wheel, &TABLE_9, v, dt);
         assert_eq!(driver.len(), 2400 - 36 - 1);
         assert!((driver[2000] - 1.0 * rate).abs() < 1e-5);
     }

@@ -6,20 +6,25 @@
 //! driver's far point is not on the bus; [`far_point`] computes it, and a note says so.
 //!
 //! The signals are put on an even grid at the pace of the camera: T_h as held at each instant, the others on the line
-//! between their neighbours. A signal that pauses, a preview that is not valid and a speed that changes are refused
-//! with their line. What is not here: counters and CRCs, which were the business of those who received the frames.
+//! between their neighbours. Frames with a wrong CRC are not used and those that are lost are counted ([`protection`]);
+//! where a signal pauses or the preview is not valid, it is missing, and the preflight bridges or cuts the drive there. A
+//! speed that changes is refused with its line.
 
 mod far_point;
+mod protection;
 
 use std::path::Path;
 
-use can_dbc::{ByteOrder, Dbc, MessageId, Signal, ValueType};
+use can_dbc::Dbc;
 
 use super::log::{DriveLog, LogError};
+pub use far_point::SingleTrack;
 use haptic_log::candump::{self, CandumpFrame};
+use haptic_log::formats::dbc::{identifier, raw};
+use protection::{Audit, audited};
 
-/// The product's own bus.
-const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
+/// The product's own bus: core/haptic.dbc.
+pub const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
 
 /// Rows a second: the camera's.
 const RATE_HZ: f64 = 120.0;
@@ -30,10 +35,25 @@ const SPEED_TOLERANCE: f64 = 0.03;
 /// Slowest mean speed, m/s, at which the guidance works.
 const SLOWEST_M_PER_S: f64 = 5.0;
 
-/// Said of every log that comes from a trace.
+/// Said of every log that comes from a trace, of the vehicle of table 9 and of another.
 const NOTE: &str = "From a bus trace: e_theta at the driver's far point (1.0 s) is computed from the guidance's far point \
                     (0.7 s), 0.3 s later, and the turn that the vehicle of table 9 makes until then with the recorded wheel angle. The \
                     estimates are as good as that vehicle's parameters.";
+
+const NOTE_OF_OTHER: &str = "From a bus trace: e_theta at the driver's far point (1.0 s) is computed from the guidance's \
+                             far point (0.7 s), 0.3 s later, and the turn that the vehicle given makes until then with the recorded \
+                             wheel angle. The estimates are as good as that vehicle's parameters.";
+
+/// How a recording is to be understood.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Recording<'a> {
+    /// What a trace's frames mean, if not the product's own file.
+    pub dbc: Option<&'a Path>,
+    /// The vehicle, if not that of table 9.
+    pub vehicle: Option<SingleTrack>,
+    /// Without guidance.
+    pub manual: bool,
+}
 
 /// Reads the log at `path`, a CSV file or a trace of `candump`; `dbc` says what the trace's frames mean, if it is not
 /// the product's own file. The sentence, if any, says what was computed.
@@ -45,6 +65,18 @@ pub fn open_recording(
     dbc: Option<&Path>,
     manual: bool,
 ) -> Result<(DriveLog, Option<&'static str>), LogError> {
+    let vehicle = None;
+    open_recording_with(path, &Recording { dbc, vehicle, manual })
+}
+
+/// The same of a vehicle that is not that of table 9.
+///
+/// # Errors
+/// As [`open_recording`].
+pub fn open_recording_with(
+    path: &Path,
+    recording: &Recording<'_>,
+) -> Result<(DriveLog, Option<&'static str>), LogError> {
     let named = |e: String| LogError::new(format!("{}: {e}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| named(e.to_string()))?;
     let text = std::str::from_utf8(&bytes)
@@ -52,18 +84,37 @@ pub fn open_recording(
         .filter(|t| candump::looks_like_one(t));
     let Some(text) = text else {
         return Ok((
-            DriveLog::read(&bytes[..], manual).map_err(|e| named(e.to_string()))?,
+            DriveLog::read(&bytes[..], recording.manual).map_err(|e| named(e.to_string()))?,
             None,
         ));
     };
-    let dbc = match dbc {
-        None => HAPTIC_DBC.to_owned(),
-        Some(dbc) => {
-            std::fs::read_to_string(dbc).map_err(|e| LogError::new(format!("{}: {e}", dbc.display())))?
-        }
+    let records = candump::parse(text).map_err(named)?;
+    let (log, note) = of_frames(&records, recording).map_err(named)?;
+    Ok((log, Some(note)))
+}
+
+/// A log of frames that were read already, and the sentence about it.
+pub(super) fn of_frames(
+    records: &[CandumpFrame],
+    recording: &Recording<'_>,
+) -> Result<(DriveLog, &'static str), String> {
+    let dbc = dbc_text(recording.dbc).map_err(|e| e.to_string())?;
+    let vehicle = recording.vehicle.unwrap_or(far_point::TABLE_9);
+    let log = read_trace(records, &dbc, &vehicle, recording.manual)?;
+    let note = if recording.vehicle.is_some() {
+        NOTE_OF_OTHER
+    } else {
+        NOTE
     };
-    let log = read_trace(text, &dbc, manual).map_err(named)?;
-    Ok((log, Some(NOTE)))
+    Ok((log, note))
+}
+
+/// The DBC file's text, or that of the product's own.
+pub(super) fn dbc_text(dbc: Option<&Path>) -> Result<String, LogError> {
+    let Some(dbc) = dbc else {
+        return Ok(HAPTIC_DBC.to_owned());
+    };
+    std::fs::read_to_string(dbc).map_err(|e| LogError::new(format!("{}: {e}", dbc.display())))
 }
 
 /// A signal over time.
@@ -74,34 +125,47 @@ struct Course {
     value: Vec<f64>,
 }
 
-fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
+fn read_trace(
+    records: &[CandumpFrame],
+    dbc: &str,
+    vehicle: &SingleTrack,
+    manual: bool,
+) -> Result<DriveLog, String> {
     let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
-    let records = candump::parse(text)?;
-    let course = |name| Course::of(name, &dbc, &records);
+    let mut audits: Vec<Audit> = Vec::new();
+    let mut course = |name| Course::of(name, &dbc, records, &mut audits);
 
-    let e_y = course("LanePreview_LateralError")?;
-    let e_theta = course("LanePreview_YawError")?;
+    let mut e_y = course("LanePreview_LateralError")?;
+    let mut e_theta = course("LanePreview_YawError")?;
     let valid = course("LanePreview_Valid")?;
     let age = course("LanePreview_Age")?;
-    if let Some(k) = valid.value.iter().position(|&v| v == 0.0) {
-        return Err(format!("line {}: the lane preview is not valid", valid.line[k]));
-    }
-    let [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age));
     let [torque, angle] = [course("Column_DriverTorque")?, course("Column_WheelAngle")?];
     let guidance = if manual {
         None
     } else {
         Some(course("Guidance_Torque")?)
     };
-    let speed = course("Vehicle_Speed1")?;
-    let speed_m_per_s = speed.steady()?;
+    let speed_m_per_s = course("Vehicle_Speed1")?.steady()?;
+    let mut findings: Vec<[String; 3]> = audits.iter().filter_map(Audit::finding).collect();
+    let not_valid = valid.value.iter().filter(|&&v| v == 0.0).count();
+    if not_valid > 0 {
+        findings.push([
+            "LanePreview".to_owned(),
+            format!("{not_valid} frames that say that they are not valid"),
+            "not used".to_owned(),
+        ]);
+    }
+    [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age).only(&valid));
 
     let needed: Vec<&Course> = [&e_y, &e_theta, &torque, &angle]
         .into_iter()
         .chain(guidance.as_ref())
         .collect();
     for c in &needed {
-        c.check_pauses()?;
+        if c.time_s.len() < 2 {
+            return Err(format!("no frame of {} can be used", c.name));
+        }
+        findings.extend(c.pauses());
     }
     let start_s = needed
         .iter()
@@ -113,7 +177,8 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
     let at = |k: usize| start_s + k as f64 * dt_s;
     let on_grid = |c: &Course| -> Vec<f64> { sampled(c, (0..rows).map(at), Hold::Line) };
     let wheel_angle_rad = on_grid(&angle);
-    let e_theta_rad = far_point::driver_yaw_error(&on_grid(&e_theta), &wheel_angle_rad, speed_m_per_s, dt_s);
+    let e_theta_rad =
+        far_point::driver_yaw_error(&on_grid(&e_theta), &wheel_angle_rad, vehicle, speed_m_per_s, dt_s);
     let rows = e_theta_rad.len();
     let cut = |mut values: Vec<f64>| {
         values.truncate(rows);
@@ -121,7 +186,7 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
     };
     // The ECU's milliseconds are counted from one of its frames.
     let first_decided_s = guidance.as_ref().map_or(start_s, |g| g.time_s[0]);
-    DriveLog::from_signals(
+    let mut log = DriveLog::from_signals(
         start_s - first_decided_s,
         dt_s,
         [
@@ -135,12 +200,19 @@ fn read_trace(text: &str, dbc: &str, manual: bool) -> Result<DriveLog, String> {
             cut(on_grid(&torque)),
         ],
     )
-    .map_err(|e| e.to_string())
+    .map_err(|e| e.to_string())?;
+    log.findings = findings;
+    Ok(log)
 }
 
 impl Course {
     /// The signal in SI units, from all frames that carry it.
-    fn of(name: &'static str, dbc: &Dbc, records: &[CandumpFrame]) -> Result<Self, String> {
+    fn of(
+        name: &'static str,
+        dbc: &Dbc,
+        records: &[CandumpFrame],
+        audits: &mut Vec<Audit>,
+    ) -> Result<Self, String> {
         let found = dbc
             .messages
             .iter()
@@ -148,27 +220,25 @@ impl Course {
         let Some((message, signal)) = found else {
             return Err(format!("the DBC file has no signal {name}"));
         };
-        if signal.byte_order != ByteOrder::LittleEndian {
-            return Err(format!(
-                "signal {name} of the DBC file is big-endian, which is not read"
-            ));
-        }
         let unit = match signal.unit.as_str() {
             "deg" => std::f64::consts::PI / 180.0,
             "ms" => 1e-3,
             _ => 1.0,
         };
-        let id = match message.id {
-            MessageId::Standard(id) => u32::from(id),
-            MessageId::Extended(id) => id,
-        };
+        let (id, _) = identifier(message.id);
         let mut course = Self {
             name,
             line: Vec::new(),
             time_s: Vec::new(),
             value: Vec::new(),
         };
-        for record in records.iter().filter(|r| r.id == id) {
+        let of_id = records.iter().filter(|r| r.id == id);
+        let (good, audit) = audited(dbc, message.id, &message.name, of_id);
+        let seen = audit.frames;
+        if audits.iter().all(|a| a.name != audit.name) {
+            audits.push(audit);
+        }
+        for record in good {
             let raw = raw(signal, &record.data).ok_or_else(|| {
                 format!(
                     "line {}: frame {id:03X} has {} bytes, too few for {name}",
@@ -186,7 +256,13 @@ impl Course {
                 .push((raw as f64 * signal.factor + signal.offset) * unit);
         }
         if course.value.len() < 2 {
-            return Err(format!("no frame {id:03X} ({}), so no {name}", message.name));
+            return Err(match seen {
+                0 | 1 => format!("no frame {id:03X} ({}), so no {name}", message.name),
+                _ => format!(
+                    "none of {seen} frames {id:03X} ({}) has a right CRC, so no {name}",
+                    message.name
+                ),
+            });
         }
         Ok(course)
     }
@@ -203,19 +279,40 @@ impl Course {
         self
     }
 
-    fn check_pauses(&self) -> Result<(), String> {
-        let pause = self
-            .time_s
-            .windows(2)
-            .position(|w| !(0.0..=LONGEST_PAUSE_S).contains(&(w[1] - w[0])));
-        pause.map_or(Ok(()), |k| {
-            Err(format!(
-                "line {}: {} comes {:.3} s after the one before; at most {LONGEST_PAUSE_S} s is wanted",
-                self.line[k + 1],
-                self.name,
-                self.time_s[k + 1] - self.time_s[k]
-            ))
-        })
+    /// Without the samples that are not `valid`, and in the order of their time.
+    fn only(self, valid: &Self) -> Self {
+        let mut out = Self {
+            name: self.name,
+            line: Vec::new(),
+            time_s: Vec::new(),
+            value: Vec::new(),
+        };
+        for (k, &valid) in valid.value.iter().enumerate().take(self.value.len()) {
+            let later = out.time_s.last().is_none_or(|&last| self.time_s[k] > last);
+            if valid != 0.0 && later {
+                out.line.push(self.line[k]);
+                out.time_s.push(self.time_s[k]);
+                out.value.push(self.value[k]);
+            }
+        }
+        out
+    }
+
+    /// How often the signal pauses, in words.
+    fn pauses(&self) -> Option<[String; 3]> {
+        let steps = self.time_s.windows(2).map(|w| w[1] - w[0]);
+        let long: Vec<(usize, f64)> = steps.enumerate().filter(|s| s.1 > LONGEST_PAUSE_S).collect();
+        let &(k, _) = long.first()?;
+        let longest = long.iter().map(|s| s.1).fold(0.0, f64::max);
+        Some([
+            self.name.to_owned(),
+            format!(
+                "{} pauses, the longest of {longest:.3} s, the first before line {}",
+                long.len(),
+                self.line[k + 1]
+            ),
+            "bridged if short, else cut".to_owned(),
+        ])
     }
 
     /// The mean of a speed that does not change.
@@ -259,6 +356,9 @@ fn sampled(course: &Course, at_s: impl Iterator<Item = f64>, hold: Hold) -> Vec<
             k += 1;
         }
         let next = (k + 1).min(time.len() - 1);
+        if time[next] - time[k] > LONGEST_PAUSE_S && t > time[k] + 1e-6 {
+            return f64::NAN;
+        }
         match hold {
             Hold::Line if time[next] > time[k] => {
                 value[k] + (t - time[k]) / (time[next] - time[k]) * (value[next] - value[k])
@@ -267,24 +367,4 @@ fn sampled(course: &Course, at_s: impl Iterator<Item = f64>, hold: Hold) -> Vec<
         }
     })
     .collect()
-}
-
-/// The bits of a little-endian signal, with its sign; none if the frame is too short.
-fn raw(signal: &Signal, data: &[u8]) -> Option<i64> {
-    let (start, size) = (
-        u32::try_from(signal.start_bit).ok()?,
-        u32::try_from(signal.size).ok()?,
-    );
-    let end = start.checked_add(size)?;
-    if !(1..=64).contains(&size) || end as usize > 8 * data.len() || end > 64 {
-        return None;
-    }
-    let mut bytes = [0; 8];
-    bytes[..data.len()].copy_from_slice(data);
-    // To the top, and back down with or without the sign.
-    let top = u64::from_le_bytes(bytes) << (64 - end);
-    Some(match signal.value_type {
-        ValueType::Signed => (top as i64) >> (64 - size),
-        ValueType::Unsigned => (top >> (64 - size)) as i64,
-    })
 }

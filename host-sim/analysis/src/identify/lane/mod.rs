@@ -102,13 +102,14 @@ fn noise_of_differences(signal: &[f64], weight: &[f64]) -> f64 {
     *median / 0.674_5 / 20.0_f64.sqrt()
 }
 
-/// Smooths the place (`integrals` 2) or the angle (1) of the lane. `weight` is the precision of each sample relative
+/// Smooths the place (`integrals` 2) or the angle (1) of the lane, with the vehicle's answer in it or without (`by_motion`). `weight` is the precision of each sample relative
 /// to the usual, zero where there is none; `floor` the least noise that rounding makes.
 pub(crate) fn smooth(
     signal: &[f64],
     wheel_angle: &[f64],
     dt: f64,
     integrals: usize,
+    by_motion: bool,
     weight: &[f64],
     floor: f64,
 ) -> Smoothed {
@@ -127,7 +128,11 @@ pub(crate) fn smooth(
             },
         };
     }
-    let answers = answers(wheel_angle, dt, integrals);
+    let answers = if by_motion {
+        answers(wheel_angle, dt, integrals)
+    } else {
+        Vec::new()
+    };
     let mut weight = weight.to_vec();
     let mut outliers = Vec::new();
     let mut ratio = 1.0;

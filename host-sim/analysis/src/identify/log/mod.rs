@@ -1,12 +1,14 @@
 //! A recorded drive, read from a CSV file and checked before anything is estimated from it.
 //!
-//! An estimator turns a wrong unit or a hole in the record into a plausible wrong number, so everything that
-//! can be seen to be wrong is refused here, with the line. What is *not* here: any filtering or repair. A log
-//! with a gap is cut by its owner, who knows what happened there.
+//! An estimator turns a wrong unit into a plausible wrong number, so what can be seen to be another unit, no number or
+//! no time is refused here, with the line. What real recorders do is read: rows that were lost and values that are
+//! empty or NaN stay missing (no number) in the log, uneven stamps are put on an even grid ([`grid`]), and what was
+//! found is kept in [`DriveLog::findings`]. What is *not* here: any filtering or repair; that is the preflight's.
 //!
 //! Columns: `time_s`, `e_y_m` and `e_theta_rad` (at the driver's near and far point), `wheel_angle_rad`,
 //! `guidance_torque_nm` (the torque really applied, probe included), `driver_torque_nm`. Others are ignored.
 
+mod grid;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -16,6 +18,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
+use grid::Grid;
 use haptic_log::table::TableError;
 use haptic_log::table::TableReader;
 
@@ -47,17 +50,10 @@ const LIMITS: [(f64, &str); 6] = [
 /// A wheel angle recorded more coarsely than this (about 1.1 deg) is not in radians.
 const COARSEST_WHEEL_STEP_RAD: f64 = 0.02;
 
-/// Share of a sample period by which a time stamp may miss the even grid: rounding to a millisecond makes it 6 %
-/// at 120 Hz and 12.5 % at 250 Hz.
-const TIME_STAMP_TOLERANCE: f64 = 0.15;
-
-/// Sample periods that the models here are valid for, s: the muscle's lag of 0.1 s needs 20 Hz at least.
-const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.05);
-
 /// Shortest record, s: a few times the slowest thing to be told from the data (the remnant's corner).
 const SHORTEST_S: f64 = 10.0;
 
-/// A drive as recorded: evenly spaced, finite, in SI units.
+/// A drive as recorded: on an even grid, in SI units. What is missing is no number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveLog {
     /// Time of the first row, s.
@@ -74,6 +70,8 @@ pub struct DriveLog {
     pub guidance_torque_nm: Vec<f64>,
     /// Driver torque T_d as measured, N.m.
     pub driver_torque_nm: Vec<f64>,
+    /// What was found when the log was read: what, found, done.
+    pub findings: Vec<[String; 3]>,
 }
 
 /// Why a log was refused. The text names the line (1 is the header) and the column.
@@ -97,6 +95,14 @@ impl From<TableError> for LogError {
 impl LogError {
     pub(crate) fn new(message: String) -> Self {
         Self(message)
+    }
+
+    /// Of a file without lines: counted are the rows.
+    fn in_a_row(self) -> Self {
+        Self(match self.0.strip_prefix("line ") {
+            Some(rest) => format!("row {rest}"),
+            None => self.0,
+        })
     }
 }
 
@@ -129,6 +135,7 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
         ] = signals;
+        let findings = Vec::new();
         let span_s = dt_s * driver_torque_nm.len() as f64;
         if span_s < SHORTEST_S {
             return refuse(too_short(span_s));
@@ -142,6 +149,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
+            findings,
         })
     }
 
@@ -159,8 +167,8 @@ impl DriveLog {
     /// Reads and checks a log from `source`; see [`DriveLog::open`].
     ///
     /// # Errors
-    /// A missing or doubled column, a field that is no finite number, a value beyond its column's range, time
-    /// stamps that run backwards, repeat, leave a gap or are uneven, or a record that is too short.
+    /// A missing or doubled column, a field that is neither a number nor empty, a value beyond its column's range, time
+    /// stamps that run backwards or repeat, or a record that is too short.
     pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
         let mut table = TableReader::new(source)?;
         let index = find_columns(table.header(), table.header_line(), manual)?;
@@ -180,33 +188,91 @@ impl DriveLog {
                 });
             }
         }
+        Self::from_table(&lines, columns, manual)
+    }
+
+    /// A log of columns in memory, in the order of [`COLUMNS`] and of equal lengths; a value that is missing is NaN. Rows
+    /// are named as lines, from 1.
+    ///
+    /// # Errors
+    /// As [`DriveLog::read`]; columns of different lengths.
+    pub fn from_columns(columns: [Vec<f64>; 6], manual: bool) -> Result<Self, LogError> {
+        let rows = columns[0].len();
+        if let Some(c) = (0..6).find(|&c| columns[c].len() != rows) {
+            return refuse(format!(
+                "{} has {} rows where time_s has {rows}",
+                COLUMNS[c],
+                columns[c].len()
+            ));
+        }
+        for (c, column) in columns.iter().enumerate() {
+            for (line, &value) in (1..).zip(column) {
+                within_limits(value, line, c)?;
+            }
+        }
+        let lines: Vec<u64> = (1..=rows as u64).collect();
+        Self::from_table(&lines, columns, manual)
+    }
+
+    /// A log of a table's columns in the order of [`COLUMNS`]; the first is not looked at. Of a `manual` drive the guidance
+    /// may be missing.
+    pub(crate) fn from_rows(
+        time_s: Vec<f64>,
+        columns: [Option<Vec<f64>>; 6],
+        manual: bool,
+    ) -> Result<Self, LogError> {
+        let nothing = || vec![0.0; time_s.len()];
+        let mut columns = columns.map(|column| column.unwrap_or_else(nothing));
+        columns[0] = time_s;
+        Self::from_columns(columns, manual).map_err(LogError::in_a_row)
+    }
+
+    /// Puts columns that are in their limits on an even grid.
+    fn from_table(lines: &[u64], columns: [Vec<f64>; 6], manual: bool) -> Result<Self, LogError> {
+        let [time, signals @ ..] = columns;
+        let grid = Grid::of(&time, lines)?;
+        let mut c = 0;
+        let mut signals = signals.map(|column| {
+            c += 1;
+            grid.put(&time, column, c)
+        });
+        if manual {
+            for x in signals[GUIDANCE_COLUMN - 1].iter_mut().filter(|x| x.is_nan()) {
+                *x = 0.0;
+            }
+        }
+        for (signal, name) in signals.iter().zip(&COLUMNS[1..]) {
+            if signal.iter().all(|x| x.is_nan()) {
+                return refuse(format!("{name} holds no number"));
+            }
+        }
         let [
-            time,
             e_y_m,
             e_theta_rad,
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
-        ] = columns;
-        let (start_s, dt_s) = check_time(&time, &lines)?;
-        check_wheel_resolution(&wheel_angle_rad, &lines)?;
+        ] = signals;
+        check_wheel_resolution(&wheel_angle_rad, lines)?;
         check_sensor(&driver_torque_nm)?;
         Ok(Self {
-            start_s,
-            dt_s,
+            start_s: grid.start_s,
+            dt_s: grid.dt_s,
             e_y_m,
             e_theta_rad,
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
+            findings: grid.finding.into_iter().collect(),
         })
     }
 }
 
 /// A sensor that says the same from beginning to end is dead, or not connected: there is nothing to explain.
 fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
-    let first = driver_torque_nm[0];
-    if driver_torque_nm.iter().all(|&t| t == first) {
+    let mut known = driver_torque_nm.iter().copied().filter(|t| t.is_finite());
+    let first = known.next().unwrap_or(0.0);
+    if known.all(|t| t == first) {
         return refuse(format!(
             "driver_torque_nm is {first} throughout: the sensor measures nothing"
         ));
@@ -251,88 +317,37 @@ fn find_columns(header: &[String], line: u64, manual: bool) -> Result<[Option<us
     Ok(index)
 }
 
+/// What loggers write where there is no value.
+const NOTHING: [&str; 6] = ["", "-", "na", "n/a", "nan", "null"];
+
 fn field(text: &str, line: u64, c: usize) -> Result<f64, LogError> {
     let name = COLUMNS[c];
-    let Ok(value) = text.parse::<f64>() else {
-        return refuse(format!("line {line}: {name} is {text:?}, which is not a number"));
+    let value = match text.parse::<f64>() {
+        Ok(value) => value,
+        Err(_) if NOTHING.contains(&text.trim().to_ascii_lowercase().as_str()) => f64::NAN,
+        Err(_) => return refuse(format!("line {line}: {name} is {text:?}, which is not a number")),
     };
+    within_limits(value, line, c)
+}
+
+/// A value that its column can have; missing if it is not finite.
+fn within_limits(value: f64, line: u64, c: usize) -> Result<f64, LogError> {
     let (limit, hint) = LIMITS[c];
     if !value.is_finite() {
-        return refuse(format!(
-            "line {line}: {name} is {text}, which is not a finite number"
-        ));
+        return match c {
+            0 => refuse(format!(
+                "line {line}: time_s is {value}, which is not a finite number"
+            )),
+            _ => Ok(f64::NAN),
+        };
     }
     if value.abs() > limit {
         return refuse(format!(
-            "line {line}: {name} is {value}, outside -{limit:.4} to {limit:.4}: {hint}"
+            "line {line}: {} is {value}, outside -{limit:.4} to {limit:.4}: {hint}",
+            COLUMNS[c]
         ));
     }
     Ok(value)
-}
-
-/// Checks the time stamps and returns start and period of the even grid that fits them best, s.
-fn check_time(time: &[f64], lines: &[u64]) -> Result<(f64, f64), LogError> {
-    if time.len() < 3 {
-        return refuse(format!("the log has {} rows, which is too few", time.len()));
-    }
-    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    if let Some(k) = steps.iter().position(|&d| d <= 0.0) {
-        return refuse(format!(
-            "line {}: time_s goes from {} to {}: it must grow",
-            lines[k + 1],
-            time[k],
-            time[k + 1]
-        ));
-    }
-    steps.sort_by(f64::total_cmp);
-    let usual = steps[steps.len() / 2];
-    let (low, high) = SAMPLE_PERIOD_RANGE_S;
-    if !(low..=high).contains(&usual) {
-        return refuse(format!(
-            "line {}: the step of time_s is {usual}, outside {low} to {high} s: is it in ms?",
-            lines[1]
-        ));
-    }
-    for (k, w) in time.windows(2).enumerate() {
-        let step = w[1] - w[0];
-        if step > 1.5 * usual {
-            return refuse(format!(
-                "line {}: gap of {step:.6} s before it, {:.1} samples of {usual:.6} s are missing",
-                lines[k + 1],
-                step / usual - 1.0
-            ));
-        }
-    }
-    let (start, dt) = even_grid(time);
-    let missed = |k: usize| (time[k] - start - k as f64 * dt).abs();
-    let worst = (0..time.len()).max_by(|&a, &b| missed(a).total_cmp(&missed(b)));
-    if let Some(k) = worst.filter(|&k| missed(k) > TIME_STAMP_TOLERANCE * dt) {
-        return refuse(format!(
-            "line {}: uneven time stamps, time_s is {} where an even grid has {:.6}",
-            lines[k],
-            time[k],
-            start + k as f64 * dt
-        ));
-    }
-    let span = time[time.len() - 1] - time[0];
-    if span < SHORTEST_S {
-        return refuse(too_short(span));
-    }
-    Ok((start, dt))
-}
-
-/// Start and period of the even grid through `time`, by least squares.
-fn even_grid(time: &[f64]) -> (f64, f64) {
-    let middle = (time.len() - 1) as f64 / 2.0;
-    let (mut mean, mut product, mut square) = (0.0, 0.0, 0.0);
-    for (k, t) in time.iter().enumerate() {
-        let from_middle = k as f64 - middle;
-        mean += (t - time[0]) / time.len() as f64;
-        product += from_middle * (t - time[0]);
-        square += from_middle * from_middle;
-    }
-    let dt = product / square;
-    (time[0] + mean - middle * dt, dt)
 }
 
 fn too_short(span_s: f64) -> String {
@@ -347,7 +362,7 @@ fn check_wheel_resolution(wheel_angle: &[f64], lines: &[u64]) -> Result<(), LogE
         .fold(f64::INFINITY, f64::min);
     if step.is_finite() && step > COARSEST_WHEEL_STEP_RAD {
         let first = wheel_angle.windows(2).position(|w| (w[1] - w[0]).abs() > 1e-12);
-        let line = lines[first.unwrap_or(0) + 1];
+        let line = lines[(first.unwrap_or(0) + 1).min(lines.len() - 1)];
         return refuse(format!(
             "line {line}: wheel_angle_rad moves by {step:.3} at least, coarser than {COARSEST_WHEEL_STEP_RAD} rad: \
              is it in degrees?"

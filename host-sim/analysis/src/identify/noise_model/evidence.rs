@@ -7,7 +7,7 @@ use super::{CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, LONGEST_DELAY_S, P
 use crate::identify::search::{Quadratic, covariance, step};
 
 /// Steps of the delay's profile over the whole range.
-const PROFILE_STEPS: usize = 40;
+const PROFILE_STEPS: usize = 20;
 /// Length of the blocks over which scores are taken as independent, s.
 const BLOCK_S: f64 = 2.0;
 
@@ -20,21 +20,33 @@ pub(super) struct Alternative {
     pub step: f64,
     /// That in its standard errors.
     pub z: f64,
-    /// What it would move the other parameters by.
-    pub moved: DVector<f64>,
+    /// What the other parameters move by for each unit of it.
+    pub slopes: DVector<f64>,
+    /// What the record knows of it, as a standard error.
+    pub error: f64,
+}
+
+impl Alternative {
+    /// What it would move parameter `i` by.
+    pub(super) fn moves(&self, i: usize) -> f64 {
+        self.slopes[i] * self.step
+    }
 }
 
 impl Problem<'_> {
     /// Minus twice the log likelihood over t_p above the optimum, with what is linear solved for at each.
-    pub(super) fn profile(&self, p: &[f64], loss: f64, variance: f64) -> Vec<[f64; 2]> {
+    pub(super) fn profile(&self, p: &[f64], loss: f64, variance: f64, error: f64) -> Vec<[f64; 2]> {
         if !self.is_free(T_P) {
             return Vec::new();
         }
         let mut delays: Vec<f64> = (0..=PROFILE_STEPS)
             .map(|i| LONGEST_DELAY_S * i as f64 / PROFILE_STEPS as f64)
             .collect();
-        delays.push(p[T_P]);
+        // Finer where the interval ends.
+        let error = if error.is_finite() { error } else { 0.0 };
+        delays.extend((-4..=4).map(|i| (p[T_P] + 0.5 * f64::from(i) * error).clamp(0.0, LONGEST_DELAY_S)));
         delays.sort_by(f64::total_cmp);
+        delays.dedup();
         delays
             .into_iter()
             .map(|t_p| {
@@ -112,6 +124,7 @@ fn freed(full: &Quadratic, free: &[usize], place: usize, variance: f64) -> Optio
         place,
         step,
         z: step * (curvature / variance).sqrt(),
-        moved: -follow * step,
+        error: (variance / curvature).sqrt(),
+        slopes: -follow,
     })
 }

@@ -3,13 +3,16 @@
 //!
 //! What counts as refuted is said in [`crate::identify::verdict`].
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
-use super::{CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_P};
+use super::{
+    CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S,
+    T_P,
+};
 use crate::identify::options::Options;
-use crate::identify::result::{Identification, STANDARD_NORMAL_95};
-use crate::identify::search::{Bounds, Optimum, minimise};
+use crate::identify::result::{AtTNms, Identification, STANDARD_NORMAL_95};
+use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict::{self, Refutation};
 
 /// Largest factor by which the scatter of the scores may widen a standard error: more is no noise.
@@ -18,6 +21,8 @@ const WIDEST: f64 = 3.0;
 const PROFILE_95: f64 = 3.841;
 /// Share of what counts as right (10 %, 15 ms, 0.05) that another assumption has to move a parameter by to matter.
 const MATTERS: f64 = 0.3;
+/// Standard errors by which the record has to draw t_nms from what is assumed before it is freed.
+const DRAWN: f64 = 3.0;
 /// Twice the log likelihood ratio that the driver model has to gain over no driver at all.
 const LEAST_GAIN: f64 = 60.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
@@ -92,19 +97,9 @@ impl Problem<'_> {
         ));
         refuted.extend(self.beside_nothing(optimum));
         let p = &optimum.point;
-        let tolerance = |i: usize| match i {
-            T_P => 0.015,
-            K_HG => 0.05,
-            _ => 0.1 * p[i].abs(),
-        };
-        let matters = |a: &Alternative| {
-            (0..=T_P).any(|i| {
-                self.is_free(i) && a.moved[i].abs() > errors[(i, i)].sqrt().max(MATTERS * tolerance(i))
-            })
-        };
         let likeliest = alternatives
             .iter()
-            .filter(|a| a.z.abs() > verdict::CERTAIN && matters(a))
+            .filter(|a| a.z.abs() > verdict::CERTAIN && self.matters(a, p, errors))
             .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
         if let Some(a) = likeliest {
             let name = NAMES[a.place].unwrap_or_default();
@@ -119,16 +114,112 @@ impl Problem<'_> {
                 cure: format!("--estimate {name}, or --fix {name}=VALUE if it is known"),
             });
         }
+        if self.t_nms_prior_s.is_some() {
+            let [low, high] = T_NMS_RANGE_S;
+            let (assumed, drawn, error) = (self.assumed_t_nms_s, p[T_NMS], errors[(T_NMS, T_NMS)].sqrt());
+            found.notes.push(format!(
+                "the record draws t_nms from the {assumed} s that are assumed to {drawn:.3} +- {error:.3} s: it was \
+                 estimated, held near {assumed} s by {T_NMS_SD_S} s. --fix t_nms={assumed} keeps it."
+            ));
+            let beyond = (low - drawn).max(drawn - high);
+            if beyond > 0.01 + verdict::CERTAIN * error {
+                refuted.push(Refutation {
+                    assumption: "t_nms is that of an arm",
+                    evidence: format!(
+                        "it would have to be {drawn:.3} +- {error:.3} s; arms have {low} to {high} s"
+                    ),
+                    cause: "a torque sensor is filtered or late, or the driver is another one".to_owned(),
+                    cure: "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known".to_owned(),
+                });
+            }
+        }
         if !refuted.is_empty() {
             found.parameters.take_back();
         }
         found.refuted = refuted;
         found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
         if !self.is_free(T_NMS) {
-            found.assumed.push(format!("t_nms is {} s", p[T_NMS]));
+            let [low, high] = T_NMS_RANGE_S;
+            found.assumed.push(if options.t_nms_known {
+                format!("t_nms is {} s", p[T_NMS])
+            } else {
+                format!(
+                    "t_nms is {} s, give or take {T_NMS_SD_S} s (arms have {low} to {high} s): the errors hold that",
+                    p[T_NMS]
+                )
+            });
         }
         if !self.is_free(K_NMS) {
             found.assumed.push(format!("K_nms is {} N.m/rad", p[K_NMS]));
+        }
+    }
+
+    /// Whether freeing an assumption would move a parameter by its standard error and by a share of what counts as right.
+    fn matters(&self, a: &Alternative, p: &[f64], errors: &DMatrix<f64>) -> bool {
+        let tolerance = |i: usize| match i {
+            T_P => 0.015,
+            K_HG => 0.05,
+            _ => 0.1 * p[i].abs(),
+        };
+        (0..=T_P)
+            .any(|i| self.is_free(i) && a.moves(i).abs() > errors[(i, i)].sqrt().max(MATTERS * tolerance(i)))
+    }
+
+    /// t_nms as the record alone would have it, if that is another than was assumed and matters.
+    pub(super) fn drawn_t_nms(&self, optimum: &Optimum) -> Option<f64> {
+        if self.is_free(T_NMS) {
+            return None;
+        }
+        let p = &optimum.point;
+        let free: Vec<usize> = (0..self.size())
+            .filter(|&i| self.is_free(i) && (i >= super::COUNT || !self.bounds[i].touches(p[i])))
+            .collect();
+        let variance =
+            (2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64).max(SMALLEST_ERROR_NM.powi(2));
+        let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
+        let all = self.alternatives(p, &free, variance);
+        let a = all.into_iter().find(|a| a.place == T_NMS)?;
+        (a.z.abs() > DRAWN && self.matters(&a, p, &errors)).then_some(p[T_NMS] + a.step)
+    }
+
+    /// Widens the standard errors by what is not known of t_nms, and says where the record draws the parameters by it: t_nms
+    /// is that of drivers' arms, about what is assumed, and what the record says of it; to first order.
+    pub(super) fn widen_by_t_nms(
+        &self,
+        errors: &mut DMatrix<f64>,
+        alternatives: &[Alternative],
+    ) -> DVector<f64> {
+        let mut drawn = DVector::zeros(errors.nrows());
+        let Some(a) = alternatives.iter().find(|a| a.place == T_NMS) else {
+            return drawn;
+        };
+        let (known, seen) = (T_NMS_SD_S.powi(2), a.error.powi(2));
+        let variance = known * seen / (known + seen);
+        let step = a.step * known / (known + seen);
+        for i in (0..=T_P).filter(|&i| self.is_free(i)) {
+            drawn[i] = a.slopes[i] * step;
+            for j in (0..=T_P).filter(|&j| self.is_free(j)) {
+                errors[(i, j)] += variance * a.slopes[i] * a.slopes[j];
+            }
+        }
+        drawn
+    }
+
+    /// The 95 % intervals if t_nms is what is assumed, from the standard errors that hold then.
+    pub(super) fn at_t_nms(&self, p: &[f64], errors: &DMatrix<f64>, pull: &DVector<f64>) -> AtTNms {
+        let interval = |i: usize| {
+            let margin = STANDARD_NORMAL_95 * errors[(i, i)].sqrt();
+            let middle = p[i] + pull[i];
+            let ends = [(middle - margin).min(p[i]), (middle + margin).max(p[i])];
+            let Bounds { low, high } = self.bounds[i];
+            ends.map(|x| x.clamp(low, high))
+        };
+        AtTNms {
+            t_nms_s: p[T_NMS],
+            intervals_95: (0..=T_P)
+                .filter(|&i| self.is_free(i) && errors[(i, i)].is_finite())
+                .filter_map(|i| Some((NAMES[i]?, interval(i))))
+                .collect(),
         }
     }
 

@@ -20,11 +20,14 @@
 //! ended ([`report`]).
 
 mod evidence;
+mod information;
 mod judge;
 mod report;
+mod restricted;
 
 use std::ops::Range;
 
+pub use information::{INFORMED, Information, Truth, information};
 use nalgebra::{DMatrix, DVector};
 
 use super::log::DriveLog;
@@ -90,6 +93,13 @@ const START_DELAYS_S: [f64; 5] = [0.02, 0.1, 0.2, 0.32, 0.48];
 /// in a record without remnant. The best delay of each is followed to the end.
 const START_CORNERS_HZ: [f64; 2] = [0.5, 5.0];
 
+/// What is known of t_nms where nobody says more: the range of drivers, s, and its standard deviation about the value
+/// assumed, s. Published arms have 0.06 to 0.15 s.
+const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
+const T_NMS_SD_S: f64 = 0.03;
+/// Where it is searched once it is freed, s.
+const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
+
 /// Expected improvement, as a share of the loss, below which the search ends. With tens of thousands of rows
 /// this leaves the estimate within two hundredths of a standard error of the optimum.
 const TOLERANCE: f64 = 1e-8;
@@ -106,8 +116,17 @@ pub fn identify(log: &DriveLog, options: &Options) -> Identification {
 /// Identifies the driver of a log that was prepared.
 pub(crate) fn identify_prepared(prepared: &Prepared, options: &Options) -> Identification {
     let mut problem = Problem::new(prepared, options);
-    let (optimum, starts) = problem.search();
+    let (mut optimum, starts) = problem.search();
     problem.assume_muscle(&optimum.point);
+    let drawn = if options.t_nms_known {
+        None
+    } else {
+        problem.drawn_t_nms(&optimum)
+    };
+    if drawn.is_some() {
+        optimum = problem.free_t_nms(&optimum);
+    }
+    optimum = problem.restrict(optimum);
     problem.report(prepared, options, &optimum, starts)
 }
 
@@ -122,6 +141,8 @@ struct Problem<'a> {
     stretches: Vec<Range<usize>>,
     /// Whether anything beyond [`CORE`] is searched.
     extended: bool,
+    /// Standard deviation of t_nms about what is assumed, s, where it is estimated although nobody asked for it.
+    t_nms_prior_s: Option<f64>,
 }
 
 /// One row of the loss: the prediction error and its negative derivatives.
@@ -176,7 +197,19 @@ impl<'a> Problem<'a> {
             bounds,
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
+            t_nms_prior_s: None,
         }
+    }
+
+    /// The optimum with t_nms free, held near what was assumed by what is known of it, from the one without.
+    fn free_t_nms(&mut self, from: &Optimum) -> Optimum {
+        self.bounds[T_NMS] = Bounds::new(T_NMS_SEARCHED_S[0], T_NMS_SEARCHED_S[1]);
+        self.t_nms_prior_s = Some(T_NMS_SD_S);
+        self.extended = true;
+        let bounds = self.bounds.clone();
+        let freed = minimise(&from.point, &bounds, TOLERANCE, |p| self.evaluate(p));
+        self.assume_muscle(&freed.point);
+        freed
     }
 
     fn is_free(&self, i: usize) -> bool {
@@ -336,6 +369,17 @@ impl<'a> Problem<'a> {
             for j in 0..N {
                 quadratic.hessian[(i, j)] = hessian[i.max(j)][i.min(j)];
             }
+        }
+        // As so much more of a likelihood whose variance is the loss's own: L (1 + d^2/rows), d in standard deviations.
+        if let Some(sd) = self.t_nms_prior_s {
+            let (rows, d) = (
+                self.row_count().max(1) as f64,
+                (p[T_NMS] - self.assumed_t_nms_s) / sd,
+            );
+            let (loss, more) = (quadratic.loss, 1.0 + d * d / rows);
+            quadratic.loss *= more;
+            quadratic.gradient[T_NMS] += loss * 2.0 * d / (rows * sd);
+            quadratic.hessian[(T_NMS, T_NMS)] += loss * 2.0 / (rows * sd * sd);
         }
         for (s, (g, h, mixed)) in constants.into_iter().enumerate() {
             let o = COUNT + s;

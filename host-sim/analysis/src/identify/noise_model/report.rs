@@ -51,9 +51,25 @@ impl Problem<'_> {
         let variance = 2.0 * optimum.quadratic.loss / rows.saturating_sub(free.len()).max(1) as f64;
         let error_variance = variance.max(SMALLEST_ERROR_NM.powi(2));
         let mut errors = covariance(&optimum.quadratic.hessian, &free) * error_variance;
-        let delay_profile = self.profile(p, optimum.quadratic.loss, error_variance);
+        let delay_profile = self.profile(
+            p,
+            optimum.quadratic.loss,
+            error_variance,
+            errors[(T_P, T_P)].sqrt(),
+        );
         self.widen(&mut errors, p, &optimum.quadratic.hessian, &free, &delay_profile);
+        let core: Vec<usize> = free
+            .iter()
+            .copied()
+            .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
+            .collect();
+        let alternatives = self.alternatives(p, &core, error_variance);
         let trim = self.trim(optimum, &free, &errors, error_variance);
+        let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
+        if !options.t_nms_known && !self.is_free(T_NMS) {
+            at_t_nms = Some(self.at_t_nms(p, &errors, &trim.pull));
+            drawn = self.widen_by_t_nms(&mut errors, &alternatives);
+        }
         let parameter = |i: usize| {
             if !self.is_free(i) {
                 Parameter::fixed(p[i])
@@ -64,18 +80,13 @@ impl Problem<'_> {
                     p[i],
                     trim.pull[i],
                     errors[(i, i)],
+                    drawn[i],
                     self.bounds[i],
                     VARIATION_WIDTHS[i],
                 )
             }
         };
         let gains = [0, 1, 2].map(parameter);
-        let core: Vec<usize> = free
-            .iter()
-            .copied()
-            .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
-            .collect();
-        let alternatives = self.alternatives(p, &core, error_variance);
         let split = split_scale(&gains, &trim.pull, &errors, options);
         let (k_d, a) = split
             .clone()
@@ -128,6 +139,7 @@ impl Problem<'_> {
             fit_percent_predicted: Some(fit(&predicted)),
             fit_percent_wheel_angle: None,
             parameters,
+            at_t_nms,
             combinations,
             correlation: Correlation::new(&NAMES, &errors, &free),
             remnant: Some(remnant(p[RHO], p[THETA], variance, self.signals.dt_s)),
@@ -387,6 +399,7 @@ fn split_scale(
             a * ratio,
             a * (unbounded_ratio - ratio),
             (a / optimum[known]).powi(2) * relative,
+            0.0,
             Bounds::FREE,
             high - low,
         )
@@ -418,7 +431,7 @@ mod tests {
     use super::*;
 
     fn gain(estimate: f64) -> Parameter {
-        Parameter::estimated(estimate, 0.0, 0.01, Bounds::FREE, 8.0)
+        Parameter::estimated(estimate, 0.0, 0.01, 0.0, Bounds::FREE, 8.0)
     }
 
     /// gain_1 = 0.4, gain_3 = 15 with variances 0.04 and 0.09 and covariance 0.03; a_3 = 3.75 makes the scale 4, so

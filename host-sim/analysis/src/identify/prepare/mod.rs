@@ -3,7 +3,7 @@
 //!
 //! Single samples first ([`faults`]): what is no number, stuck or a spike is bridged, in the lane signals by the
 //! smoother of [`super::lane`]. Then stretches ([`stretches`]) in which the record is no driving: hands off, standstill,
-//! lane changes, pauses of a signal longer than [`LONGEST_BRIDGE_S`], and what the caller leaves out. What remains is
+//! lane changes, pauses of a signal longer than [`Options::bridge_s`], and what the caller leaves out. What remains is
 //! a set of stretches, each with an unknown of its own for what the integral of e_y was before it.
 
 mod faults;
@@ -20,9 +20,6 @@ use super::lane::{LaneNoise, smooth};
 use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
 
-/// A signal that pauses for longer is not bridged, s: the delay's own size.
-const LONGEST_BRIDGE_S: f64 = 0.3;
-
 /// Changes of e_y, e_theta, wheel angle, T_h and T_d below which a sample is never out of line: m, rad, rad, N.m, N.m.
 const LEAST: [f64; 5] = [5e-3, 5e-4, 1e-2, 0.06, 0.06];
 
@@ -34,13 +31,17 @@ const USUAL_GAINS: [f64; 2] = [0.4, 14.8];
 /// What was found in a log and what was done about it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Preflight {
+    /// What was found when the log was read: what, found, done.
+    pub reading: Vec<[String; 3]>,
     /// By column: e_y_m, e_theta_rad, wheel_angle_rad, guidance_torque_nm, driver_torque_nm.
     pub columns: Vec<(&'static str, ColumnFaults)>,
     /// Camera noise of e_y, m, and of e_theta, rad.
     pub lane_noise: [LaneNoise; 2],
     /// Stretches that were left out.
     pub left_out: Vec<LeftOut>,
-    /// Seconds of the record, and seconds used.
+    /// Pauses up to so long were bridged, s.
+    pub bridge_s: f64,
+    /// Seconds of the record.
     pub recorded_s: f64,
     /// Seconds that the estimate rests on.
     pub used_s: f64,
@@ -49,23 +50,19 @@ pub struct Preflight {
 impl Preflight {
     /// In words: what, found, done.
     pub fn findings(&self) -> Vec<[String; 3]> {
-        let mut out = Vec::new();
+        let mut out = self.reading.clone();
+        let bridged = match self.bridge_s {
+            0.0 => "cut".to_owned(),
+            s => format!("bridged, or cut where longer than {s} s"),
+        };
         for (name, faults) in &self.columns {
             let mut add = |count: usize, found: &str, done: &str| {
                 if count > 0 {
                     out.push([(*name).to_owned(), format!("{count} {found}"), done.to_owned()]);
                 }
             };
-            add(
-                faults.missing,
-                "values that are no number",
-                "bridged, or cut where longer than 0.3 s",
-            );
-            add(
-                faults.stuck,
-                "values stuck",
-                "bridged, or cut where longer than 0.3 s",
-            );
+            add(faults.missing, "values missing or no number", &bridged);
+            add(faults.stuck, "values stuck", &bridged);
             add(faults.spikes, "values out of line", "bridged");
             add(
                 faults.held_rows,
@@ -128,12 +125,12 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
             return None;
         }
         let floor = 0.1 * examined[c].faults.step;
-        let integrals = 2 - c;
         Some(smooth(
             &examined[c].signal,
             &examined[2].signal,
             dt,
-            integrals,
+            [2, 1][c],
+            !options.plain_smoother,
             &examined[c].weight,
             floor,
         ))
@@ -158,6 +155,8 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
             .copied()
             .zip(named.map(|e| e.faults))
             .collect(),
+        reading: log.findings.clone(),
+        bridge_s: options.bridge_s,
         recorded_s: log.len() as f64 * dt,
         ..Preflight::default()
     };
@@ -178,6 +177,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         wheel_angle_rad: phi.signal,
         guidance_torque_nm: t_h.signal,
         driver_torque_nm: t_d.signal,
+        findings: Vec::new(),
     };
     preflight.lane_noise = lane_noise;
     let (stretches, left_out) = stretches::stretches(log, &clean, &bad, lane_noise, options);

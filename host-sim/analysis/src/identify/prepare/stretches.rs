@@ -5,7 +5,6 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::LONGEST_BRIDGE_S;
 use crate::identify::lane::LaneNoise;
 use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
@@ -100,7 +99,7 @@ pub(super) fn stretches(
     let rows = |s: f64| (s / log.dt_s).round() as usize;
     for column in bad {
         for run in true_runs(column) {
-            if run.len() > rows(LONGEST_BRIDGE_S) {
+            if run.len() > rows(options.bridge_s) {
                 mark(run, Reason::Pause);
             }
         }

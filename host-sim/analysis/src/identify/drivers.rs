@@ -1,0 +1,250 @@
+//! Several drivers beside each other: whether two differ, and what a group is like as a population.
+//!
+//! Of two drivers the estimates are independent, so the variance of a difference is the sum of theirs. A group is a
+//! random-effects model, parameter by parameter: driver i has `theta_i ~ N(mean, spread^2)`, of which the fit of the
+//! drive says `theta_i` with its standard error. The spread is that of the largest restricted likelihood, its interval
+//! by the Q-profile (Viechtbauer, "Confidence intervals for the amount of heterogeneity in meta-analysis", 2007), the
+//! interval of the mean by Knapp and Hartung with Student's t, and each driver's value is the conditional mean: drawn
+//! towards the group the more, the less its own drive says.
+
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+use super::result::{Identification, Parameter, STANDARD_NORMAL_95};
+
+/// One parameter of two drivers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// Key of the parameter.
+    pub parameter: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// The first driver's value less the second's.
+    pub difference: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Its 95 % interval.
+    pub interval_95: [f64; 2],
+    /// Whether the interval leaves zero out.
+    pub real: bool,
+}
+
+/// What tells two drivers apart: the parameters that are identified in both.
+pub fn differences(first: &Identification, second: &Identification) -> Vec<Difference> {
+    let pairs = first.parameters.list().into_iter().zip(second.parameters.list());
+    pairs
+        .filter_map(|((parameter, unit, a), (_, _, b))| {
+            let ((a, a_error), (b, b_error)) = (estimated(a)?, estimated(b)?);
+            let (difference, standard_error) = (a - b, a_error.hypot(b_error));
+            let margin = STANDARD_NORMAL_95 * standard_error;
+            Some(Difference {
+                parameter,
+                unit,
+                difference,
+                standard_error,
+                interval_95: [difference - margin, difference + margin],
+                real: difference.abs() > margin,
+            })
+        })
+        .collect()
+}
+
+fn estimated(p: &Parameter) -> Option<(f64, f64)> {
+    if p.fixed {
+        return None;
+    }
+    Some((p.estimate?, p.standard_error.filter(|&e| e > 0.0)?))
+}
+
+/// One parameter of a group of drivers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Population {
+    /// Key of the parameter.
+    pub parameter: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Drivers in whom it is identified.
+    pub drivers: usize,
+    /// Mean of the group.
+    pub mean: f64,
+    /// 95 % interval of the mean.
+    pub mean_interval_95: [f64; 2],
+    /// Standard deviation between drivers.
+    pub spread: f64,
+    /// 95 % interval of the spread.
+    pub spread_interval_95: [f64; 2],
+    /// Each driver's value given the group, in the order given; none where it is not identified.
+    pub each: Vec<Option<f64>>,
+}
+
+/// What the group is like, for each parameter that is identified in at least three drivers.
+pub fn population(found: &[&Identification]) -> Vec<Population> {
+    let Some(first) = found.first() else {
+        return Vec::new();
+    };
+    first
+        .parameters
+        .list()
+        .into_iter()
+        .enumerate()
+        .filter_map(|(i, (parameter, unit, _))| {
+            let all: Vec<Option<(f64, f64)>> = found
+                .iter()
+                .map(|f| estimated(f.parameters.list()[i].2))
+                .collect();
+            let known: Vec<(f64, f64)> = all.iter().copied().flatten().collect();
+            let effects = RandomEffects::of(&known)?;
+            Some(Population {
+                parameter,
+                unit,
+                drivers: known.len(),
+                mean: effects.mean,
+                mean_interval_95: effects.mean_interval_95,
+                spread: effects.variance.sqrt(),
+                spread_interval_95: effects.variance_interval_95.map(f64::sqrt),
+                each: all.iter().map(|x| x.map(|(y, s)| effects.shrunk(y, s))).collect(),
+            })
+        })
+        .collect()
+}
+
+/// A random-effects model of values with standard errors.
+#[derive(Debug, Clone, Copy)]
+struct RandomEffects {
+    mean: f64,
+    mean_interval_95: [f64; 2],
+    variance: f64,
+    variance_interval_95: [f64; 2],
+}
+
+/// Fewest drivers that have a spread.
+const FEWEST: usize = 3;
+/// Halvings of an interval until it is done.
+const HALVINGS: usize = 200;
+
+impl RandomEffects {
+    fn of(values: &[(f64, f64)]) -> Option<Self> {
+        if values.len() < FEWEST {
+            return None;
+        }
+        let freedom = (values.len() - 1) as f64;
+        let variance = restricted_variance(values);
+        let (mean, weight, q) = weighed(values, variance);
+        let error = (q / freedom / weight).sqrt();
+        let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
+        let chi = ChiSquared::new(freedom).ok()?;
+        // Q falls as the variance grows.
+        let at = |level: f64| root(values, chi.inverse_cdf(level));
+        Some(Self {
+            mean,
+            mean_interval_95: [mean - t * error, mean + t * error],
+            variance,
+            variance_interval_95: [at(0.975), at(0.025)],
+        })
+    }
+
+    fn shrunk(&self, value: f64, error: f64) -> f64 {
+        let own = self.variance / (self.variance + error * error);
+        self.mean + own * (value - self.mean)
+    }
+}
+
+/// Mean, sum of the weights and weighed sum of squares at a variance between drivers.
+fn weighed(values: &[(f64, f64)], variance: f64) -> (f64, f64, f64) {
+    let weight = |s: f64| 1.0 / (s * s + variance);
+    let sum: f64 = values.iter().map(|v| weight(v.1)).sum();
+    let mean = values.iter().map(|v| weight(v.1) * v.0).sum::<f64>() / sum;
+    let q = values.iter().map(|v| weight(v.1) * (v.0 - mean).powi(2)).sum();
+    (mean, sum, q)
+}
+
+/// A variance that is surely too large.
+fn largest(values: &[(f64, f64)]) -> f64 {
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (a.min(v.0), b.max(v.0))
+        });
+    1e4 * (high - low).powi(2) + 1e-12
+}
+
+fn root(values: &[(f64, f64)], level: f64) -> f64 {
+    let (mut low, mut high) = (0.0, largest(values));
+    if weighed(values, 0.0).2 <= level {
+        return 0.0;
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if weighed(values, middle).2 > level {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// The variance between drivers of the largest restricted likelihood, by bisection of its derivative.
+fn restricted_variance(values: &[(f64, f64)]) -> f64 {
+    // 2 dl/dv = -sum w + sum w^2/sum w + sum w^2 (y - mean)^2.
+    let rises = |variance: f64| {
+        let (mean, sum, _) = weighed(values, variance);
+        let weight = |s: f64| 1.0 / (s * s + variance);
+        let squares: f64 = values.iter().map(|v| weight(v.1).powi(2)).sum();
+        let far: f64 = values.iter().map(|v| (weight(v.1) * (v.0 - mean)).powi(2)).sum();
+        far + squares / sum - sum > 0.0
+    };
+    if !rises(0.0) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.0, largest(values));
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if rises(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The trials of the BCG vaccine (log relative risks and variances as printed by R's metafor for `dat.bcg`), whose
+    /// documented results are tau^2 0.3132 with the Q-profile's interval 0.1197 to 1.1115, and the mean -0.7145.
+    #[test]
+    fn the_published_results_of_the_bcg_trials_are_found() {
+        let y = [
+            -0.8893, -1.5854, -1.3481, -1.4416, -0.2175, -0.7861, -1.6209, 0.0120, -0.4694, -1.3713, -0.3394,
+            0.4459, -0.0173,
+        ];
+        let v = [
+            0.3256_f64, 0.1946, 0.4154, 0.0200, 0.0512, 0.0069, 0.2230, 0.0040, 0.0564, 0.0730, 0.0124,
+            0.5325, 0.0714,
+        ];
+        let values: Vec<(f64, f64)> = y.into_iter().zip(v.map(f64::sqrt)).collect();
+        let found = RandomEffects::of(&values).unwrap();
+        assert!((found.variance - 0.3132).abs() < 1e-3, "{found:?}");
+        assert!((found.mean + 0.7145).abs() < 1e-3, "{found:?}");
+        let [low, high] = found.variance_interval_95;
+        assert!(
+            (low - 0.1197).abs() < 2e-3 && (high - 1.1115).abs() < 5e-3,
+            "{found:?}"
+        );
+    }
+
+    /// The eight schools (Rubin 1981): no spread beyond the errors, and the mean 7.69 of equal schools.
+    #[test]
+    fn drivers_who_do_not_differ_have_no_spread() {
+        let y = [28.0, 8.0, -3.0, 7.0, -1.0, 1.0, 18.0, 12.0];
+        let s = [15.0, 10.0, 16.0, 11.0, 9.0, 11.0, 10.0, 18.0];
+        let values: Vec<(f64, f64)> = y.into_iter().zip(s).collect();
+        let found = RandomEffects::of(&values).unwrap();
+        assert_eq!(found.variance, 0.0);
+        assert!((found.mean - 7.69).abs() < 0.01, "{found:?}");
+        assert!((found.shrunk(28.0, 15.0) - found.mean).abs() < 1e-12);
+    }
+}

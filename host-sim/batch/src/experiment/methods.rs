@@ -1,0 +1,114 @@
+//! What each way to treat noise on the lane signals is worth: the participants' drives under more and more camera noise,
+//! identified in four ways, beside the information bound.
+//!
+//! *Naive* takes the lane signals as they are. The *plain smoother* takes each as a smooth course under white noise. The
+//! *chosen* one takes the vehicle's answer to the wheel angle out of that course. *Published* is the paper's.
+
+use haptic_analysis::identify::{Identification, Options, identify_as_published, identify_with_noise_model};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::repetitions::{COMPARED, bound_of, compared};
+use super::spoiled::{POPULATION, Spoiling, spoiled_log};
+use super::{Plan, chosen, driven};
+
+/// The ways.
+pub const METHODS: [&str; 4] = ["naive", "plain smoother", "chosen", "published"];
+
+/// One way on one level of noise.
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodLine {
+    /// The noise.
+    pub noise: &'static str,
+    /// One of [`METHODS`].
+    pub method: &'static str,
+    /// Drives.
+    pub drives: usize,
+    /// Root mean square error of gain_1, gain_2, gain_3, t_p and K_hg.
+    pub rms: [f64; COMPARED],
+    /// Least RMS error of an unbiased estimator from exact lane signals.
+    pub bound: [f64; COMPARED],
+    /// Share of the 95 % intervals that hold the truth, of those that there are.
+    pub coverage: Option<f64>,
+}
+
+/// Identifies `seeds` guided drives of each participant of `plan` in all ways; `done` is called after each drive.
+///
+/// # Errors
+/// As [`super::experiment`].
+pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Vec<MethodLine>, String> {
+    let drivers = chosen(&plan.participants)?;
+    let jobs: Vec<_> = drivers
+        .iter()
+        .flat_map(|p| (0..u64::from(seeds)).map(move |s| (p.number, p.guided, s)))
+        .collect();
+    let noises: Vec<(&'static str, &[Spoiling])> = POPULATION
+        .iter()
+        .filter(|(_, ways)| matches!(ways, [] | [Spoiling::LaneNoise(..)]))
+        .copied()
+        .collect();
+    let found = jobs
+        .into_par_iter()
+        .map(|(number, truth, seed)| {
+            let plan = Plan {
+                seed: plan.seed.wrapping_add(seed),
+                ..plan.clone()
+            };
+            let log = driven(&plan, number, &truth)?.log;
+            let bound = bound_of(&log, &truth);
+            let values: Vec<_> = noises
+                .iter()
+                .flat_map(|(_, ways)| {
+                    let log = spoiled_log(&log, ways, &plan, number);
+                    let naive = Options {
+                        lane_noise: false,
+                        ..Options::default()
+                    };
+                    let plain = Options {
+                        plain_smoother: true,
+                        ..Options::default()
+                    };
+                    let ours = |o: &Options| Some(identify_with_noise_model(&log, o));
+                    [
+                        ours(&naive),
+                        ours(&plain),
+                        ours(&Options::default()),
+                        identify_as_published(&log, &Options::default()).ok(),
+                    ]
+                })
+                .map(|f: Option<Identification>| f.map(|f| compared(&truth, &f.parameters)))
+                .collect();
+            done();
+            Ok((bound, values))
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    let root_mean = |values: &mut dyn Iterator<Item = f64>| {
+        let (sum, n) = values.fold((0.0, 0), |(s, n), x| (s + x * x, n + 1));
+        (sum / f64::from(n.max(1))).sqrt()
+    };
+    let mut lines = Vec::new();
+    for (n, (noise, _)) in noises.iter().enumerate() {
+        for (m, method) in METHODS.iter().enumerate() {
+            let place = n * METHODS.len() + m;
+            let here: Vec<_> = found.iter().filter_map(|f| f.1[place].as_ref()).collect();
+            let (mut held, mut all) = (0, 0);
+            for (p, truth) in here.iter().flat_map(|h| h.iter().map(|c| (c.1, c.2))) {
+                if let Some([low, high]) = p.interval_95 {
+                    all += 1;
+                    held += usize::from(low <= truth && truth <= high);
+                }
+            }
+            lines.push(MethodLine {
+                noise,
+                method,
+                drives: here.len(),
+                rms: std::array::from_fn(|i| {
+                    root_mean(&mut here.iter().filter_map(|h| Some(h[i].1.optimum? - h[i].2)))
+                }),
+                bound: std::array::from_fn(|i| root_mean(&mut found.iter().map(|f| f.0[i]))),
+                coverage: (all > 0).then(|| f64::from(held as u32) / f64::from(all)),
+            });
+        }
+    }
+    Ok(lines)
+}

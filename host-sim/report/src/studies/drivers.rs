@@ -1,0 +1,195 @@
+//! Several drivers beside each other: what differs between two, and what a group is like.
+
+use std::path::Path;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_analysis::identify::{Difference, Population};
+use haptic_batch::identify::Drivers;
+
+/// Parameters that a torque record can carry.
+const SHOWN: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
+
+/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
+    let figure = figure(found);
+    write_figure(directory, "drivers", &figure)?;
+    write_json(&directory.join("results.json"), &stamped(found))?;
+    let mut blocks = vec![Block::Figure {
+        figure,
+        caption: "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval."
+            .into(),
+    }];
+    blocks.extend(tables(found).into_iter().map(Block::Table));
+    write_report(
+        directory,
+        &Report {
+            title: format!("{} drivers", found.drivers.len()),
+            summary: "Every drive is a driver of its own.".into(),
+            sections: vec![Section {
+                heading: "Drivers".into(),
+                blocks,
+            }],
+            provenance: Some(Provenance::of(None)),
+        },
+    )
+}
+
+/// The results as JSON holds them.
+pub fn stamped(found: &Drivers) -> Stamped<'_, Drivers> {
+    Provenance::of(None).stamp(found)
+}
+
+fn number(value: Option<f64>) -> Cell {
+    Cell::Number { value, decimals: 4 }
+}
+
+/// All that is found: each driver, the differences of two, the population of more.
+pub fn tables(found: &Drivers) -> Vec<Table> {
+    let mut out = vec![each(found)];
+    if !found.differences.is_empty() {
+        out.push(differences(&found.differences));
+    }
+    if !found.population.is_empty() {
+        out.push(population(&found.population));
+    }
+    out
+}
+
+fn each(found: &Drivers) -> Table {
+    let rows = found.drivers.iter().map(|(name, fit)| {
+        let list = fit.parameters.list();
+        let mut cells = vec![Cell::Text(name.clone())];
+        for wanted in SHOWN {
+            let p = list.iter().find(|l| l.0 == wanted).map(|l| l.2);
+            cells.push(number(p.and_then(|p| p.estimate)));
+            cells.push(number(p.and_then(|p| p.standard_error)));
+        }
+        let refuted = fit.refuted.first().map_or_else(String::new, |r| r.cause.clone());
+        cells.push(Cell::Text(refuted));
+        cells
+    });
+    let mut columns = vec!["Drive".to_owned()];
+    for name in SHOWN {
+        columns.extend([name.to_owned(), "+-".to_owned()]);
+    }
+    columns.push("Refuted".to_owned());
+    Table {
+        caption: "Each driver; a dash: not identified.".into(),
+        columns,
+        rows: rows.collect(),
+    }
+}
+
+fn differences(found: &[Difference]) -> Table {
+    let row = |d: &Difference| {
+        let [low, high] = d.interval_95;
+        vec![
+            Cell::Text(d.parameter.into()),
+            Cell::Text(d.unit.into()),
+            number(Some(d.difference)),
+            number(Some(d.standard_error)),
+            number(Some(low)),
+            number(Some(high)),
+            Cell::Text(if d.real { "they differ" } else { "not told apart" }.into()),
+        ]
+    };
+    Table {
+        caption: "The first driver less the second.".into(),
+        columns: [
+            "",
+            "Unit",
+            "Difference",
+            "Standard error",
+            "95 % from",
+            "to",
+            "Verdict",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: found.iter().map(row).collect(),
+    }
+}
+
+fn population(found: &[Population]) -> Table {
+    let row = |p: &Population| {
+        vec![
+            Cell::Text(p.parameter.into()),
+            Cell::Text(p.unit.into()),
+            Cell::number(p.drivers as f64, 0),
+            number(Some(p.mean)),
+            number(Some(p.mean_interval_95[0])),
+            number(Some(p.mean_interval_95[1])),
+            number(Some(p.spread)),
+            number(Some(p.spread_interval_95[0])),
+            number(Some(p.spread_interval_95[1])),
+        ]
+    };
+    Table {
+        caption: "The group: its mean, and the standard deviation between drivers (random effects).".into(),
+        columns: [
+            "",
+            "Unit",
+            "Drivers",
+            "Mean",
+            "95 % from",
+            "to",
+            "Spread",
+            "95 % from",
+            "to",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: found.iter().map(row).collect(),
+    }
+}
+
+fn figure(found: &Drivers) -> Figure {
+    let count = found.drivers.len();
+    let ends = [0.5, count as f64 + 0.5];
+    let panels = SHOWN.iter().map(|&wanted| {
+        let mut series = Vec::new();
+        if let Some(p) = found.population.iter().find(|p| p.parameter == wanted) {
+            series.push(Series::interval(
+                "mean of the group",
+                5,
+                &ends,
+                &[p.mean_interval_95; 2],
+            ));
+        }
+        let (mut points, mut intervals) = (Vec::new(), Vec::new());
+        for (i, (_, fit)) in found.drivers.iter().enumerate() {
+            let list = fit.parameters.list();
+            let p = list.iter().find(|l| l.0 == wanted).map(|l| l.2);
+            if let Some((x, interval)) = p.and_then(|p| Some((p.estimate?, p.interval_95?))) {
+                points.push(((i + 1) as f64, x));
+                intervals.push(interval);
+            }
+        }
+        series.push(Series::with_mark(
+            "own drive",
+            1,
+            Mark::Whiskers(intervals),
+            points,
+        ));
+        Panel {
+            title: wanted.to_owned(),
+            y: Axis::of(wanted),
+            series,
+        }
+    });
+    Figure {
+        x: Axis {
+            label: "Driver".into(),
+            limits: Some((0.5, count as f64 + 0.5)),
+            whole: true,
+        },
+        panels: panels.collect(),
+        ..Figure::default()
+    }
+}
