@@ -302,8 +302,10 @@ fn confirm(
             (0..u64::from(question.confirmations)).map(move |r| (number, driver, r))
         })
         .collect();
-    let mut options = Options::default();
-    options.t_nms_known = question.t_nms_known;
+    let options = Options {
+        t_nms_known: question.t_nms_known,
+        ..Options::default()
+    };
     let found = jobs
         .into_par_iter()
         .map(|(number, driver, repetition)| {
