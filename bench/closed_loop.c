@@ -16,6 +16,9 @@
  *
  * Not here: modes, envelope, monitor, noise, courses other than the paper-course.
  *
+ * With SHIPPING_ECU defined the ECU is the shipping one, linked as a library (bindings/c): only the world is then this
+ * file's, and `cargo xtask bench speed` compares it with the simulator around the same ECU.
+ *
  *   gcc -O3 -std=c11 -Wall -Wextra -o target/closed_loop bench/closed_loop.c -lm
  *   target/closed_loop --help
  */
@@ -28,6 +31,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#ifdef SHIPPING_ECU
+#include "haptic_guidance.h"
+#endif
 
 static const double TICK = 1e-3;           /* s: control period and plant step */
 static const double SPEED = 60.0 / 3.6;    /* m/s */
@@ -335,6 +341,53 @@ static inline double law_torque(const Law *l)
     return t > TORQUE_LIMIT ? TORQUE_LIMIT : t < -TORQUE_LIMIT ? -TORQUE_LIMIT : t;
 }
 
+#ifdef SHIPPING_ECU
+/* ---- the shipping ECU and its senders, with the simulator's periods ------------------------------------------------ */
+
+typedef struct {
+    hg_ecu ecu;
+    uint8_t lanes, columns, hosts;
+    double next_lane, torque;
+    long frames, rejected;
+} Shipping;
+
+static void shipping_send(Shipping *e, int32_t made, const hg_frame *f, uint32_t now_us)
+{
+    e->frames++;
+    if (made != HG_OK || hg_ecu_receive(&e->ecu, f, now_us) != HG_OK)
+        e->rejected++;
+}
+
+/* A tick: what the sensors send, the ECU's step, and the torque as the actuator reads it from the frame. */
+static double shipping_step(Shipping *e, Link *command, long k, double e_y, double e_theta, double t_d, double phi)
+{
+    const uint32_t now_us = (uint32_t)k * 1000u;
+    hg_frame f;
+    hg_step out;
+    if ((double)k * TICK >= e->next_lane) {
+        e->next_lane += 1 / LANE_RATE;
+        shipping_send(e, hg_lane_preview(e_y, e_theta, 0, 1, e->lanes++, &f), &f, now_us);
+    }
+    if (k % 2 == 0)
+        shipping_send(e, hg_column(code(t_d, T_D_LSB) * T_D_LSB, code(phi, PHI_LSB) * PHI_LSB, e->torque, e->columns++, &f),
+                      &f, now_us);
+    if (k % 10 == 0) {
+        shipping_send(e, hg_vehicle(SPEED, SPEED, e->hosts, &f), &f, now_us);
+        shipping_send(e, hg_demand(1, 1.0, 0, e->hosts++, &f), &f, now_us);
+    }
+    if (hg_ecu_step(&e->ecu, now_us, &out) != HG_OK || out.frame_count == 0)
+        return e->torque;
+    const uint8_t *b = out.frames[0].data, counter = b[1] & 15;
+    e->frames++;
+    if (b[0] == crc8(b, command->id[counter]) && counter != command->seen)
+        e->torque = (int16_t)(uint16_t)(b[1] >> 4 | b[2] << 4 | b[3] << 12) * HG_TORQUE_LSB_NM;
+    else
+        e->rejected++;
+    command->seen = counter;
+    return e->torque;
+}
+#endif
+
 /* ---- the loop ---------------------------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -364,6 +417,11 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
     Foot guide_near = foot_at(road, SPEED * GT_N), guide_far = foot_at(road, SPEED * GT_F);
     Link lane = open_link(0x11), column = open_link(0x22), command = open_link(0x5A);
     Law law = {0};
+#ifdef SHIPPING_ECU
+    Shipping shipping = {0};
+    if (hg_ecu_init(&shipping.ecu, NULL, 1, 0, NULL) != HG_OK)
+        abort();
+#endif
 
     const long delay = (long)(o->t_p / TICK + 1e-9);
     const double part = o->t_p / TICK - (double)delay > 1e-9 ? o->t_p / TICK - (double)delay : 0.0;
@@ -403,6 +461,11 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
             project(road, &guide_near, px + SPEED * GT_N * c, py + SPEED * GT_N * s);
             project(road, &guide_far, px + SPEED * GT_F * c, py + SPEED * GT_F * s);
             const double ge_y = -guide_near.offset, ge_theta = wrapped(guide_far.heading - chi);
+#ifdef SHIPPING_ECU
+            if (o->paper_sensors) {
+                torque = shipping_step(&shipping, &command, k, ge_y, ge_theta, x[T_D], x[PHI]);
+            } else
+#endif
             if (!o->paper_sensors) {
                 law_sample(&law, time, ge_y, ge_theta, 0);
                 torque = law_torque(&law);
@@ -454,6 +517,10 @@ static Result run(const Options *o, const Road *road, const Plant *plant, FILE *
         py += 0.5 * TICK * SPEED * (s_before + s);
         r.steps++;
     }
+#ifdef SHIPPING_ECU
+    r.frames += shipping.frames;
+    r.rejected += shipping.rejected;
+#endif
     return r;
 }
 

@@ -1,13 +1,19 @@
 //! Our side of the comparison with `closed_loop.c` and `closed_loop.py`: the simulator's loop with the shipping
 //! controller behind its bus, one run of the evaluation's course, timed. Prints one JSON object with the peers'
-//! field names. The road is built outside the time, as theirs is.
+//! field names. The road is built outside the time, as theirs is. `--ecu c` puts C's kind of ECU in the place of the
+//! shipping one: protected frames and the law in float64, and nothing else.
 //!
 //!     cargo run --release --example closed_loop -p haptic-guidance -- --repeat 20
 
 use std::time::Instant;
 
+use haptic_core::bus::Frame;
+use haptic_core::bus::e2e::Protection;
+use haptic_core::params::Params;
+use haptic_sim::guidance::{Actuation, Guidance, Observation};
+use haptic_sim::models::sensors;
 use haptic_sim::scenario::Scenario;
-use haptic_sim::simulation::{Run, simulate};
+use haptic_sim::simulation::{Run, Simulation, simulate};
 
 /// One run. A function of its own so that callgrind can count what is below it.
 #[inline(never)]
@@ -15,29 +21,43 @@ fn one_run(scenario: &Scenario) -> Run {
     simulate(scenario)
 }
 
+#[inline(never)]
+fn run_with_c_s_ecu(scenario: &Scenario) -> Run {
+    Simulation::with(scenario, Light::default()).run()
+}
+
+const USAGE: &str = "usage: closed_loop [--ecu shipping|c] [--repeat N], the fastest of N runs is timed";
+
 fn main() {
+    let (mut repeat, mut one_run): (u32, fn(&Scenario) -> Run) = (1, one_run);
     let mut arguments = std::env::args().skip(1);
-    let repeat = match (
-        arguments.next().as_deref(),
-        arguments.next().map(|n| n.parse::<u32>()),
-    ) {
-        (None, None) => 1,
-        (Some("--repeat"), Some(Ok(n @ 1..))) => n,
-        _ => {
-            eprintln!("usage: closed_loop [--repeat N], the fastest of N runs is timed");
-            std::process::exit(2);
+    while let Some(option) = arguments.next() {
+        match (option.as_str(), arguments.next().as_deref()) {
+            ("--repeat", Some(n)) if n.parse::<u32>().is_ok_and(|n| n > 0) => repeat = n.parse().unwrap_or(1),
+            ("--ecu", Some("shipping")) => {}
+            ("--ecu", Some("c")) => one_run = run_with_c_s_ecu,
+            _ => {
+                eprintln!("{USAGE}");
+                std::process::exit(2);
+            }
         }
-    };
+    }
     let scenario = Scenario::default();
     let _built = scenario.course().centreline();
     let mut wall_seconds = f64::INFINITY;
-    let mut steps = 0;
+    let (mut steps, mut peak_m) = (0, 0.0);
     for _ in 0..repeat {
         let start = Instant::now();
         let run = one_run(&scenario);
         wall_seconds = wall_seconds.min(start.elapsed().as_secs_f64());
         assert!(!run.diverged(), "a run that diverged is no measure");
         steps = run.steps;
+        let in_window = run
+            .trace
+            .samples
+            .iter()
+            .filter(|s| (1080.0..=1740.0).contains(&s.s_m));
+        peak_m = in_window.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max);
     }
     let simulated_seconds = f64::from(steps) * 1e-3;
     println!(
@@ -49,6 +69,157 @@ fn main() {
             "wall_seconds": wall_seconds,
             "times_real_time": simulated_seconds / wall_seconds,
             "steps": steps,
+            "peak_lateral_error_m": peak_m,
         })
     );
+}
+
+/// C's kind of ECU, as `closed_loop.c` has it: a lane frame at 120 Hz, a column frame and a torque frame each
+/// millisecond, packed, protected, checked and unpacked; the law in float64. No mode, no envelope, no monitor.
+#[derive(Debug, Clone)]
+struct Light {
+    gains: Params,
+    lane: Link,
+    column: Link,
+    command: Link,
+    law: Law,
+    torque_nm: f64,
+    /// Of the decoded column frames: their reader, so that no work is optimised away.
+    column_sum: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Link {
+    protection: Protection,
+    sent: u8,
+    seen: u8,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Law {
+    primed: bool,
+    time_s: f64,
+    errors: [f64; 2],
+    rates: [f64; 2],
+}
+
+const LSB_OF_E_Y_M: f64 = 1.0 / 8192.0;
+const LSB_OF_E_THETA_RAD: f64 = 1.0 / 65536.0;
+const LSB_OF_T_D_NM: f64 = 0.005;
+const LSB_OF_PHI_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
+const LSB_OF_T_H_NM: f64 = 0.001;
+
+impl Link {
+    fn new(constant: u8) -> Self {
+        Self {
+            protection: Protection::new(constant),
+            sent: 15,
+            seen: 15,
+        }
+    }
+
+    fn send(&mut self, [a, b]: [i16; 2]) -> Frame {
+        self.sent = (self.sent + 1) & 15;
+        let ([a0, a1], [b0, b1]) = (a.to_le_bytes(), b.to_le_bytes());
+        let mut data = [0, 0x10, a0, a1, b0, b1, 0, 0];
+        self.protection.protect(&mut data, self.sent);
+        Frame::new(0x100, &data).expect("eight bytes are a frame")
+    }
+
+    fn receive(&mut self, frame: &Frame) -> Option<[i16; 2]> {
+        let data = frame.full_data()?;
+        let counter = data[1] & 15;
+        if !self.protection.is_intact(&data) || counter == self.seen {
+            return None;
+        }
+        self.seen = counter;
+        Some([
+            i16::from_le_bytes([data[2], data[3]]),
+            i16::from_le_bytes([data[4], data[5]]),
+        ])
+    }
+}
+
+/// Rounded half away from zero, saturated.
+fn code(value: f64, lsb: f64) -> i16 {
+    let code = value / lsb;
+    (if code < 0.0 { code - 0.5 } else { code + 0.5 }) as i16
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Self {
+            gains: Params::PAPER,
+            lane: Link::new(0x11),
+            column: Link::new(0x22),
+            command: Link::new(0x5A),
+            law: Law::default(),
+            torque_nm: 0.0,
+            column_sum: 0.0,
+        }
+    }
+}
+
+impl Law {
+    fn sample(&mut self, time_s: f64, errors: [f64; 2], corner_hz: f64) {
+        let dt = time_s - self.time_s;
+        if self.primed && dt > 0.0 {
+            let w_dt = std::f64::consts::TAU * corner_hz * dt;
+            let gain = w_dt / (1.0 + w_dt);
+            for (i, rate) in self.rates.iter_mut().enumerate() {
+                *rate += gain * ((errors[i] - self.errors[i]) / dt - *rate);
+            }
+        }
+        (self.primed, self.time_s, self.errors) = (true, time_s, errors);
+    }
+
+    fn torque_nm(&self, p: &Params) -> f64 {
+        let ([e_y, e_theta], [y_rate, theta_rate]) = (self.errors, self.rates);
+        let torque = p.k_1 * (p.a_1 * e_y + p.a_2 * y_rate + p.a_3 * e_theta + p.a_4 * theta_rate);
+        torque.clamp(-p.torque_limit_nm, p.torque_limit_nm)
+    }
+}
+
+impl Guidance for Light {
+    fn looks_at_road(&self, step: u32) -> bool {
+        sensors::camera_looks(step)
+    }
+
+    #[inline]
+    fn step(&mut self, observation: &Observation) -> Actuation {
+        if let Some(errors) = observation.lane {
+            let codes = [
+                code(errors.e_y_m, LSB_OF_E_Y_M),
+                code(errors.e_theta_rad, LSB_OF_E_THETA_RAD),
+            ];
+            let frame = self.lane.send(codes);
+            if let Some([a, b]) = self.lane.receive(&frame) {
+                let seen = [f64::from(a) * LSB_OF_E_Y_M, f64::from(b) * LSB_OF_E_THETA_RAD];
+                self.law.sample(
+                    f64::from(observation.step) * 1e-3,
+                    seen,
+                    self.gains.rate_corner_hz,
+                );
+            }
+        }
+        let codes = [
+            code(observation.driver_torque_nm, LSB_OF_T_D_NM),
+            code(observation.wheel_angle_rad, LSB_OF_PHI_RAD),
+        ];
+        let frame = self.column.send(codes);
+        if let Some([a, b]) = self.column.receive(&frame) {
+            self.column_sum += f64::from(a) * LSB_OF_T_D_NM + f64::from(b) * LSB_OF_PHI_RAD;
+        }
+        let frame = self
+            .command
+            .send([code(self.law.torque_nm(&self.gains), LSB_OF_T_H_NM), 0]);
+        if let Some([a, _]) = self.command.receive(&frame) {
+            self.torque_nm = f64::from(a) * LSB_OF_T_H_NM;
+        }
+        // The sum keeps its reader; it is never a thousand million.
+        Actuation {
+            torque_nm: self.torque_nm,
+            limited: self.column_sum.abs() > 1e12,
+        }
+    }
 }

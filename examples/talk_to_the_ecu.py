@@ -81,7 +81,7 @@ class Vehicle:
             # The driver holds the wheel straight against the guidance, and the motor delivers what it is told.
             return {"DriverTorque": -self.torque, "WheelAngle": 0, "MotorTorque": self.torque}
         if name == "Vehicle":
-            return {"Speed1": SPEED, "Speed2": SPEED}
+            return {"Speed1": SPEED, "Speed2": SPEED, "YawRate": 0, "YawRateValid": 1}
         return {"Engage": int(self.engage), "Authority": 1, "Probe": 0}
 
 

@@ -2,18 +2,52 @@
 
 use std::collections::BTreeSet;
 
+use haptic_campaign::campaign::{FailedBy, FailedTrial};
 use haptic_campaign::table::{FaultCase, Place, rows};
 use haptic_campaign::{World, campaign, document};
+use haptic_sim::worlds::WORLDS;
+
+/// Rows that the vehicle fails today: a handover that starts from what a lie made, which no check has yet told from the
+/// truth. docs/safety.md names them as known limits.
+const GOES_TOO_FAR: &[&str] = &[];
 
 #[test]
-fn every_fault_with_a_few_seeds_breaks_no_rule() {
+fn every_fault_with_a_few_seeds_breaks_no_rule_and_no_handover_is_worse_than_a_drop() {
     let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
     let campaign = campaign::run(&World::new(), &here, 1..5, || ());
-    let failed: Vec<_> = campaign.failures().collect();
+    let known = |f: &&FailedTrial| f.by == FailedBy::Vehicle && GOES_TOO_FAR.contains(&f.row);
+    let failed: Vec<_> = campaign.failures().filter(|f| !known(f)).collect();
     assert!(failed.is_empty(), "{failed:#?}");
-    // Four runs of 4.7 to 6.2 s each; a step every millisecond but for the faults of time.
-    let least = here.len() as u64 * 4 * 4700;
+    // Four runs of 6.7 to 10.7 s each; a step every millisecond but for the faults of time.
+    let least = here.len() as u64 * 4 * 6700;
     assert!(campaign.cycles > least * 9 / 10, "{} cycles", campaign.cycles);
+}
+
+/// The vehicle is really looked at: with nothing wrong it goes where its twin goes, and a guidance that is lost moves it.
+#[test]
+fn the_vehicle_is_judged_against_its_twin() {
+    let by_name = |name: &str| rows().find(|row| row.name == name).expect("a row of the table");
+    let campaign = campaign::run(
+        &World::new(),
+        &[by_name("counter-wrap"), by_name("jerk"), by_name("brown-out")],
+        1..7,
+        || (),
+    );
+    let [honest, jerked, lost] = &campaign.rows[..] else {
+        panic!("three rows");
+    };
+    assert_eq!((honest.deviation_m, jerked.deviation_m), (0.0, 0.0));
+    assert!(lost.deviation_m > 0.1, "{lost:?}");
+}
+
+/// In a real world every rule of every cycle holds as well.
+#[test]
+fn no_rule_breaks_where_roads_and_cars_are_real() {
+    let world = WORLDS.iter().find(|world| world.name == "everything").unwrap();
+    let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
+    let campaign = campaign::run(&World::real(world), &here, 1..2, || ());
+    let failed: Vec<_> = campaign.failures().filter(|f| f.by == FailedBy::Ecu).collect();
+    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 /// A campaign that cannot see its faults would pass as well: a fault that is declared must be seen often enough.
@@ -29,10 +63,15 @@ fn contradictions_are_seen() {
         "lateral-error-flipped",
         "yaw-error-flipped",
         "all-frozen",
-        "motor-half",
     ] {
         assert!(seen(name) >= 8, "{name}: {} of 10", seen(name));
     }
+    // Half of the onsets lie on a straight, where there is no torque to halve.
+    assert!(
+        seen("motor-half") >= 4,
+        "motor-half: {} of 10",
+        seen("motor-half")
+    );
 }
 
 /// The list that a controller has to survive: each of its entries is a row of the table.

@@ -52,7 +52,10 @@ const PACKAGES: Arrows = &[
     ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
     ("bindings/c", &["haptic-core"]),
-    ("bindings/fmu", &["haptic-core"]),
+    // Driver and vehicle are the simulator's.
+    ("bindings/fmu", &["haptic-core", "haptic-sim"]),
+    // The loop and the identification in a page.
+    ("bindings/web", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
     // The parts that Python hands out; no injector, no serial port, no charts.
     ("bindings/python", &["haptic-analysis", "haptic-batch", "haptic-core", "haptic-log", "haptic-sim"]),
 ];
@@ -305,6 +308,8 @@ const LONGEST: usize = 350;
 const LONGER: &[(&str, &str)] = &[
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("bindings/fmu/src/fmi2.rs", "one C interface, function by function"),
+    ("bindings/fmu/src/fmi3.rs", "one C interface, function by function"),
+    ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
     ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),

@@ -11,11 +11,12 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Message, Vehicle, WriteOutcome};
+use haptic_core::bus::messages::{Identity, Message, Vehicle, WriteOutcome};
 use haptic_core::bus::slcan;
 use haptic_core::download;
 use haptic_core::params::Params;
 use haptic_core::quantity::Speed;
+use haptic_target::live::{Listener, View};
 use haptic_target::parameters::Product;
 use machine::{Machine, image};
 
@@ -66,6 +67,7 @@ const SETTLES_WITHIN: usize = 11;
 fn send(machine: &mut Machine, params: &Params, in_use: u32, without: Option<usize>) {
     let standing = Vehicle {
         speeds: [Speed::ZERO; 2],
+        yaw_rate: None,
     };
     for counter in 0..5 {
         machine.send(&slcan::format(&standing.encode(counter)));
@@ -83,7 +85,7 @@ fn send(machine: &mut Machine, params: &Params, in_use: u32, without: Option<usi
         }
         machine.send(&slcan::format(frame));
     };
-    send_standing(&download::unlock(in_use));
+    send_standing(&download::unlock(in_use, 0));
     for (index, frame) in download::frames(params).iter().enumerate() {
         if without != Some(index) {
             send_standing(frame);
@@ -152,7 +154,8 @@ fn the_workbench_stores_a_set_over_a_serial_adapter() {
     let mut qemu = Command::new("qemu-system-arm")
         .args(["-machine", BOARD, "-display", "none", "-monitor", "none"])
         .args(["-serial", "pty", "-serial", "null"])
-        .args(["-icount", "shift=5,sleep=off"])
+        // Its client has a clock of its own, and the machine must not run ahead of that while it sleeps.
+        .args(["-icount", "shift=5,sleep=on"])
         .args(["-semihosting-config", "enable=on,target=native"])
         .arg("-kernel")
         .arg(image(BOARD, "steering-ecu"))
@@ -175,22 +178,49 @@ fn the_workbench_stores_a_set_over_a_serial_adapter() {
         torque_limit_nm: 3.0,
         ..Params::PAPER
     };
-    let status = product.store(&softer).unwrap();
+    let status = product.store(&softer, 654_321).unwrap();
     assert_eq!((status.stored, status.damaged, status.sequence), (true, false, 1));
+    // QEMU's machines have no number of their own.
+    assert_eq!(
+        product.identity().unwrap(),
+        Identity {
+            vehicle: 654_321,
+            hardware: 0
+        }
+    );
     // As the bus rounds it: 3 is a binary32.
     assert_eq!(product.values().unwrap().torque_limit_nm, 3.0);
     // Not within ten seconds of the restart, lest somebody wears the flash out.
-    let too_soon = product.store(&softer).unwrap_err().to_string();
+    let too_soon = product.store(&softer, 654_321).unwrap_err().to_string();
     assert!(too_soon.contains("ten seconds after a reset"), "{too_soon}");
     // Not even sent: the ECU's answer would be "out of range".
     let too_much = Params {
         torque_limit_nm: 5.5,
         ..Params::PAPER
     };
-    assert!(product.store(&too_much).is_err());
+    assert!(product.store(&too_much, 0).is_err());
     assert_eq!(product.status().unwrap().outcome, WriteOutcome::TooSoon);
+    listen(Listener::after(product));
     qemu.kill().unwrap();
     qemu.wait().unwrap();
+}
+
+/// An ECU that nobody else talks to any more waits, and says what it misses.
+fn listen(mut listener: Listener) {
+    let mut view = View::default();
+    let mut changes = Vec::new();
+    for _ in 0..5000 {
+        let frame = listener.frame().unwrap();
+        if let Some(frame) = frame {
+            changes.extend(view.take(0.0, &frame));
+        }
+    }
+    assert_eq!(changes[0], "mode Standby, last start: NewParameters");
+    let status = view.status();
+    assert_eq!((status.torque_nm, status.warning), (Some(0.0), false));
+    assert_eq!(status.speed_m_per_s, None, "nobody sends one");
+    assert!(status.faults.contains(&"SpeedTimeout".to_owned()), "{status:?}");
+    assert_eq!((view.counts().damaged, view.counts().foreign), (0, 0));
 }
 
 /// The image cuts the supply of its flash at every number of operations, resets, and looks (`power_loss.rs`).

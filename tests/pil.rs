@@ -11,7 +11,7 @@ use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::ecu::Boot;
 use haptic_core::params::Params;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_lockstep::{Start, StartState};
 use haptic_target::{Channel, Machine, Pil, PilError, Report, Target, image};
 
@@ -79,7 +79,13 @@ impl World {
         }
         if k.is_multiple_of(10) {
             let speeds = [Speed::from_m_per_s(Self::SPEED_M_PER_S); 2];
-            frames.push(Vehicle { speeds }.encode((k / 10) as u8));
+            frames.push(
+                Vehicle {
+                    speeds,
+                    yaw_rate: Some(TurningRate::ZERO),
+                }
+                .encode((k / 10) as u8),
+            );
             let demand = Demand {
                 engage: in_cycle > 2500,
                 authority: Ratio::from_si(1.0),

@@ -165,6 +165,7 @@ fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
         frames.push(
             Vehicle {
                 speeds: [Speed::from_m_per_s(20.0); 2],
+                yaw_rate: None,
             }
             .encode((k / 10) as u8),
         );

@@ -1,20 +1,86 @@
-"""The FMU, checked by FMPy: its description is valid, it gives the torques of the library for the same samples, bit for
-bit, its state can be taken and given back, and what it refuses leaves it as it was.
+"""The FMUs, checked by FMPy, those of FMI 2.0 and of FMI 3.0: their descriptions are valid; the controller gives the torques
+of the library for the same samples, bit for bit; a state can be taken and given back; what is refused leaves everything as it
+was; controller, driver and vehicle coupled drive as `host-sim run` does.
 
-    check.py FMU
+    check.py DIRECTORY RUN_CSV
 """
 
+import csv
 import sys
+from pathlib import Path
 
 import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 import haptic_guidance as hg
 
+MODELS = ("HapticController", "HapticDriver", "HapticVehicle")
 INPUTS = ("e_y_m", "e_theta_rad", "driver_torque_nm", "wheel_angle_rad", "motor_torque_nm", "speed_m_per_s")
 STEPS = 5000
+# The worst that coupling by held values may cost, m.
+WITHIN_M = 1e-3
+
+
+class Unit:
+    """One FMU of either standard, by names."""
+
+    def __init__(self, path, **parameters):
+        description = read_model_description(path)
+        self.references = {v.name: v.valueReference for v in description.modelVariables}
+        self.new = description.fmiVersion.startswith("3")
+        arguments = dict(
+            guid=description.guid,
+            unzipDirectory=extract(path),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=description.modelName,
+        )
+        self.fmu = (FMU3Slave if self.new else FMU2Slave)(**arguments)
+        self.fmu.instantiate()
+        for name, value in parameters.items():
+            (self.turn if isinstance(value, bool) else self.put)(**{name: value})
+        if not self.new:
+            self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def get(self, *names):
+        get = self.fmu.getFloat64 if self.new else self.fmu.getReal
+        return get([self.references[name] for name in names])
+
+    def code(self, name):
+        return (self.fmu.getInt32 if self.new else self.fmu.getInteger)([self.references[name]])[0]
+
+    def put(self, **values):
+        put = self.fmu.setFloat64 if self.new else self.fmu.setReal
+        put([self.references[name] for name in values], list(values.values()))
+
+    def turn(self, **values):
+        self.fmu.setBoolean([self.references[name] for name in values], list(values.values()))
+
+    def step(self, k, step_s=1e-3):
+        self.fmu.doStep(k * 1e-3, step_s)
+
+    def state(self):
+        return self.fmu.getFMUState()
+
+    def go_to(self, state):
+        self.fmu.setFMUState(state)
+        self.fmu.freeFMUState(state)
+
+    def end(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+def refused(call):
+    try:
+        call()
+    except Exception as error:
+        return True
+    return False
 
 
 def samples():
@@ -24,36 +90,8 @@ def samples():
     return zip(e_y, e_theta, 0.1 * np.sin(5 * t), 0.005 * np.sin(5 * t))
 
 
-def begin(fmu):
-    description = read_model_description(fmu)
-    references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    unit = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(fmu),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="controller",
-    )
-    unit.instantiate()
-    unit.setupExperiment(startTime=0.0)
-    unit.enterInitializationMode()
-    unit.exitInitializationMode()
-    return unit, references
-
-
-def refused(call):
-    try:
-        call()
-    except Exception as error:
-        return "fmi2Error" in str(error) or "status 3" in str(error)
-    return False
-
-
-def main(fmu):
-    problems = validate_fmu(fmu)
-    assert not problems, problems
-    unit, references = begin(fmu)
-    reals = [references[name] for name in INPUTS]
-    torque = [references["torque_nm"]]
+def controller(path):
+    unit = Unit(path)
     ecu, bus = hg.Ecu(), hg.Bus()
     torque_nm, modes, differing = 0.0, set(), 0
     for k, (e_y, e_theta, driver, wheel) in enumerate(samples()):
@@ -61,26 +99,90 @@ def main(fmu):
         values = dict(zip(INPUTS, (e_y, e_theta, driver, wheel, torque_nm, 16.5)))
         for frame in bus.frames(1000 * k, **values, engage=engage):
             ecu.receive(*frame, 1000 * k)
-        unit.setReal(reals, list(values.values()))
-        unit.setBoolean([references["engage"]], [engage])
-        unit.doStep(k * 1e-3, 1e-3)
+        unit.put(**values)
+        unit.turn(engage=engage)
+        unit.step(k)
         torque_nm = ecu.step(1000 * k).torque_nm
-        differing += unit.getReal(torque)[0] != torque_nm
-        modes.add(unit.getInteger([references["mode"]])[0])
+        differing += unit.get("torque_nm")[0] != torque_nm
+        modes.add(unit.code("mode"))
         if k == STEPS // 2:
-            state, then = unit.getFMUState(), unit.getReal(torque)
+            state, then = unit.state(), unit.get("torque_nm")
     assert differing == 0 and modes >= {1, 2}, (differing, modes)
-    unit.setFMUState(state)
-    assert unit.getReal(torque) == then
-    unit.freeFMUState(state)
-    before = unit.getReal(reals)
-    assert refused(lambda: unit.setReal(reals[:2], [0.05, float("nan")]))
-    assert refused(lambda: unit.doStep(0.0, 0.0005)), "no multiple of 1 ms"
-    assert refused(lambda: unit.setReal([references["k_1"]], [0.3])), "a parameter after the start"
-    assert unit.getReal(reals) == before and unit.getReal(torque) == then
-    unit.terminate()
-    unit.freeInstance()
-    print(f"fmpy validate: no problem; {STEPS} torques, {differing} differ from the library's; state and refusals hold")
+    unit.go_to(state)
+    assert unit.get("torque_nm") == then
+    before = unit.get(*INPUTS)
+    assert refused(lambda: unit.put(e_y_m=0.05, e_theta_rad=float("nan")))
+    assert refused(lambda: unit.step(0, 0.0005)), "no multiple of 1 ms"
+    assert refused(lambda: unit.put(k_1=0.3)), "a parameter after the start"
+    assert refused(lambda: unit.put(torque_nm=1.0)), "an output"
+    assert refused(lambda: unit.turn(e_y_m=True)), "another type"
+    assert unit.get(*INPUTS) == before and unit.get("torque_nm") == then
+    unit.end()
+    return differing
 
 
-main(sys.argv[1])
+def coupled(directory, ending, until_s):
+    """Lateral errors every 5 ms of the three, each step under what the others had at its start."""
+    path = lambda model: directory / f"{model}.{ending}"
+    vehicle = Unit(path("HapticVehicle"))
+    driver = Unit(path("HapticDriver"), **DRIVER)
+    guidance = Unit(path("HapticController"), engaged_at_start=True)
+    guidance.turn(engage=True)
+    errors, half = [], None
+    for k in range(int(until_s * 1000)):
+        seen = vehicle.get(
+            "e_y_m", "e_theta_rad", "guidance_e_y_m", "guidance_e_theta_rad", "wheel_angle_rad", "column_torque_nm",
+            "motor_torque_nm", "speed_m_per_s", "lateral_error_m",
+        )
+        e_y, e_theta, near, far, wheel, column, motor, speed, lateral = seen
+        if k % 5 == 0:
+            errors.append(lateral)
+        torque = guidance.get("torque_nm")[0]
+        guidance.put(
+            e_y_m=near, e_theta_rad=far, driver_torque_nm=column, wheel_angle_rad=wheel, motor_torque_nm=motor,
+            speed_m_per_s=speed,
+        )
+        driver.put(e_y_m=e_y, e_theta_rad=e_theta, wheel_angle_rad=wheel, guidance_torque_nm=torque)
+        vehicle.put(driver_torque_nm=driver.get("driver_torque_nm")[0], guidance_torque_nm=torque)
+        for unit in (guidance, driver, vehicle):
+            unit.step(k)
+        if k == 2000:
+            half = [(unit, unit.state(), unit.get("time")[0] if unit.new else None) for unit in (vehicle, driver, guidance)]
+    after = [vehicle.get("e_y_m")[0], driver.get("driver_torque_nm")[0]]
+    for unit, state, time in half:
+        unit.go_to(state)
+        assert time is None or unit.get("time")[0] == time == 2.001
+    assert [vehicle.get("e_y_m")[0], driver.get("driver_torque_nm")[0]] != after
+    assert refused(lambda: vehicle.step(0, 3600.0)), "past the end of the course"
+    for unit in (vehicle, driver, guidance):
+        unit.end()
+    return np.array(errors)
+
+
+def main(directory, run_csv):
+    for ending in ("fmu", "fmi3.fmu"):
+        for model in MODELS:
+            problems = validate_fmu(str(directory / f"{model}.{ending}"))
+            assert not problems, (model, ending, problems)
+        differing = controller(directory / f"HapticController.{ending}")
+        print(f"{ending}: fmpy validate: no problem in {', '.join(MODELS)}; controller: {STEPS} torques, {differing} differ "
+              "from the library's; state and refusals hold")
+    with open(run_csv) as file:
+        rows = list(csv.DictReader(file))
+    expected = np.array([float(row["lateral_error_m"]) for row in rows])
+    # The first bend, into it and out of it.
+    until_s = min(105.0, float(rows[-1]["time_s"]))
+    runs = [coupled(directory, ending, until_s) for ending in ("fmu", "fmi3.fmu")]
+    assert np.array_equal(*runs), "FMI 2.0 and 3.0 differ"
+    rows = min(len(runs[0]), len(expected))
+    apart = np.abs(runs[0][:rows] - expected[:rows])
+    print(f"coupled: {rows / 200:.1f} s, lateral error at most {apart.max() * 1e3:.3f} mm from host-sim's, which reaches "
+          f"{np.abs(expected).max() * 1e3:.1f} mm; FMI 2.0 and 3.0 the same bits")
+    assert apart.max() < WITHIN_M and rows / 200 > 60
+
+
+# Those of the scenario of `cargo xtask fmu`.
+DRIVER = dict(t_p_s=0.3, k_d_nm_per_rad=3.0, k_hg=0.5)
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2])

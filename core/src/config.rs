@@ -19,10 +19,11 @@ use crate::params::{ParamError, Params, in_range};
 use crate::plausibility::Plausibility;
 use crate::probe::Probe;
 use crate::quantity::{
-    AngularImpulse, CurvaturePerAngle, Metres, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    AngularImpulse, CurvaturePerAngle, Metres, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
     TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::redundant::words;
+use crate::schedule::Schedule;
 
 words! {
     /// The checked configuration of every block of the controller.
@@ -37,12 +38,18 @@ words! {
         pub least_speed: Speed,
         /// The probe.
         pub probe: Probe,
+        /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
+        pub schedule: Schedule,
     }
 }
 
 /// Largest product K_1*a', in N.m per unit: keeps the law's wide sum inside an `i64`.
 const MAX_GAIN: f64 = 32.0;
 const PROBE_SLOPE: &str = "2 * pi * probe_amplitude_nm * probe_frequency_hz";
+/// Half the monitor's band, N.m: at least, and at most. As wide as the absolute limit it would guard nothing.
+const LEAST_BAND_NM: f64 = 0.3;
+const MOST_BAND_NM: f64 = 5.0;
+const BAND: &str = "the monitor's band for k_1 * (a_1, a_2, a_3, a_4) at rate_corner_hz";
 /// Steepest slope of the probe, N.m/s.
 const MAX_PROBE_SLOPE: f64 = 3.5;
 
@@ -105,6 +112,8 @@ impl Config {
                 aligning_gain: TorquePerAcceleration::from_nm_s2_per_m(v.aligning_gain_nm_s2_per_m),
                 column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
                 far_time: Seconds::from_s(v.far_time_s),
+                near_time: Seconds::from_s(v.near_time_s),
+                between: Micros::from_us((f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32),
                 lane_margin: Metres::from_m(0.4),
                 column_margin: AngularImpulse::from_nm_s(0.6),
             },
@@ -113,6 +122,7 @@ impl Config {
                 amplitude: Torque::from_nm(p.probe_amplitude_nm),
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
+            schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
         }
     }
 }
@@ -120,6 +130,22 @@ impl Config {
 /// 2^32 turns for each second's 10^6 microseconds.
 const fn phase_per_us(frequency_hz: f64) -> u32 {
     (frequency_hz * 4_294.967_296 + 0.5) as u32
+}
+
+/// Half the monitor's band, N.m: how far an honest law may be from the monitor's coarse one. Both take rates from the
+/// same samples, the law with its filter, the monitor over 50 to 60 ms, so that they differ by the change of a rate
+/// times the difference of their delays: the errors' second derivatives are up to 4 m/s2 and 1 rad/s2 on a road. Noise
+/// of 15 mm and 1.5 mrad, three times what a camera has, moves the law's rates by its share of a sample.
+const fn monitor_band_nm(p: &Params) -> f64 {
+    let tau_s = 1.0 / (2.0 * core::f64::consts::PI * p.rate_corner_hz);
+    let apart_s = if tau_s > 0.04 { tau_s - 0.02 } else { 0.06 - tau_s };
+    let noise_per_s = 1.5 / (tau_s + 1.0 / 120.0);
+    let a_rate = p.k_1 * p.a_2 * (4.0 * apart_s + 0.015 * noise_per_s);
+    let theta_rate = p.k_1 * p.a_4 * (apart_s + 0.001_5 * noise_per_s);
+    // A sample that is 30 ms old goes on at rates that differ by as much.
+    let ahead = 0.03 * p.k_1 * (p.a_1 * 4.0 + p.a_3) * apart_s;
+    let carried = 0.03 * p.k_1 * (p.a_1 * 1.5 + p.a_3 * 0.3);
+    f64::max(LEAST_BAND_NM, 2.0 * (a_rate + theta_rate + ahead) + carried)
 }
 
 /// Everything that parameters decide: the controller's configuration, the monitor's and the estimator's.
@@ -146,8 +172,13 @@ impl Setup {
     /// # Errors
     /// The first parameter that is not a number within its range.
     pub const fn new(p: &Params) -> Result<Self, ParamError> {
-        match Config::new(p) {
-            Ok(config) => Ok(Self {
+        let config = match Config::new(p) {
+            Ok(config) => config,
+            Err(error) => return Err(error),
+        };
+        // Gains that an honest law may use and the monitor cannot follow contradict each other.
+        match in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m") {
+            Ok(()) => Ok(Self {
                 config,
                 monitor: Monitor::new(p),
                 estimator: Estimator::new(p),
@@ -189,6 +220,8 @@ impl Monitor {
         Self {
             limit_mnm: (p.torque_limit_nm * 1e3 + 0.5) as i32,
             growth_mnm_per_ms: (p.wind_up_nm_per_s + 0.999) as i32,
+            fall_mnm_per_ms: (p.reduction_nm_per_s + 0.999) as i32,
+            band_mnm: (monitor_band_nm(p) * 1e3 + 0.5) as i32,
             probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
             gains_mnm: [
                 (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,

@@ -8,12 +8,14 @@ mod step;
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason};
 use crate::faults::{Fault, FaultSet};
+use crate::hands::HandsState;
 use crate::injection::{Injection, NoInjection};
 use crate::law::{LaneSample, LawState};
 use crate::modes::Mode;
+use crate::past::Past;
 use crate::plausibility::PlausibilityState;
 use crate::probe::ProbeState;
-use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque};
+use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use crate::ramp::{History, Ramp};
 use crate::redundant::{Redundant, words};
 use step::{Step, without};
@@ -62,6 +64,37 @@ words! {
     }
 }
 
+words! {
+    /// How the vehicle moves, as its own sensors have it.
+    #[derive(Default)]
+    pub struct Motion {
+        /// Two sources of its speed.
+        pub speeds: [Speed; 2],
+        /// The measured yaw rate; counts only where there is one.
+        pub yaw_rate: TurningRate,
+        /// 1 where there is a measured yaw rate.
+        pub has_yaw_rate: u32,
+    }
+}
+
+impl Motion {
+    /// Speeds, and the yaw rate if it is measured.
+    #[must_use]
+    pub fn new(speeds: [Speed; 2], yaw_rate: Option<TurningRate>) -> Self {
+        Self {
+            speeds,
+            yaw_rate: yaw_rate.unwrap_or(TurningRate::ZERO),
+            has_yaw_rate: u32::from(yaw_rate.is_some()),
+        }
+    }
+
+    /// The yaw rate, if it is measured.
+    #[must_use]
+    pub fn yaw_rate(&self) -> Option<TurningRate> {
+        (self.has_yaw_rate != 0).then_some(self.yaw_rate)
+    }
+}
+
 /// What the host requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
@@ -80,10 +113,12 @@ pub struct Inputs {
     pub lane: Input<LaneSample>,
     /// The column's sensors.
     pub column: Input<Column>,
-    /// Two sources of the vehicle's speed.
-    pub speeds: Input<[Speed; 2]>,
+    /// Two sources of the vehicle's speed, and its yaw rate.
+    pub motion: Input<Motion>,
     /// What the host requests.
     pub request: Input<Request>,
+    /// The new lane sample is of another line than the last.
+    pub line_moved: bool,
     /// Faults found outside: on the bus, by the monitor, at the output.
     pub faults: FaultSet,
 }
@@ -118,6 +153,9 @@ words! {
         age: Ages,
         /// [`Fault`] bits of inputs that were implausible when last new.
         implausible: u32,
+        /// The rate of turn when the last lane sample was true, and what the vehicle has turned since.
+        rate_then: TurningRate,
+        turned: Radians,
         last_step: Instant,
         /// Late and early steps in a row.
         late: u32,
@@ -127,6 +165,7 @@ words! {
         law: LawState,
         envelope: EnvelopeState,
         plausibility: PlausibilityState,
+        hands: HandsState,
         ramp: Ramp,
         probe: ProbeState,
         /// The part of the torque applied that is the probe.
@@ -159,6 +198,8 @@ impl Memory {
                 request: NONE,
             },
             implausible: 0,
+            rate_then: TurningRate::ZERO,
+            turned: Radians::ZERO,
             last_step: now,
             late: 0,
             early: 0,
@@ -166,6 +207,7 @@ impl Memory {
             law: LawState::NEW,
             envelope: EnvelopeState::new(now),
             plausibility: PlausibilityState::NEW,
+            hands: HandsState::NEW,
             ramp: Ramp::NONE,
             probe: ProbeState::SILENT,
             probe_applied: Torque::ZERO,
@@ -182,6 +224,7 @@ impl Memory {
 pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
     history: History,
+    past: Past,
 }
 
 impl ControllerState {
@@ -201,6 +244,7 @@ impl ControllerState {
         Self {
             memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),
+            past: Past::new(),
         }
     }
 
@@ -269,7 +313,7 @@ impl Controller {
         let Some(config) = self.config.get() else {
             return state.lose_memory(now);
         };
-        let history = &mut state.history;
+        let (history, past) = (&mut state.history, &mut state.past);
         let command = state.memory.change(|memory| {
             let step = Step {
                 config,
@@ -280,7 +324,7 @@ impl Controller {
                 injection,
             };
             memory.last_step = now;
-            step.run(memory, history)
+            step.run(memory, history, past)
         });
         let Some(command) = command else {
             return state.lose_memory(now);

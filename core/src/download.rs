@@ -21,7 +21,7 @@ use crate::config::Config;
 use crate::faults::{Fault, FaultSet};
 use crate::modes::Mode;
 use crate::params::{PARAMETERS, Params};
-use crate::stored::Stored;
+use crate::stored::{Set, Stored};
 
 const VALUES: usize = PARAMETERS.len();
 /// No field has this index.
@@ -55,10 +55,14 @@ pub fn mode_for_parameters(mode: Mode, faults: FaultSet) -> Mode {
     }
 }
 
-/// The frame that has to come before those of a set.
+/// The frame that has to come before those of a set for the vehicle of that number.
 #[must_use]
-pub fn unlock(in_use: u32) -> Frame {
-    ParameterUnlock { sequence: in_use }.encode(0)
+pub fn unlock(in_use: u32, vehicle: u32) -> Frame {
+    let unlock = ParameterUnlock {
+        vehicle,
+        sequence: in_use,
+    };
+    unlock.encode(0)
 }
 
 /// The value that is due at a turn, of the set in use.
@@ -98,8 +102,9 @@ pub struct Download {
     values: [f64; VALUES],
     /// The field that must come next.
     next: usize,
-    /// When it was unlocked.
+    /// When it was unlocked, and for a set for which vehicle.
     unlocked_ms: Option<u32>,
+    vehicle: u32,
     outcome: WriteOutcome,
 }
 
@@ -109,17 +114,19 @@ impl Download {
         values: [0.0; VALUES],
         next: 0,
         unlocked_ms: None,
+        vehicle: 0,
         outcome: WriteOutcome::None,
     };
 
     /// Takes a frame. Returns the set that it completes, every parameter within its range. Other messages, and frames
     /// that are damaged on the way, are ignored.
-    pub fn receive(&mut self, frame: &Frame, conditions: &Conditions) -> Option<Params> {
+    pub fn receive(&mut self, frame: &Frame, conditions: &Conditions) -> Option<Set> {
         match frame.id() {
             ParameterUnlock::ID => {
                 let unlock = ParameterUnlock::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
                 let is_right = unlock.sequence == conditions.in_use;
                 self.unlocked_ms = is_right.then_some(conditions.now_ms);
+                self.vehicle = unlock.vehicle;
                 return None;
             }
             ParameterWrite::ID => {}
@@ -169,7 +176,10 @@ impl Download {
         } else {
             WriteOutcome::OutOfRange
         };
-        is_good.then_some(params)
+        is_good.then_some(Set {
+            params,
+            vehicle: self.vehicle,
+        })
     }
 
     /// What the bus is told: the set in use, whether a copy of it cannot be read, and what became of the last one

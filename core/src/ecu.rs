@@ -7,6 +7,7 @@ mod receivers;
 
 use heapless::Vec;
 
+use crate::actuator::Motor;
 use crate::background::Background;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
@@ -177,7 +178,9 @@ impl Ecu {
         // One whose limits are damaged permits nothing.
         let monitor = self.monitor.get();
         let mut faults = FaultSet::from_bits(v.faults);
-        faults.insert_if(!self.receivers.actuator.obeys(v.applied), Fault::Actuator);
+        let motor = self.receivers.actuator.judge(v.applied);
+        faults.insert_if(motor == Motor::Astray, Fault::Actuator);
+        faults.set(motor == Motor::Weak, Fault::MotorWeak);
         faults.insert_if(
             steps % SELF_TEST == 1 && !passes_self_test(monitor, steps / SELF_TEST, injection),
             Fault::SelfTest,
@@ -254,8 +257,9 @@ impl Ecu {
         let inputs = Inputs {
             lane: Input::Lost,
             column: Input::Lost,
-            speeds: Input::Lost,
+            motion: Input::Lost,
             request: Input::Lost,
+            line_moved: false,
             faults: FaultSet::NONE,
         };
         (Memory::new(faults, now), inputs)

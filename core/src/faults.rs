@@ -10,6 +10,8 @@ use crate::quantity::{Instant, Micros};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Class {
+    /// The guidance has to end, and nothing is wrong with the ECU: the torque fades.
+    A,
     /// An input failed: the torque is handed over.
     B,
     /// The computation, memory, timing or output failed: no torque until the next power-up.
@@ -18,18 +20,11 @@ pub enum Class {
     Locked,
 }
 
-/// Since when an input has been wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Since {
-    /// Its age says so, or it does not matter.
-    Known,
-    /// It arrives, but cannot be true: nobody knows since when.
-    Unknown,
-}
-
-/// Declares the faults: `code Name: class, since when;`. The code is the fault's bit in the fault word.
+/// Declares the faults: `code Name: class, unseen;`. The code is the fault's bit in the fault word. *Unseen*, in ms, is for
+/// how long before its declaration the fault may have been there and spoilt the torque, beside the age of its input: no
+/// handover starts from an output of that time. 0 where the age says it all, or where the torque does not depend on it.
 macro_rules! faults {
-    ($($(#[$doc:meta])* $code:literal $name:ident: $class:ident, $since:ident;)*) => {
+    ($($(#[$doc:meta])* $code:literal $name:ident: $class:ident, $unseen_ms:literal;)*) => {
         /// A fault, by its bit in the fault word. More will come.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         #[repr(u8)]
@@ -53,9 +48,11 @@ macro_rules! faults {
                 }
             }
 
-            const fn since(self) -> Since {
+            /// For how long it may have been there before it is declared, beside the age of its input.
+            #[must_use]
+            pub const fn unseen(self) -> Micros {
                 match self {
-                    $(Self::$name => Since::$since,)*
+                    $(Self::$name => Micros::from_ms($unseen_ms),)*
                 }
             }
 
@@ -73,41 +70,45 @@ macro_rules! faults {
 
 faults! {
     /// B: no usable lane preview for 30 ms.
-    0 LaneTimeout: B, Known;
+    0 LaneTimeout: B, 0;
     /// B: the lane preview's sender does not vouch for it.
-    1 LaneInvalid: B, Known;
+    1 LaneInvalid: B, 0;
     /// B: the lateral error does not move as yaw error, wheel and speed say it must.
-    2 LaneImplausible: B, Unknown;
+    2 LaneImplausible: B, 2000;
     /// B: no usable driver torque and wheel angle for 30 ms.
-    3 ColumnTimeout: B, Known;
+    3 ColumnTimeout: B, 0;
     /// B: driver torque and wheel angle do not belong together.
-    4 ColumnImplausible: B, Unknown;
+    4 ColumnImplausible: B, 1500;
     /// B: no usable speed for 30 ms.
-    5 SpeedTimeout: B, Known;
+    5 SpeedTimeout: B, 0;
     /// B: the two speeds differ by 2 m/s or more.
-    6 SpeedImplausible: B, Unknown;
+    6 SpeedImplausible: B, 500;
     /// B: no usable command for 30 ms.
-    7 CommandTimeout: B, Known;
+    7 CommandTimeout: B, 0;
     /// C: steps late or missing.
-    8 Deadline: C, Known;
+    8 Deadline: C, 0;
     /// C: the monitor disagreed with a command.
-    9 Monitor: C, Known;
+    9 Monitor: C, 0;
     /// C: the two copies of a redundant state differ.
-    10 Memory: C, Known;
-    /// C: the torque delivered is not the torque commanded.
-    11 Actuator: C, Known;
+    10 Memory: C, 0;
+    /// C: a torque is delivered that was not commanded.
+    11 Actuator: C, 0;
     /// C: the monitor passed a command that it has to refuse.
-    12 SelfTest: C, Known;
+    12 SelfTest: C, 0;
     /// Locked: no good copy of the parameters.
-    13 Parameters: Locked, Known;
+    13 Parameters: Locked, 0;
     /// Locked: three resets within 10 s, or ten since power-up.
-    14 ResetLoop: Locked, Known;
+    14 ResetLoop: Locked, 0;
     /// B: lane previews arrive, and for 30 ms each is too far from the last one used to be true.
-    15 LaneStep: B, Known;
+    15 LaneStep: B, 0;
     /// B: speeds arrive, and for 30 ms each is too far from the last one used to be true.
-    16 SpeedStep: B, Known;
+    16 SpeedStep: B, 0;
     /// B: another node sends under an identifier of this ECU; for a second after the last such frame.
-    17 OwnIdentifier: B, Known;
+    17 OwnIdentifier: B, 0;
+    /// B: the motor delivers less than was commanded.
+    18 MotorWeak: B, 0;
+    /// A: no hand on the wheel for 15 s of guidance; after 30 s the guidance ends.
+    19 HandsOff: A, 0;
 }
 
 // The word has 32 bits, and a fault's code is its place in the list.
@@ -134,20 +135,10 @@ impl FaultSet {
     pub const CRITICAL: Self = Self::of(Class::C);
     /// What forbids to leave Boot.
     pub const LOCKING: Self = Self::of(Class::Locked);
-    /// Inputs that arrive, but cannot be true: since when is unknown.
-    #[expect(clippy::indexing_slicing, reason = "at compile time")]
-    pub const IMPLAUSIBLE: Self = {
-        let (mut set, mut i) = (0, 0);
-        while i < Fault::COUNT {
-            if matches!(Fault::ALL[i].since(), Since::Unknown) {
-                set |= Self::bit(Fault::ALL[i]);
-            }
-            i += 1;
-        }
-        Self(set)
-    };
+    /// What ends guidance with a fade.
+    pub const FADING: Self = Self::of(Class::A);
     /// Every fault that has a name.
-    const NAMED: u32 = Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0;
+    const NAMED: u32 = Self::FADING.0 | Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0;
 
     /// Every fault of a class.
     #[must_use]
@@ -190,6 +181,13 @@ impl FaultSet {
     #[must_use]
     pub const fn intersects(self, other: Self) -> bool {
         self.0 & other.0 != 0
+    }
+
+    /// For how long any of them may have been there before it was declared, beside the ages of the inputs.
+    #[must_use]
+    pub fn unseen(self) -> Micros {
+        let present = Fault::ALL.into_iter().filter(|fault| self.contains(*fault));
+        present.map(Fault::unseen).max().unwrap_or_default()
     }
 
     /// Adds a fault.

@@ -16,8 +16,8 @@
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
 use crate::quantity::{
-    Instant, Metres, Micros, Radians, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
-    TorquePerTurningRate, per_second_times, saturate, shift_round,
+    Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
+    TorquePerTurningRate, TurningRate, per_second_times, product, saturate, shift_round,
 };
 use crate::redundant::words;
 
@@ -78,6 +78,80 @@ impl LawState {
     };
 }
 
+/// What the vehicle did since a sample that was old when it came: how its motion differs from going on as it did then.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Since {
+    /// The heading that it turned beyond its rate of turn at the sample.
+    pub turned: Radians,
+    /// How much faster it turns now.
+    pub faster: TurningRate,
+    /// Its speed.
+    pub speed: Speed,
+    /// How far ahead the near point is.
+    pub near: Metres,
+}
+
+impl Since {
+    /// It went on as it did.
+    pub const NOTHING: Self = Self {
+        turned: Radians::ZERO,
+        faster: TurningRate::ZERO,
+        speed: Speed::ZERO,
+        near: Metres::ZERO,
+    };
+
+    /// Bounded to what a vehicle can turn in 200 ms beyond its rate: a flipped bit of the past must not ask for more.
+    #[must_use]
+    pub fn new(turned: Radians, faster: TurningRate, speed: Speed, near: Metres) -> Self {
+        let (most, fastest) = (Radians::from_rad(0.04), TurningRate::from_rad_per_s(0.3));
+        Self {
+            turned: turned
+                .min(most)
+                .max(Radians::from_bits(most.bits().saturating_neg())),
+            faster: faster
+                .min(fastest)
+                .max(TurningRate::from_bits(fastest.bits().saturating_neg())),
+            speed,
+            near,
+        }
+    }
+}
+
+impl LawState {
+    /// The state from which [`Law::torque`], which lets the errors go on at their rates, finds the errors and rates of now.
+    /// Both errors turn with the vehicle; the near point moves aside by the way that it is ahead, and drifts at the speed
+    /// times the heading, of which a third of the age counts where the heading grew with the square of the time.
+    fn moved_on(&self, age: Micros, since: &Since) -> Self {
+        let turned = i64::from(since.turned.bits());
+        let aside = product(since.near.bits(), since.turned.bits());
+        // What the yaw error's own rate makes of the lateral error's, and the heading beyond it.
+        let going = per_second_times(i64::from(self.e_theta_rate) << 4, age);
+        let drift = product(since.speed.bits(), saturate(turned.saturating_sub(going)));
+        let drifted = per_second_times(product(since.speed.bits(), since.turned.bits()), age) / 3;
+        let bent = per_second_times(product(since.speed.bits(), saturate(going)), age) / 2;
+        let slower_y = drift.saturating_add(product(since.near.bits(), since.faster.bits()));
+        let slower_theta = i64::from(since.faster.bits());
+        let error = |error: i32, away: i64, slower: i64| {
+            // The rates that are taken away below did not act all the time.
+            let ahead = per_second_times(slower, age);
+            i64::from(error).saturating_sub(away).saturating_add(ahead)
+        };
+        let away_y = aside.saturating_add(drifted).saturating_sub(bent);
+        let to_rate = |bits: i64| saturate(shift_round(bits, 4));
+        let mut late = *self;
+        late.last.e_y = Metres::from_wide(error(self.last.e_y.bits(), away_y, slower_y));
+        late.last.e_theta = Radians::from_wide(error(self.last.e_theta.bits(), turned, slower_theta));
+        late.e_y_rate = self.e_y_rate.saturating_sub(to_rate(slower_y));
+        late.e_theta_rate = self.e_theta_rate.saturating_sub(to_rate(slower_theta));
+        late
+    }
+
+    /// The line is another one from this sample on: it goes on at the rates of the old one.
+    pub fn relocate(&mut self, sample: LaneSample) {
+        self.last = sample;
+    }
+}
+
 /// Two samples further apart than this share no rate: the filter starts anew from zero.
 /// 100 ms is twelve lost samples at 120 Hz, past every time-out on the inputs.
 const GAP: Micros = Micros::from_ms(100);
@@ -90,9 +164,10 @@ const RATE_BITS: u32 = 20;
 const MAX_RATE: u64 = 1000 << RATE_BITS;
 
 impl Law {
-    /// The torque that the law asks for now, from the latest sample received.
+    /// The torque that the law asks for now, from the latest sample received; `since` is what the vehicle did since that
+    /// sample that its rates do not say.
     #[must_use]
-    pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample) -> Torque {
+    pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, since: &Since) -> Torque {
         let dt = sample.at.since(state.last.at);
         if state.has_last == 0 || dt > GAP {
             *state = LawState::NEW;
@@ -106,7 +181,11 @@ impl Law {
             );
         }
         (state.has_last, state.last) = (1, sample);
-        self.torque(state, now.since(sample.at))
+        if *since == Since::NOTHING {
+            return self.torque(state, now.since(sample.at));
+        }
+        let late = state.moved_on(now.since(sample.at), since);
+        self.torque(&late, now.since(sample.at))
     }
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two

@@ -53,7 +53,7 @@
 //!     let frames = [
 //!         (8, lane.encode((ms / 8) as u8)),
 //!         (2, column.encode((ms / 2) as u8)),
-//!         (10, Vehicle { speeds }.encode((ms / 10) as u8)),
+//!         (10, Vehicle { speeds, yaw_rate: None }.encode((ms / 10) as u8)),
 //!         (10, demand.encode((ms / 10) as u8)),
 //!     ];
 //!     for (period, frame) in frames {
@@ -109,16 +109,19 @@ pub mod ecu;
 pub mod envelope;
 pub mod estimator;
 pub mod faults;
+pub mod hands;
 mod injection;
 pub mod law;
 pub mod modes;
 pub mod monitor;
 pub mod params;
+pub mod past;
 pub mod plausibility;
 pub mod probe;
 pub mod quantity;
 pub mod ramp;
 pub mod redundant;
 pub mod rejections;
+pub mod schedule;
 mod sine;
 pub mod stored;

@@ -5,9 +5,9 @@
 //! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
 //! module: a mistake there must not repeat itself here. It shares how memory is guarded, and nothing else.
 //!
-//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), in a mode without
-//! torque, against a driver who overrides, on lane data that is too old, or, in Active, away from the torque that
-//! lane errors ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and
+//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (unless
+//! the mode says that it ends at once, or the driver overrides), in a mode without torque, against a driver who
+//! overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and
 //! rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count:
 //! the envelope may still be bringing an honest change about. While the host asks for the probe, and for a second
 //! after, the band is wider by the probe's amplitude.
@@ -23,6 +23,10 @@ words! {
         pub(crate) limit_mnm: i32,
         /// Largest growth in one millisecond.
         pub(crate) growth_mnm_per_ms: i32,
+        /// Largest fall in one millisecond.
+        pub(crate) fall_mnm_per_ms: i32,
+        /// Half the band around the torque that the lane errors ask for.
+        pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
         pub(crate) probe_mnm: i32,
         /// Law, mN.m per m, per rad, per m/s, per rad/s.
@@ -79,20 +83,20 @@ const FADE: i32 = 3;
 const LAST_WITH_TORQUE: i32 = 4;
 /// Half an LSB on each side, and the roundings of this file.
 const TOLERANCE_MNM: i32 = 3;
-/// Around the torque that the lane errors ask for.
-const BAND_MNM: i32 = 300;
 /// The probe ends within a period, and none is slower than 1 Hz; a command is stale after 30 ms.
 const PROBE_END_US: i32 = 1_030_000;
 /// For how long the torque may be outside that band.
 const ASTRAY_MS: i32 = 20;
-/// Lane data older than this must not move the wheel in Active: the time-out and a camera period.
-const OLDEST_LANE_US: i32 = 40_000;
+/// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
+const OLDEST_LANE_US: i32 = 360_000;
+/// A sample older than this is continued at its rates.
+const PROMPT_LANE_US: i32 = 40_000;
 /// Override bound: from 0.8 N.m of opposing torque, 3 N.m per N.m, and what two frames' time can change.
 const OVERRIDE_FROM_MNM: i32 = 800;
 const OVERRIDE_SLOPE: i32 = 3;
 const OVERRIDE_SLACK_MNM: i32 = 50;
 /// How many rules there are to try.
-pub const RULES: u32 = 6;
+pub const RULES: u32 = 7;
 /// Rates are taken over at least this.
 const RATE_SPAN_US: i32 = 50_000;
 
@@ -131,16 +135,25 @@ impl Monitor {
         let changes_sign = (torque ^ state.torque_mnm).is_negative();
         let old = if changes_sign { 0 } else { state.torque_mnm };
         let grown = torque.saturating_abs().saturating_sub(old.saturating_abs());
-        let allowed = if mode == ACTIVE {
-            self.growth_mnm_per_ms
+        let within = |per_ms: i32| {
+            per_ms
                 .saturating_mul(elapsed_us.clamp(1000, 2000))
                 .saturating_div(1000)
                 .saturating_add(TOLERANCE_MNM)
+        };
+        let allowed = if mode == ACTIVE {
+            within(self.growth_mnm_per_ms)
         } else {
             0
         };
+        let left = if changes_sign { 0 } else { torque.saturating_abs() };
+        let fallen = state.torque_mnm.saturating_abs().saturating_sub(left);
+        let may_fall = fallen <= within(self.fall_mnm_per_ms)
+            || mode > LAST_WITH_TORQUE
+            || left.saturating_add(OVERRIDE_SLACK_MNM) >= self.bound(state.torque_mnm, state.driver_mnm);
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed
+            && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
             && self.leaves_the_driver_in_charge(torque, state.driver_mnm)
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
@@ -151,6 +164,12 @@ impl Monitor {
 
     /// `abs(T) <= L + 3*(0.8 - opposing)`.
     fn leaves_the_driver_in_charge(&self, torque: i32, driver: i32) -> bool {
+        let bound = self.bound(torque, driver);
+        torque.saturating_abs() <= bound.saturating_add(OVERRIDE_SLACK_MNM)
+    }
+
+    /// What the driver leaves of a torque to its side.
+    fn bound(&self, torque: i32, driver: i32) -> i32 {
         let opposing = if torque.is_negative() {
             driver
         } else {
@@ -160,8 +179,7 @@ impl Monitor {
             .saturating_sub(OVERRIDE_FROM_MNM)
             .max(0)
             .saturating_mul(OVERRIDE_SLOPE);
-        let bound = self.limit_mnm.saturating_sub(shrink).max(0);
-        torque.saturating_abs() <= bound.saturating_add(OVERRIDE_SLACK_MNM)
+        self.limit_mnm.saturating_sub(shrink).max(0)
     }
 
     #[expect(
@@ -193,13 +211,22 @@ impl Monitor {
             .saturating_mul(e_y_mmps)
             .saturating_div(1000)
             .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
+        // What an old sample has become since, at most: the errors went on at their rates.
+        let late_ms = lane.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
+        let carried = per_m
+            .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
+            .saturating_div(1000)
+            .saturating_add(
+                per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
+            );
+        let position = position.saturating_add(carried);
         let both = position.saturating_add(rate);
         let probe = if state.probe_left_us > 0 {
             self.probe_mnm
         } else {
             0
         };
-        let band = BAND_MNM.saturating_add(probe);
+        let band = self.band_mnm.saturating_add(probe);
         // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
         let high = position.max(both).max(0).saturating_add(band);
         let low = position.min(both).min(0).saturating_sub(band);
@@ -213,8 +240,8 @@ impl Monitor {
     }
 
     /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
-    /// exactly one rule refuses. Each of [`RULES`] turns tries another one. (Below a limit of 0.4 N.m nothing can be
-    /// astray, and the limit refuses that turn.)
+    /// exactly one rule refuses. Each of [`RULES`] turns tries another one. (Below a limit of 0.1 N.m above the band
+    /// nothing can be astray, and the limit refuses that turn.)
     #[must_use]
     pub fn self_test_vector(&self, turn: u32) -> (MonitorState, [u8; 8]) {
         // As long as nothing else is said: a held torque that each rule allows.
@@ -225,11 +252,15 @@ impl Monitor {
             2 => mode = STANDBY,
             3 => state.driver_mnm = -20_000,
             4 => state.lane.age_us = 1_000_000,
-            _ => (torque, state.astray_ms) = (400, ASTRAY_MS),
+            5 => (torque, grown) = (0, -400),
+            _ => (torque, state.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
         }
         state.torque_mnm = torque.saturating_sub(grown);
         // The least count that is cut to so many mN.m again.
-        let count = torque.saturating_mul(4096).saturating_div(1000).saturating_add(1);
+        let count = torque
+            .saturating_mul(4096)
+            .saturating_add(999)
+            .saturating_div(1000);
         let [count, mode] = [count, mode].map(|field| u64::from(field.cast_unsigned()));
         let word = (count << 12).saturating_add(mode << 32);
         (state, word.to_le_bytes())
@@ -244,7 +275,9 @@ impl MonitorState {
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
-                age_us: (field(bytes, 46, 10) & 0x1FF).saturating_mul(100),
+                age_us: (field(bytes, 46, 10) & 0x1FF)
+                    .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
+                    .saturating_mul(100),
             };
             // After a gap there is no rate.
             if self.lane.age_us > OLDEST_LANE_US {

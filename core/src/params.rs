@@ -140,6 +140,10 @@ parameters! {
         t_nms_s: "s", 0.01 to 1.0, 0.1;
         /// K_nms of the driver's arm, likewise.
         k_nms: "N.m/rad", 0.0 to 10.0, 1.0;
+        /// Share of the guidance torque at 20 km/h and below; it grows linearly to all of it at 60 km/h.
+        low_speed_share: "1", 0.0 to 1.0, 1.0;
+        /// Share of the guidance torque at 130 km/h and above; it falls linearly to that from all of it at 60 km/h.
+        high_speed_share: "1", 0.0 to 1.0, 1.0;
         group vehicle: VehicleParams,
         "What the plausibility checks know of the vehicle. The defaults follow from the paper's tables 8 and 9." {
             /// K_t/l, front wheel angle per wheel angle over the wheelbase: (1/17)/2.635.
@@ -152,6 +156,8 @@ parameters! {
             column_damping_nm_s: "N.m.s/rad", 0.0 to 10.0, 0.57;
             /// t'_f of the lane preview's sender.
             far_time_s: "s", 0.1 to 3.0, 0.7;
+            /// t'_n of it.
+            near_time_s: "s", 0.0 to 5.0, 0.3;
         }
     }
 }

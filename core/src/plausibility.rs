@@ -1,29 +1,38 @@
 //! Whether the inputs can be true together: what a CRC cannot see.
 //!
 //! **Lane.** Between two samples the near-point error must move as the vehicle does:
-//! `de_y'/dt = v*e_theta' - L_f*chi_dot` (`L_f = v*t'_f`; `chi_dot`, the rate of the direction of movement,
-//! from wheel angle and speed by the steady-state bicycle model). The change predicted and the change seen
-//! are both summed with a memory of 1 s; the preview is declared implausible when the prediction exceeds
-//! what was seen, in the prediction's direction, by the margin. So a frozen, flipped or too small error is
-//! found when it must have moved; an error that moves *more* than predicted (gust, noise, a camera's scale)
-//! is a valid extreme and meets the envelope only. A yaw error that is frozen or flipped predicts a movement
-//! that does not come, and is found the same way.
+//! `de_y'/dt = v*theta_n - L_n*psi_dot`, with the line's direction at the near point against the vehicle's, `theta_n`, and
+//! the rate of turn, `psi_dot`. With a measured yaw rate both are known: the near point is now where the far point was
+//! `t'_f - t'_n` ago, so that `theta_n` is the far point's direction of then, less what the vehicle has turned since
+//! ([`crate::past`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
+//! yaw rate's zero; a slow estimate takes them away, bounded so that a lie cannot hide in it. Without a yaw rate the
+//! rate of turn comes from wheel angle and speed by the steady-state bicycle model, and the line is taken to bend as the
+//! vehicle turns: `de_y'/dt = v*e_theta' - L_f*psi_dot`, which a bank, a tyre, or an offset of the wheel angle spoils.
 //!
-//! **Column.** Torque in equals torque out: `T_d + T_h = c_a(v)*phi + B_s*dphi/dt`, summed with the same
-//! memory; the inertia (0.11 kg.m2 at hand speeds: 0.02 N.m.s) is far inside the margin. A torque sensor
-//! that is stuck high or has its sign flipped is found by the momentum that does not show in the wheel.
+//! The change predicted and the change seen are both summed with a memory of 1 s; the preview is declared implausible
+//! when the prediction exceeds what was seen, in the prediction's direction, by the margin. So a frozen, flipped or too
+//! small error is found when it must have moved; an error that moves *more* than predicted (gust, noise, a camera's
+//! scale) is a valid extreme and meets the envelope only. A yaw error that is frozen or flipped predicts a movement that
+//! does not come, and is found the same way.
 //!
-//! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump
-//! persists, the input goes stale and is a fault.
+//! **Column.** Torque in equals torque out: `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Of the power assist `T_a` only
+//! its direction is known, and that it is at most [`ASSIST`] times `T_d`; of the aligning torque, that it is right by 30 %
+//! (trail, tyres, load); and there is friction. What is beyond all that is summed with a memory of 1 s; the inertia (0.11
+//! kg.m2 at hand speeds: 0.02 N.m.s) is far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is
+//! estimated slowly, and bounded.
+//!
+//! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists and is not
+//! that of a line that was chosen anew ([`is_another_line`]), the input goes stale and is a fault.
 //!
 //! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
 //! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
 
 use crate::law::LaneSample;
+use crate::past::Past;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
-    StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRatePerAngle,
-    per_second_times, product, saturate,
+    StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
+    per_second_times, product,
 };
 use crate::redundant::words;
 
@@ -40,6 +49,9 @@ words! {
         pub(crate) column_damping: TorquePerTurningRate,
         /// t'_f, s.
         pub(crate) far_time: Seconds,
+        /// t'_n, s, and how long before the far point is where the near point is now.
+        pub(crate) near_time: Seconds,
+        pub(crate) between: Micros,
         /// Margin of the lane check, m.
         pub(crate) lane_margin: Metres,
         /// Margin of the column check, N.m.s.
@@ -54,13 +66,22 @@ words! {
         wheel: Radians,
         /// Rate of the direction of movement per wheel angle at this speed, 1/s.
         turning_gain: TurningRatePerAngle,
+        /// The measured yaw rate, if there is one.
+        yaw_rate: TurningRate,
+        has_yaw_rate: u32,
+        /// Messages in a row whose speeds were apart.
+        apart: u32,
         has_lane: u32,
         lane: LaneSample,
         lane_predicted: Metres,
         lane_seen: Metres,
+        /// What the prediction is wrong by in the long run.
+        lane_bias: Speed,
         has_column: u32,
         column_at: Instant,
         column_sum: AngularImpulse,
+        /// The torque that the column lacks in the long run.
+        column_bias: Torque,
     }
 }
 
@@ -70,6 +91,9 @@ impl PlausibilityState {
         speed: Speed::ZERO,
         wheel: Radians::ZERO,
         turning_gain: TurningRatePerAngle::ZERO,
+        yaw_rate: TurningRate::ZERO,
+        has_yaw_rate: 0,
+        apart: 0,
         has_lane: 0,
         lane: LaneSample {
             e_y: Metres::ZERO,
@@ -78,14 +102,35 @@ impl PlausibilityState {
         },
         lane_predicted: Metres::ZERO,
         lane_seen: Metres::ZERO,
+        lane_bias: Speed::ZERO,
         has_column: 0,
         column_at: Instant::from_us(0),
         column_sum: AngularImpulse::ZERO,
+        column_bias: Torque::ZERO,
     };
 
-    /// chi_dot, the rate of the direction of movement, 2^-24 rad/s.
-    fn turning(&self) -> i32 {
-        saturate(product(self.turning_gain.bits(), self.wheel.bits()))
+    /// The rate of turn: measured, or else that of the direction of movement by wheel angle and speed.
+    #[must_use]
+    pub fn turning(&self) -> TurningRate {
+        if self.has_yaw_rate != 0 {
+            self.yaw_rate
+        } else {
+            TurningRate::from_wide(product(self.turning_gain.bits(), self.wheel.bits()))
+        }
+    }
+
+    /// The speed in use.
+    #[must_use]
+    pub const fn speed(&self) -> Speed {
+        self.speed
+    }
+
+    /// Takes two speeds; `false` when they have been too far apart for [`SPEEDS_PATIENCE`] messages in a row.
+    #[must_use]
+    pub fn speeds_agree(&mut self, [a, b]: [Speed; 2]) -> (bool, bool) {
+        let agree = speeds_agree(a, b);
+        self.apart = if agree { 0 } else { self.apart.saturating_add(1) };
+        (agree, self.apart < SPEEDS_PATIENCE)
     }
 
     /// The movement predicted, and what of it was not seen, positive in its direction. 2^-24 m.
@@ -118,6 +163,8 @@ const LANE_STEP: Metres = Metres::from_m(0.3);
 const YAW_STEP: Radians = Radians::from_rad(0.1);
 /// Largest honest change of a speed between two messages: 1 m/s in 10 ms is 10 g.
 const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
+/// One message may be that of a wheel that slips.
+const SPEEDS_PATIENCE: u32 = 3;
 /// Two sources that differ by this much are not both right.
 const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 
@@ -126,6 +173,25 @@ const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
     last.e_y.bits().abs_diff(new.e_y.bits()) <= LANE_STEP.bits().unsigned_abs()
         && last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
+}
+
+/// A line that moves so far from one sample to the next is one of another picture of the same lane: works, an exit.
+const LINE_SHIFT: Metres = Metres::from_m(0.4);
+/// Widths of a lane.
+const LANE_WIDTHS: [Metres; 2] = [Metres::from_m(2.3), Metres::from_m(4.3)];
+
+/// Whether a sample too far from the last one may be that of a line chosen anew: a little beside the old one, or a lane's
+/// width from it and no further from the vehicle, as it is when the vehicle changes lanes. One that is further away than
+/// the old one would pull the vehicle where nobody wants to go.
+#[must_use]
+pub fn is_another_line(last: &LaneSample, new: &LaneSample) -> bool {
+    let moved = last.e_y.bits().abs_diff(new.e_y.bits());
+    let [narrow, wide] = LANE_WIDTHS.map(|width| width.bits().unsigned_abs());
+    let shift = LINE_SHIFT.bits().unsigned_abs();
+    let room = last.e_y.bits().unsigned_abs().saturating_add(shift);
+    let is_near = (narrow..=wide).contains(&moved) && new.e_y.bits().unsigned_abs() <= room;
+    last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
+        && (moved <= shift || is_near)
 }
 
 /// Whether a speed follows from the last one.
@@ -140,11 +206,25 @@ pub fn speeds_agree(a: Speed, b: Speed) -> bool {
     a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
+/// Power assist: all that acts on the column is at most so many times the driver's torque.
+pub const ASSIST: i64 = 5;
+/// Friction of the column, and what else holds it without a sign.
+const FRICTION: Torque = Torque::from_nm(0.5);
+/// Bounds of what is learnt slowly: a bank of 5 %, or a pull; 5 mrad of camera and yaw rate at 30 m/s.
+const COLUMN_BIAS: Torque = Torque::from_nm(0.5);
+const LANE_BIAS: Speed = Speed::from_m_per_s(0.15);
+/// It is learnt within 2^4 s.
+const BIAS_SHIFT: u32 = 4;
+
 impl Plausibility {
-    /// Takes the speed in use; returns nothing, for it has no counterpart but its second source. How fast the
-    /// vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle
-    /// model.
-    pub fn speed(&self, state: &mut PlausibilityState, speed: Speed) {
+    /// Takes the speed in use and the measured yaw rate; returns nothing, for neither has a counterpart here. How fast
+    /// the vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle model.
+    pub fn motion(&self, state: &mut PlausibilityState, speed: Speed, yaw_rate: Option<TurningRate>) {
+        state.has_yaw_rate = u32::from(yaw_rate.is_some());
+        state.yaw_rate = yaw_rate.unwrap_or(TurningRate::ZERO);
+        if speed == state.speed {
+            return;
+        }
         state.speed = speed;
         let v = speed.bits();
         let slip = (i64::from(self.stability_factor.bits()).saturating_mul(product(v, v))) >> FRAC_BITS;
@@ -168,29 +248,73 @@ impl Plausibility {
         let dt = now.since(state.column_at);
         if state.has_column != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
-            let lateral = product(state.speed.bits(), state.turning());
+            let lateral = product(state.speed.bits(), state.turning().bits());
             let aligning = i64::from(self.aligning_gain.bits()).saturating_mul(lateral) >> FRAC_BITS;
-            let torque = i64::from(driver.bits())
-                .saturating_add(i64::from(applied.bits()))
-                .saturating_sub(aligning);
+            let lacking = i64::from(applied.bits()).saturating_sub(aligning);
+            // What driver and assist may give together.
+            let driver = i64::from(driver.bits());
+            let assisted = driver.saturating_mul(ASSIST);
+            let least = lacking.saturating_add(driver.min(assisted));
+            let most = lacking.saturating_add(driver.max(assisted));
             let damped = i64::from(self.column_damping.bits()).saturating_mul(moved) >> FRAC_BITS;
-            let change = per_second_times(torque, dt).saturating_sub(damped);
+            // All times dt, for the wheel's movement is that of dt.
+            let impulse = |torque: i64| per_second_times(torque, dt);
+            let (least, most) = (
+                impulse(least).saturating_sub(damped),
+                impulse(most).saturating_sub(damped),
+            );
+            let learnt = impulse(i64::from(state.column_bias.bits()));
+            let change = beyond(least, most, 0).saturating_sub(learnt) >> BIAS_SHIFT;
+            let bias = i64::from(state.column_bias.bits()).saturating_add(change);
+            state.column_bias = Torque::from_wide(bias)
+                .min(COLUMN_BIAS)
+                .max(COLUMN_BIAS.opposite());
+            // 77/256: 30 % of the aligning torque.
+            let tolerance = aligning.abs().saturating_mul(77) >> 8;
+            let tolerance = impulse(tolerance.saturating_add(i64::from(FRICTION.bits())));
+            let change = beyond(
+                least.saturating_sub(learnt),
+                most.saturating_sub(learnt),
+                tolerance,
+            );
             state.column_sum = AngularImpulse::from_wide(leak(state.column_sum.bits(), change, dt));
         }
         (state.has_column, state.column_at, state.wheel) = (1, now, wheel);
         i64::from(state.column_sum.bits()).abs() <= i64::from(self.column_margin.bits())
     }
 
-    /// Takes a new lane sample; `false` when its error did not move as it must have.
+    /// Takes a new lane sample that came now; `false` when its error did not move as it must have.
     #[must_use]
-    pub fn lane(&self, state: &mut PlausibilityState, sample: LaneSample) -> bool {
+    pub fn lane(
+        &self,
+        state: &mut PlausibilityState,
+        past: &mut Past,
+        now: Instant,
+        sample: LaneSample,
+    ) -> bool {
+        past.see(now, sample.at, sample.e_theta);
         let dt = sample.at.since(state.lane.at);
         if state.has_lane != 0 && dt.us() != 0 {
-            let heading = product(state.speed.bits(), state.lane.e_theta.bits());
-            let far = product(self.far_time.bits(), state.speed.bits());
-            let turned = (far.saturating_mul(i64::from(state.turning()))) >> FRAC_BITS;
-            let predicted = per_second_times(heading.saturating_sub(turned), dt);
             let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.e_y.bits()));
+            let measured = state.has_yaw_rate != 0;
+            let rate = if measured {
+                self.line_rate(state, past, now, state.lane.at)
+            } else {
+                let heading = product(state.speed.bits(), state.lane.e_theta.bits());
+                let far = product(self.far_time.bits(), state.speed.bits());
+                let turned = (far.saturating_mul(i64::from(state.turning().bits()))) >> FRAC_BITS;
+                Some(heading.saturating_sub(turned))
+            };
+            // Where the line is not known for long enough, nothing is predicted.
+            let predicted = rate.map_or(seen, |rate| per_second_times(rate, dt));
+            let bias = i64::from(state.lane_bias.bits());
+            let predicted = predicted.saturating_add(per_second_times(bias, dt));
+            if measured {
+                let learnt = bias.saturating_add(seen.saturating_sub(predicted) >> BIAS_SHIFT);
+                state.lane_bias = Speed::from_wide(learnt)
+                    .min(LANE_BIAS)
+                    .max(Speed::from_wide(i64::from(LANE_BIAS.bits()).saturating_neg()));
+            }
             state.lane_predicted = Metres::from_wide(leak(state.lane_predicted.bits(), predicted, dt));
             state.lane_seen = Metres::from_wide(leak(state.lane_seen.bits(), seen, dt));
         }
@@ -201,11 +325,27 @@ impl Plausibility {
         missing <= margin || predicted.abs() <= margin >> 1
     }
 
+    /// How fast the near-point error must move at an instant, 2^-24 m/s, by the measured yaw rate.
+    fn line_rate(&self, state: &PlausibilityState, past: &Past, now: Instant, at: Instant) -> Option<i64> {
+        let near = past.line(now, at, self.between)?;
+        let turning = past.heading(now, at).rate;
+        let along = product(state.speed.bits(), near.bits());
+        let reach = product(self.near_time.bits(), state.speed.bits());
+        let across = reach.saturating_mul(i64::from(turning.bits())) >> FRAC_BITS;
+        Some(along.saturating_sub(across))
+    }
+
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
     pub fn used(state: &PlausibilityState) -> (Metres, AngularImpulse) {
         (Metres::from_wide(state.missing().1), state.column_sum)
     }
+}
+
+/// How far an interval is from zero, beside a tolerance; positive where all of it is above.
+fn beyond(least: i64, most: i64, tolerance: i64) -> i64 {
+    let (low, high) = (least.saturating_sub(tolerance), most.saturating_add(tolerance));
+    low.max(0).saturating_add(high.min(0))
 }
 
 /// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.

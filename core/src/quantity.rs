@@ -170,6 +170,10 @@ quantity!(
     CurvaturePerAngle, from_per_m, per_m, "one per metre"
 );
 quantity!(
+    /// A rate of turn, rad/s, positive turns left.
+    TurningRate, from_rad_per_s, rad_per_s, "radians per second"
+);
+quantity!(
     /// A turning rate per angle, 1/s.
     TurningRatePerAngle, from_per_s, per_s, "one per second"
 );

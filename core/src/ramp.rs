@@ -10,9 +10,6 @@ use crate::redundant::words;
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
 
-/// How far back an output may be trusted.
-pub const HISTORY: Micros = Micros::from_ms(250);
-
 words! {
     /// A straight line from a torque to zero.
     pub struct Ramp {
@@ -68,56 +65,84 @@ impl Ramp {
     }
 }
 
-/// The outputs of the last 250 ms, one every 5 ms.
+/// The outputs of the last 250 ms, one every 5 ms, and of the last 2.5 s, one every 40 ms.
 ///
 /// Not kept twice: wherever a flipped bit puts the start of a handover, it lies between zero and the torque
-/// applied. A fixed array, so that a flip can do nothing else.
+/// applied. Fixed arrays, so that a flip can do nothing else.
 #[derive(Debug, Clone)]
 pub struct History {
-    /// A ring, of which the newest [`KEPT`] count.
-    outputs: [(Instant, Torque); RING],
+    fine: Outputs,
+    coarse: Outputs,
+}
+
+const FINE: Micros = Micros::from_ms(5);
+const COARSE: Micros = Micros::from_ms(40);
+/// What the fine history reaches back to, with a place to spare.
+const FINE_SPAN: Micros = Micros::from_ms(300);
+/// A power of two, so that the place is a mask.
+const RING: usize = 64;
+
+/// A ring of outputs.
+#[derive(Debug, Clone)]
+struct Outputs {
+    ring: [(Instant, Torque); RING],
     /// Where the newest is. Every number names a place, modulo the ring.
     newest: usize,
 }
 
-const HISTORY_STEP: Micros = Micros::from_ms(5);
-/// 250 ms and both ends.
-const KEPT: usize = 51;
-/// A power of two, so that the place is a mask.
-const RING: usize = 64;
+impl Outputs {
+    const NONE: Self = Self {
+        ring: [(Instant::from_us(0), Torque::ZERO); RING],
+        newest: 0,
+    };
+
+    /// The output that is `back` places older than the newest.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    const fn output(&self, back: usize) -> (Instant, Torque) {
+        self.ring[self.newest.wrapping_sub(back) % RING]
+    }
+
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    fn push(&mut self, now: Instant, torque: Torque, every: Micros) {
+        if now.since(self.output(0).0) >= every {
+            self.newest = self.newest.wrapping_add(1);
+            self.ring[self.newest % RING] = (now, torque);
+        }
+    }
+
+    /// The last output before `suspect` time ago; zero if that is longer ago than the ring reaches.
+    fn before(&self, now: Instant, suspect: Micros) -> Torque {
+        let mut outputs = (0..RING).map(|back| self.output(back));
+        let before = outputs.find(|(at, _)| now.since(*at) > suspect);
+        before.map_or(Torque::ZERO, |(_, torque)| torque)
+    }
+}
 
 impl History {
     /// Nothing applied yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            outputs: [(Instant::from_us(0), Torque::ZERO); RING],
-            newest: 0,
+            fine: Outputs::NONE,
+            coarse: Outputs::NONE,
         }
-    }
-
-    /// The output that is `back` places older than the newest.
-    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
-    const fn output(&self, back: usize) -> (Instant, Torque) {
-        self.outputs[self.newest.wrapping_sub(back) % RING]
     }
 
     /// Remembers an output.
-    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn push(&mut self, now: Instant, torque: Torque) {
-        if now.since(self.output(0).0) >= HISTORY_STEP {
-            self.newest = self.newest.wrapping_add(1);
-            self.outputs[self.newest % RING] = (now, torque);
-        }
+        self.fine.push(now, torque, FINE);
+        self.coarse.push(now, torque, COARSE);
     }
 
-    /// The last output before `suspect` time ago: the oldest one kept if that is longer ago than the
-    /// history, zero if there was none.
+    /// The last output before `suspect` time ago; zero if there was none, or if that is longer ago than 2.5 s.
     #[must_use]
     pub fn trusted(&self, now: Instant, suspect: Micros) -> Torque {
-        let mut outputs = (0..KEPT).map(|back| self.output(back));
-        let before = outputs.find(|(at, _)| now.since(*at) > suspect);
-        before.unwrap_or_else(|| self.output(KEPT - 1)).1
+        let outputs = if suspect < FINE_SPAN {
+            &self.fine
+        } else {
+            &self.coarse
+        };
+        outputs.before(now, suspect)
     }
 
     /// Where a handover starts: the smaller of the torque applied and the torque trusted, with the sign of

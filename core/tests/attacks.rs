@@ -171,7 +171,7 @@ fn a_forged_demand_engages_within_every_limit() {
 #[test]
 fn a_forged_motor_torque_stops_the_guidance_for_good() {
     let mut rig = Rig::active_in_curve(1.0);
-    rig.motor = |torque| torque + 0.2;
+    rig.motor = |torque| torque + 0.3;
     let (ms, step) = rig.run_until(20, |step| step.command.mode == Mode::Fault);
     assert!(step.command.faults.contains(Fault::Actuator));
     assert!((10..=13).contains(&ms), "{ms} ms");
@@ -205,7 +205,7 @@ fn parameters_are_refused_at_any_speed_but_standstill() {
             now_ms: 700,
         };
         let mut download = Download::NEW;
-        download.receive(&unlock(0), &conditions);
+        download.receive(&unlock(0, 0), &conditions);
         for frame in frames(&strong) {
             let _ = download.receive(&frame, &conditions);
         }
@@ -229,6 +229,7 @@ fn both_speeds_have_to_be_next_to_nothing() {
     // Forged once, contradicted by the next true one.
     let forged = Vehicle {
         speeds: [Speed::ZERO; 2],
+        yaw_rate: None,
     };
     let mut rig = Rig::paper();
     rig.run(100);

@@ -4,9 +4,9 @@
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, MESSAGES, Message, ParameterStatus, ParameterUnlock,
-    ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle, Warning,
-    WriteOutcome,
+    Column, Demand, FaultRecord, Guidance, Identity, LanePreview, MESSAGES, Message, ParameterStatus,
+    ParameterUnlock, ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle,
+    Warning, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::envelope::LimitReason;
@@ -14,7 +14,7 @@ use haptic_core::estimator::Reading;
 use haptic_core::faults::{Fault, FaultSet, Record};
 use haptic_core::modes::Mode;
 use haptic_core::params::PARAMETERS;
-use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -130,11 +130,24 @@ fn vehicle_and_demand() {
         let (a, b) = (f64::from(raw) / 256.0, f64::from(90 * 256 - raw) / 256.0);
         let sent = Vehicle {
             speeds: [Speed::from_m_per_s(a), Speed::from_m_per_s(b)],
+            yaw_rate: None,
         };
         let frame = sent.encode(3);
+        let names = ["Speed1", "Speed2", "YawRate", "YawRateValid"];
+        assert_eq!(names.map(|name| signal(&dbc, &frame, name)), [a, b, 0.0, 0.0]);
+        assert_eq!(decode(sent), sent);
+    }
+    for raw in -8191..=8191 {
+        let rate = f64::from(raw) / 4096.0;
+        let sent = Vehicle {
+            speeds: [Speed::from_m_per_s(20.0); 2],
+            yaw_rate: Some(TurningRate::from_rad_per_s(rate)),
+        };
+        let frame = sent.encode(3);
+        let names = ["Speed1", "Speed2", "YawRate", "YawRateValid"];
         assert_eq!(
-            [signal(&dbc, &frame, "Speed1"), signal(&dbc, &frame, "Speed2")],
-            [a, b]
+            names.map(|name| signal(&dbc, &frame, name)),
+            [20.0, 20.0, rate, 1.0]
         );
         assert_eq!(decode(sent), sent);
     }
@@ -157,7 +170,7 @@ fn guidance() {
     let dbc = dbc();
     for raw in -20_480..=20_480_i32 {
         let torque = f64::from(raw) / 4096.0;
-        let (code, bits) = (raw.rem_euclid(7), (raw & 0x3_FFFF) as u32);
+        let (code, bits) = (raw.rem_euclid(7), (raw & 0xF_FFFF) as u32);
         let sent = Guidance {
             torque: Torque::from_nm(torque),
             limit: LimitReason::from_code(i64::from(code)).unwrap(),
@@ -172,7 +185,7 @@ fn guidance() {
         assert_eq!(signal(&dbc, &frame, "Mode"), f64::from(code));
         assert_eq!(signal(&dbc, &frame, "Warning"), f64::from(u8::from(raw % 2 == 0)));
         assert_eq!(signal(&dbc, &frame, "Reset"), f64::from(code));
-        let classes = [("ClassB", 0x3_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
+        let classes = [("ClassB", 0x7_80FF), ("ClassC", 0x1F00), ("ClassLocked", 0x6000)];
         for (name, mask) in classes {
             assert_eq!(
                 signal(&dbc, &frame, name),
@@ -267,7 +280,7 @@ fn parameters() {
         .iter()
         .any(|v| v.signal_name == "ParameterWrite_Value");
     assert!(is_float);
-    for (index, value) in [(0, 0.25_f32), (7, 5.0), (15, 0.001_753), (18, 0.0)] {
+    for (index, value) in [(0, 0.25_f32), (7, 5.0), (17, 0.001_753), (21, 0.0)] {
         let sent = ParameterWrite { index, value };
         let frame = sent.encode(index);
         assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
@@ -277,7 +290,7 @@ fn parameters() {
         assert_eq!(decode(sent), sent);
     }
     let beyond = ParameterWrite {
-        index: 19,
+        index: 22,
         value: 1.0,
     };
     assert_eq!(ParameterWrite::unpack(beyond.pack()), None);
@@ -304,14 +317,20 @@ fn parameters() {
 fn unlock_value_and_rejection() {
     let dbc = dbc();
     let sent = ParameterUnlock {
+        vehicle: 1_048_575,
         sequence: 0xFEDC_BA98,
     };
-    assert_eq!(
-        signal(&dbc, &sent.encode(0), "Sequence"),
-        f64::from(0xFEDC_BA98_u32)
-    );
+    let signals = ["Vehicle", "Sequence"].map(|name| signal(&dbc, &sent.encode(0), name));
+    assert_eq!(signals, [1_048_575.0, f64::from(0xFEDC_BA98_u32)]);
     assert_eq!(decode(sent), sent);
-    for (index, value) in [(0, 0.25_f32), (18, 0.7)] {
+    let sent = Identity {
+        vehicle: 654_321,
+        hardware: 0xFEDC_BA98,
+    };
+    let signals = ["Vehicle", "Hardware"].map(|name| signal(&dbc, &sent.encode(0), name));
+    assert_eq!(signals, [654_321.0, f64::from(0xFEDC_BA98_u32)]);
+    assert_eq!(decode(sent), sent);
+    for (index, value) in [(0, 0.25_f32), (20, 0.7)] {
         let sent = ParameterValue { index, value };
         let frame = sent.encode(index);
         assert_eq!(signal(&dbc, &frame, "Index"), f64::from(index));
@@ -416,6 +435,26 @@ fn one_lsb_beyond_the_range_is_rejected_when_received() {
             }
         }
     }
+}
+
+/// The raw value -8192 of a yaw rate has no counterpart to the left, so it is no value; where the sender says that it has
+/// no good one, nobody looks at it. Beyond the range a value saturates when it is sent.
+#[test]
+fn a_yaw_rate_counts_only_where_it_is_valid() {
+    let unpack = |raw: i64, valid: u64| {
+        Vehicle::unpack(((raw as u64) & 0x3FFF) << 44 | valid << 58)
+            .map(|v| v.yaw_rate.map(|r| r.rad_per_s()))
+    };
+    assert_eq!(unpack(-8191, 1), Some(Some(-8191.0 / 4096.0)));
+    assert_eq!(unpack(-8192, 1), None);
+    assert_eq!(unpack(-8192, 0), Some(None));
+    assert_eq!(unpack(100, 0), Some(None));
+    let spinning = Vehicle {
+        yaw_rate: Some(TurningRate::from_rad_per_s(-5.0)),
+        ..Vehicle::default()
+    };
+    let sent = decode(spinning).yaw_rate.map(|rate| rate.rad_per_s());
+    assert_eq!(sent, Some(-8191.0 / 4096.0));
 }
 
 /// By their lateral errors in 2^-13 m, 32,769 is beyond 4 m: a sender is trusted with its third good frame in a row,

@@ -7,7 +7,7 @@ use haptic_core::download::{Conditions, Download, UNLOCK_MS, frames, mode_for_pa
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_core::params::Params;
-use haptic_core::stored::Stored;
+use haptic_core::stored::{Set, Stored};
 
 /// Every value is a binary32, so that the bus rounds nothing.
 const SET: Params = Params {
@@ -24,8 +24,18 @@ const SET: Params = Params {
         aligning_gain_nm_s2_per_m: 1.25,
         column_damping_nm_s: 0.5,
         far_time_s: 0.75,
+        near_time_s: 0.375,
     },
     ..Params::PAPER
+};
+
+/// The vehicle that it is for.
+const VEHICLE: u32 = 654_321;
+
+/// What comes of it.
+const TAKEN: Set = Set {
+    params: SET,
+    vehicle: VEHICLE,
 };
 
 /// Where a set is taken.
@@ -44,12 +54,12 @@ const fn in_mode(mode: Mode) -> Conditions {
 /// A receiver that was unlocked.
 fn unlocked() -> Download {
     let mut download = Download::NEW;
-    assert_eq!(download.receive(&unlock(7), &READY), None);
+    assert_eq!(download.receive(&unlock(7, VEHICLE), &READY), None);
     download
 }
 
 /// What such a receiver makes of frames.
-fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
+fn receive(frames: &[Frame], mode: Mode) -> (Option<Set>, WriteOutcome) {
     let mut download = unlocked();
     let taken = frames
         .iter()
@@ -62,7 +72,7 @@ fn receive(frames: &[Frame], mode: Mode) -> (Option<Params>, WriteOutcome) {
 fn a_whole_set_in_standby_is_taken() {
     assert_eq!(
         receive(&frames(&SET), Mode::Standby),
-        (Some(SET), WriteOutcome::Taken)
+        (Some(TAKEN), WriteOutcome::Taken)
     );
 }
 
@@ -118,7 +128,7 @@ fn other_messages_between_the_fields_do_no_harm() {
         .into_iter()
         .flat_map(|frame| [other, frame])
         .collect();
-    assert_eq!(receive(&mixed, Mode::Standby), (Some(SET), WriteOutcome::Taken));
+    assert_eq!(receive(&mixed, Mode::Standby), (Some(TAKEN), WriteOutcome::Taken));
 }
 
 /// Each frame lost, sent twice, or swapped with its neighbour.
@@ -134,7 +144,7 @@ fn a_set_with_a_gap_is_refused() {
         swapped.swap(i, (i + 1) % good.len());
         assert_eq!(receive(&lost, Mode::Standby).0, None, "frame {i} lost");
         // A first field sent again only begins anew, and before a last one came again the set was whole.
-        if i != 0 && i != 18 {
+        if i != 0 && i != 21 {
             assert_eq!(receive(&twice, Mode::Standby).0, None, "frame {i} twice");
         }
         assert_eq!(receive(&swapped, Mode::Standby).0, None, "frame {i} swapped");
@@ -199,7 +209,7 @@ fn a_value_out_of_its_range_spoils_the_set() {
 #[test]
 fn the_ends_of_every_range_are_taken() {
     type Field = fn(&mut Params) -> &mut f64;
-    let fields: [(Field, f64, f64); 19] = [
+    let fields: [(Field, f64, f64); 22] = [
         (|p| &mut p.k_1, 0.0, 4.0),
         (|p| &mut p.a_1, 0.0, 100.0),
         (|p| &mut p.a_2, 0.0, 100.0),
@@ -214,17 +224,20 @@ fn the_ends_of_every_range_are_taken() {
         (|p| &mut p.probe_frequency_hz, 1.0, 5.0),
         (|p| &mut p.t_nms_s, 0.01, 1.0),
         (|p| &mut p.k_nms, 0.0, 10.0),
+        (|p| &mut p.low_speed_share, 0.0, 1.0),
+        (|p| &mut p.high_speed_share, 0.0, 1.0),
         (|p| &mut p.vehicle.curvature_gain_per_m, 0.001, 0.1),
         (|p| &mut p.vehicle.stability_factor_s2_per_m2, 0.0, 0.01),
         (|p| &mut p.vehicle.aligning_gain_nm_s2_per_m, 0.0, 20.0),
         (|p| &mut p.vehicle.column_damping_nm_s, 0.0, 10.0),
         (|p| &mut p.vehicle.far_time_s, 0.1, 3.0),
+        (|p| &mut p.vehicle.near_time_s, 0.0, 5.0),
     ];
     for (i, (field, min, max)) in fields.into_iter().enumerate() {
         for end in [min, max] {
             // Others so small that no product is beyond its own range.
             let mut sent = Params {
-                k_1: 0.25,
+                k_1: 0.02,
                 a_3: 1.0,
                 probe_amplitude_nm: 0.1,
                 probe_frequency_hz: 1.5,
@@ -233,7 +246,7 @@ fn the_ends_of_every_range_are_taken() {
             *field(&mut sent) = end;
             let (taken, outcome) = receive(&frames(&sent), Mode::Standby);
             assert_eq!(outcome, WriteOutcome::Taken, "field {i} = {end}");
-            let got = *field(&mut taken.unwrap());
+            let got = *field(&mut taken.unwrap().params);
             assert!((got - end).abs() <= 6e-8 * end, "field {i}: {got} for {end}");
             for (beyond, by) in [(min, -1e-6), (max, 1e-6)] {
                 *field(&mut sent) = beyond + by * max;
@@ -259,15 +272,15 @@ fn a_refused_set_can_be_sent_again() {
     // An unlock is for one attempt.
     assert_eq!(again(&mut download), None);
     assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
-    download.receive(&unlock(7), &READY);
-    assert_eq!(again(&mut download), Some(SET));
+    download.receive(&unlock(7, VEHICLE), &READY);
+    assert_eq!(again(&mut download), Some(TAKEN));
     assert_eq!(again(&mut download), None, "and for one set");
 }
 
 #[test]
 fn the_status_names_the_set_in_use() {
     let stored = Stored {
-        params: SET,
+        set: TAKEN,
         sequence: 7,
         copy: 1,
     };
@@ -336,7 +349,7 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
         now_ms: u32::MAX - 5,
         ..READY
     };
-    download.receive(&unlock(7), &begin);
+    download.receive(&unlock(7, VEHICLE), &begin);
     let end = Conditions {
         now_ms: UNLOCK_MS - 6,
         ..READY
@@ -350,7 +363,7 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
 /// A download that was recorded unlocks with the number of a set that is no longer in use.
 #[test]
 fn a_recorded_download_is_none() {
-    let recorded: Vec<Frame> = [unlock(7)].into_iter().chain(frames(&SET)).collect();
+    let recorded: Vec<Frame> = [unlock(7, VEHICLE)].into_iter().chain(frames(&SET)).collect();
     for in_use in [8, 6, 0] {
         let mut download = Download::NEW;
         let conditions = Conditions { in_use, ..READY };
@@ -386,10 +399,10 @@ fn an_ecu_that_is_locked_for_want_of_parameters_alone_takes_some() {
 fn the_values_in_use_go_round_in_their_order() {
     let expected = [0.5, 1.5, 0.25, 20.0];
     for (turn, expected) in (0..).zip(expected) {
-        for round in [0, 19, 190] {
+        for round in [0, 22, 220] {
             let told = value(&SET, turn + round).unwrap();
             assert_eq!((u32::from(told.index), told.value), (turn, expected));
         }
     }
-    assert_eq!(value(&SET, 18).map(|told| told.value), Some(0.75));
+    assert_eq!(value(&SET, 21).map(|told| told.value), Some(0.375));
 }

@@ -102,12 +102,14 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
             for _ in 0..30 {
                 assert_eq!(rig.tick().command.mode, Mode::Active, "{fault:?}");
             }
-            for k in 1..=2000 {
+            // Without a driver torque no hand can end it sooner: half the time.
+            let length = if sender == COLUMN { 1000 } else { 2000 };
+            for k in 1..=length {
                 let step = rig.tick();
                 assert_eq!(step.command.mode, Mode::Handover, "{fault:?} {k}");
                 assert!(step.command.warning && step.command.faults.contains(fault));
                 assert_eq!(warns(&step), k % 100 == 1, "a warning at once, then every 100 ms");
-                let expected = held * (1.0 - f64::from(k) / 2000.0);
+                let expected = held * (1.0 - f64::from(k) / f64::from(length));
                 let got = step.command.torque.nm();
                 assert!(
                     (got - expected).abs() <= 2.0 * BUS_LSB,
@@ -149,13 +151,13 @@ fn a_handover_starts_from_the_torque_before_the_silence() {
     for k in 2..=2000 {
         let got = rig.tick().command.torque.nm();
         let ramp = trusted * (1.0 - f64::from(k) / 2000.0);
-        // At most 5 ms of history lie between two remembered outputs.
+        // At most 40 ms of history lie between two remembered outputs.
         assert!(k < 100 || (got - ramp).abs() <= 0.02, "{k}: {got}, not {ramp}");
     }
 }
 
 #[test]
-fn a_handover_after_an_implausible_input_starts_from_the_torque_250_ms_before() {
+fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::active_in_curve(sign * 0.4);
         // The second source drifts to 1.9 m/s above the first.
@@ -165,18 +167,18 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_250_ms_before() 
         }
         // At most 5 ms of history lie between two remembered outputs, and the torque rises by 2.4 mN.m per ms.
         let mut outputs = Vec::new();
-        for k in 0..300 {
+        for k in 0..600 {
             rig.curve(sign * (0.4 + 0.0024 * f64::from(k)));
             rig.tick();
             outputs.push(rig.applied);
         }
         rig.speeds[1] = rig::SPEED + 2.1;
-        let (ms, step) = rig.run_until(10, |step| step.command.mode == Mode::Handover);
+        let (ms, step) = rig.run_until(31, |step| step.command.mode == Mode::Handover);
         assert!(step.command.faults.contains(Fault::SpeedImplausible));
         let declared = outputs.len() + ms as usize - 1;
-        let trusted = outputs[declared - 250];
+        let trusted = outputs[declared - 500];
         assert!(
-            (0.4..0.7).contains(&(sign * trusted)) && sign * rig.applied > 1.0,
+            (0.4..0.8).contains(&(sign * trusted)) && sign * rig.applied > 1.0,
             "{trusted} of {}",
             rig.applied
         );
@@ -184,7 +186,7 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_250_ms_before() 
             let got = rig.tick().command.torque.nm();
             let ramp = trusted * (1.0 - f64::from(k) / 2000.0);
             // Before, the reduction limit brings it down to the ramp at 8 mN.m per step.
-            assert!(k < 150 || (got - ramp).abs() <= 0.02, "{k}: {got}, not {ramp}");
+            assert!(k < 200 || (got - ramp).abs() <= 0.1, "{k}: {got}, not {ramp}");
         }
         assert_eq!(rig.applied, 0.0);
     }
@@ -312,6 +314,9 @@ fn speeds_that_disagree_and_speeds_too_low() {
         }
         // Both round to the bus's 2^-8 m/s.
         rig.speeds = [16.0, 16.0 + apart];
+        // One message may be that of a wheel that slips, and two: the third is a fault.
+        let step = rig.run(10);
+        assert_eq!(step.command.mode, Mode::Active, "{apart}");
         let step = rig.run(10);
         assert_eq!(step.command.mode, expected, "{apart}");
         let implausible = step.command.faults.contains(Fault::SpeedImplausible);
@@ -468,7 +473,7 @@ fn late_and_early_steps() {
 
 #[test]
 fn a_motor_that_does_not_obey() {
-    let motors: [fn(f64) -> f64; 3] = [|t| t / 2.0, |_| 0.0, |t| -t];
+    let motors: [fn(f64) -> f64; 3] = [|t| t + 0.3, |t| 1.3 * t, |t| -t];
     for motor in motors {
         let mut rig = Rig::active_in_curve(1.0);
         rig.motor = motor;
@@ -481,6 +486,22 @@ fn a_motor_that_does_not_obey() {
         rig.run(50);
         rig.engage = true;
         assert_eq!(rig.run(1500).command.mode, Mode::Fault);
+    }
+    // What is missing is handed over, and the driver warned; it is no fault of class C.
+    let motors: [fn(f64) -> f64; 2] = [|t| t / 2.0, |_| 0.0];
+    for motor in motors {
+        let mut rig = Rig::active_in_curve(1.0);
+        rig.motor = motor;
+        let (ms, step) = rig.run_until(60, |step| step.command.mode != Mode::Active);
+        assert!(step.command.faults.contains(Fault::MotorWeak) && step.command.warning);
+        assert!(
+            step.command.mode == Mode::Handover && (50..=56).contains(&ms),
+            "{ms}"
+        );
+        // From the torque that was applied, over two seconds.
+        assert!((rig.applied - 1.0).abs() < 0.01, "{}", rig.applied);
+        assert_eq!(rig.run(1500).command.mode, Mode::Handover);
+        assert_eq!(rig.run(600).command.mode, Mode::Standby);
     }
     // Within the margin of 0.1 N.m there is nothing to say; one that ignores zero is found in Standby too.
     let mut rig = Rig::active_in_curve(1.0);
@@ -692,8 +713,8 @@ fn a_lane_preview_that_never_ages_is_stale_to_the_monitor() {
     rig.tick();
     rig.ecu.keep_lane_fresh();
     rig.silent[LANE] = true;
-    let (ms, step) = rig.run_until(100, |step| step.command.mode != Mode::Active);
-    assert_eq!((ms, step.command.mode), (41, Mode::Fault));
+    let (ms, step) = rig.run_until(400, |step| step.command.mode != Mode::Active);
+    assert_eq!((ms, step.command.mode), (361, Mode::Fault));
     assert!(step.command.faults.contains(Fault::Monitor) && !step.permitted);
 }
 

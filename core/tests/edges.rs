@@ -4,7 +4,7 @@
 
 mod rig;
 
-use haptic_core::actuator::Actuator;
+use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{Guidance, Message};
@@ -108,10 +108,10 @@ fn grow(rig: &mut Rig, torque: &mut f64, slope: f64, until: f64, period: u64) ->
 }
 
 /// Asserts that the handover under way follows the line from `trusted`, that began `ms` ago.
-fn assert_line(rig: &mut Rig, trusted: f64) {
-    for k in 2..=1900 {
+fn assert_line(rig: &mut Rig, trusted: f64, length: u32) {
+    for k in 2..=length - 100 {
         let got = rig.tick().command.torque.nm();
-        let line = trusted * (1.0 - f64::from(k) / 2000.0);
+        let line = trusted * (1.0 - f64::from(k) / f64::from(length));
         // Before, the reduction limit brings it down; between two remembered outputs lie 5 ms.
         assert!(k < 100 || (got - line).abs() <= 0.02, "{k}: {got}, not {line}");
     }
@@ -139,7 +139,8 @@ fn a_handover_trusts_no_output_of_the_silence_whoever_is_silent() {
             "{sender}: {}",
             rig.applied
         );
-        assert_line(&mut rig, trusted);
+        // Without a column twice as fast.
+        assert_line(&mut rig, trusted, if sender == COLUMN { 1000 } else { 2000 });
     }
 }
 
@@ -159,7 +160,7 @@ fn a_silence_is_counted_in_time_and_not_in_steps() {
         }
     }
     assert!(rig.applied > trusted + 0.05, "{}", rig.applied);
-    assert_line(&mut rig, trusted);
+    assert_line(&mut rig, trusted, 1000);
 }
 
 /// The checks take the first speed though the second contradicts it, and find fault with honest inputs.
@@ -183,8 +184,9 @@ fn what_the_column_summed_up_ends_with_its_loss() {
     let implausible = |step: &Step| step.command.faults.contains(Fault::ColumnImplausible);
     let mut rig = Rig::paper();
     rig.run(100);
-    // 1.2 N.m that turn nothing: 0.54 N.m.s after 600 ms, with a memory of 1 s; the margin is 0.6.
-    rig.driver = Some(1.2);
+    // 1.7 N.m that turn nothing, of which friction may hold 0.5: 0.54 N.m.s after 600 ms, with a memory of 1 s; the
+    // margin is 0.6.
+    rig.driver = Some(1.7);
     for _ in 0..600 {
         assert!(!implausible(&rig.tick()));
     }
@@ -254,13 +256,13 @@ fn each_of_the_three_frames_of_a_new_sender_needs_its_crc() {
 #[test]
 fn a_motor_is_astray_for_ten_steps_and_not_eleven() {
     let mut actuator = Actuator::default();
-    let obeys: Vec<bool> = (0..12)
+    let judged: Vec<Motor> = (0..12)
         .map(|_| {
             actuator.deliver(Torque::from_nm(0.11));
-            actuator.obeys(Torque::ZERO)
+            actuator.judge(Torque::ZERO)
         })
         .collect();
-    assert_eq!(obeys.iter().position(|obeys| !obeys), Some(10));
+    assert_eq!(judged.iter().position(|motor| *motor == Motor::Astray), Some(10));
 }
 
 /// SPEAKS_FOR of 5 steps instead of 4.
@@ -268,15 +270,15 @@ fn a_motor_is_astray_for_ten_steps_and_not_eleven() {
 fn a_measurement_speaks_for_four_steps_and_not_five() {
     let mut actuator = Actuator::default();
     // One every six steps: four of them count, so that the eleventh astray is the third of the third six.
-    let obeys: Vec<bool> = (0..24)
+    let judged: Vec<Motor> = (0..24)
         .map(|step| {
             if step % 6 == 0 {
                 actuator.deliver(Torque::from_nm(0.11));
             }
-            actuator.obeys(Torque::ZERO)
+            actuator.judge(Torque::ZERO)
         })
         .collect();
-    assert_eq!(obeys.iter().position(|obeys| !obeys), Some(14));
+    assert_eq!(judged.iter().position(|motor| *motor == Motor::Astray), Some(14));
 }
 
 /// The first sample is taken for one that follows a sample at phase zero: the first block begins in the middle of its

@@ -35,16 +35,17 @@ fn sets_follow_from_the_classes() {
         FaultSet::INPUT,
         FaultSet::CRITICAL,
         FaultSet::LOCKING,
-        FaultSet::IMPLAUSIBLE,
+        FaultSet::FADING,
     ]
     .map(FaultSet::bits);
-    assert_eq!(bits, [0x3_80FF, 0x1F00, 0x6000, 0x0054]);
+    assert_eq!(bits, [0x7_80FF, 0x1F00, 0x6000, 0x8_0000]);
     assert_eq!(FaultSet::of(Class::C), FaultSet::CRITICAL);
 }
 
 #[test]
 fn bits_without_a_fault_are_dropped() {
-    assert_eq!(FaultSet::from_bits(u32::MAX).bits(), 0x3_FFFF);
+    assert_eq!(FaultSet::from_bits(u32::MAX).bits(), 0xF_FFFF);
     assert_eq!(Fault::from_code(17), Some(Fault::OwnIdentifier));
-    assert_eq!(Fault::from_code(18), None);
+    assert_eq!(Fault::from_code(19), Some(Fault::HandsOff));
+    assert_eq!(Fault::from_code(20), None);
 }

@@ -1,7 +1,7 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
 use haptic_core::config::Config;
-use haptic_core::law::{LaneSample, Law, LawState};
+use haptic_core::law::{LaneSample, Law, LawState, Since};
 use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians};
 use rand::rngs::SmallRng;
@@ -79,7 +79,7 @@ impl Pair {
         let read_at = now.after(Micros::from_us(age_us));
         let torque = self
             .law
-            .step(&mut self.state, read_at, lane)
+            .step(&mut self.state, read_at, lane, &Since::NOTHING)
             .nm()
             .clamp(-5.0, 5.0);
         let t_s = self.t_us as f64 * 1e-6;
@@ -208,11 +208,11 @@ fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
             at,
             ..LaneSample::default()
         };
-        let _ = law.step(&mut state, at, sample);
+        let _ = law.step(&mut state, at, sample, &Since::NOTHING);
     }
     let mut read = |ms: u32| {
         let now = sample.at.after(Micros::from_ms(ms));
-        law.step(&mut state, now, sample).nm()
+        law.step(&mut state, now, sample, &Since::NOTHING).nm()
     };
     // K_1*a3' = 10 N.m/rad times 0.1 rad/s times the age.
     for (ms, grown) in [(30, 0.03), (500, 0.5), (501, 0.5), (5_000, 0.5)] {

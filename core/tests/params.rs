@@ -109,6 +109,6 @@ fn values_and_fields_are_in_the_order_of_the_list() {
     assert_eq!(params.to_values(), numbered);
     assert_eq!(
         (params.k_1, params.k_nms, params.vehicle.far_time_s),
-        (0.0, 13.0, 18.0)
+        (0.0, 13.0, 20.0)
     );
 }

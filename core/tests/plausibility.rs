@@ -6,10 +6,11 @@
 
 use haptic_core::config::Config;
 use haptic_core::law::LaneSample;
+use haptic_core::past::Past;
 use haptic_core::plausibility::{
     Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
 };
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
 
 const DT: f64 = 1e-3;
 // Table 8.
@@ -76,15 +77,28 @@ fn wanted(course: Course, t: f64) -> (f64, f64) {
 }
 
 /// Drives 12 s. `side` is 1 for a course to the left, -1 to the right.
+fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Sensors, from_s: f64) -> Drive {
+    drive_with(speed, course, side, guidance_share, sensors, from_s, None)
+}
+
+/// The same, with a measured yaw rate that is `yaw_rate_bias` off, and a camera that points 3 mrad aside.
 #[expect(
     clippy::too_many_lines,
     reason = "a whole vehicle with its sensors, step by step"
 )]
-fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Sensors, from_s: f64) -> Drive {
+fn drive_with(
+    speed: f64,
+    course: Course,
+    side: f64,
+    guidance_share: f64,
+    sensors: Sensors,
+    from_s: f64,
+    yaw_rate_bias: Option<f64>,
+) -> Drive {
     let config = Config::PAPER;
     let checks: &Plausibility = &config.plausibility;
-    let mut state = PlausibilityState::NEW;
-    checks.speed(&mut state, Speed::from_m_per_s(speed));
+    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    checks.motion(&mut state, Speed::from_m_per_s(speed), None);
     // beta, yaw rate, wheel and its rate; offset and heading against the line.
     let (mut beta, mut r, mut phi, mut phi_rate) = (0.0, 0.0, 0.0_f64, 0.0_f64);
     let (mut y, mut psi) = (0.0, 0.0);
@@ -124,6 +138,11 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
 
         let at = Instant::from_us(u32::MAX - 5_000_000).after(Micros::from_ms(k));
         let wrong = t >= from_s;
+        if let Some(bias) = yaw_rate_bias.filter(|_| k % 10 == 0) {
+            let rate = TurningRate::from_rad_per_s(((r + bias) * 4096.0).round() / 4096.0);
+            checks.motion(&mut state, Speed::from_m_per_s(speed), Some(rate));
+            past.turn(at, rate);
+        }
         if k % 2 == 0 {
             let measured = match sensors {
                 Sensors::DriverFull if wrong => 20.0,
@@ -139,6 +158,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
         }
         if k % 8 == 0 {
             let (e_y, mut e_theta) = errors(0.3, 0.7);
+            e_theta += if yaw_rate_bias.is_some() { 0.003 } else { 0.0 };
             if wrong {
                 let held = *frozen.get_or_insert(e_theta);
                 if sensors == Sensors::YawFrozen {
@@ -150,7 +170,7 @@ fn drive(speed: f64, course: Course, side: f64, guidance_share: f64, sensors: Se
                 e_theta: Radians::from_rad((e_theta * 65536.0).round() / 65536.0),
                 at,
             };
-            if !checks.lane(&mut state, sample) {
+            if !checks.lane(&mut state, &mut past, sample.at, sample) {
                 drive.lane_declared_s.get_or_insert(t);
             }
             let (lane, column) = Plausibility::used(&state);
@@ -209,12 +229,39 @@ fn honest_driving_is_never_declared() {
     }
 }
 
+/// The same driving with a measured yaw rate: less of the margin is used though the yaw rate is 3 mrad/s off, the camera
+/// points 3 mrad aside, and the wheel's angle is not looked at.
+#[test]
+fn a_measured_yaw_rate_knows_swerves_from_lies() {
+    for (name, course) in [
+        ("abrupt curve", Course::Curve(0.0)),
+        ("clothoid of 2 s", Course::Curve(2.0)),
+        ("lane change", Course::LaneChange),
+        ("swerve", Course::Swerve),
+    ] {
+        for kmh in SPEEDS_KMH {
+            for (side, bias) in [(1.0, 0.003), (-1.0, 0.003), (1.0, -0.003)] {
+                let d = drive_with(kmh / 3.6, course, side, 0.3, Sensors::Honest, 99.0, Some(bias));
+                println!(
+                    "{name}, {kmh} km/h, to {side}, bias {bias}: {:.3} m of 0.4",
+                    d.lane_used_m
+                );
+                assert_eq!(
+                    (d.lane_declared_s, d.column_declared_s),
+                    (None, None),
+                    "{name} {kmh}"
+                );
+            }
+        }
+    }
+}
+
 /// A vehicle that crosses a straight line at 1 m/s to the side, its wheel straight, fed to the check sample by
 /// sample; from 2 s on, with `e_y` = 0 there, `spoil` changes what is sent. When it was declared, s after that.
 fn crossing(speed: f64, side: f64, spoil: impl Fn(f64, f64) -> (f64, f64)) -> f64 {
     let checks = Config::PAPER.plausibility;
-    let mut state = PlausibilityState::NEW;
-    checks.speed(&mut state, Speed::from_m_per_s(speed));
+    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    checks.motion(&mut state, Speed::from_m_per_s(speed), None);
     for k in 0..6000 / 8 {
         let t = f64::from(k) * 8e-3 - 2.0;
         let (mut e_y, mut e_theta) = (-t, -1.0 / speed);
@@ -225,7 +272,7 @@ fn crossing(speed: f64, side: f64, spoil: impl Fn(f64, f64) -> (f64, f64)) -> f6
             at: Instant::from_us(u32::MAX - 1_000_000).after(Micros::from_ms(8 * k)),
             ..lane(side * e_y, side * e_theta)
         };
-        if !checks.lane(&mut state, sample) {
+        if !checks.lane(&mut state, &mut past, sample.at, sample) {
             assert!(t >= 0.0, "declared while it was right");
             return t;
         }
@@ -295,7 +342,8 @@ fn a_wrong_driver_torque_is_declared() {
         // 19 N.m or more out of nowhere: 0.6 N.m.s within 32 ms, seen in samples of 2 ms.
         let full = drive(kmh / 3.6, Course::Curve(2.0), 1.0, 0.0, Sensors::DriverFull, 1.0);
         assert!(full.column_declared_s.is_some_and(|t| t < 1.04));
-        // 0.987 N.m at 1 m/s2, flipped: 1.97*(1 - exp(-t)) = 0.6 after 0.36 s.
+        // 0.987 N.m at 1 m/s2, flipped, less 0.5 N.m of friction and 0.3 of what is not known of the aligning torque:
+        // 1.17*(1 - exp(-t)) = 0.6 after 0.72 s, later by what is learnt for a constant torque meanwhile.
         let flipped = drive(
             kmh / 3.6,
             Course::Curve(2.0),
@@ -306,7 +354,7 @@ fn a_wrong_driver_torque_is_declared() {
         );
         let after = flipped.column_declared_s.map(|t| t - 6.0);
         assert!(
-            after.is_some_and(|t| (0.25..0.55).contains(&t)),
+            after.is_some_and(|t| (0.55..0.85).contains(&t)),
             "{kmh}: {after:?}"
         );
     }
@@ -324,14 +372,19 @@ fn lane(e_y: f64, e_theta: f64) -> LaneSample {
 fn what_was_lost_is_not_held_against_what_comes() {
     let checks = Config::PAPER.plausibility;
     let mut state = PlausibilityState::NEW;
-    checks.speed(&mut state, Speed::from_m_per_s(20.0));
+    checks.motion(&mut state, Speed::from_m_per_s(20.0), None);
     let at = |ms: u32| Instant::from_us(1_000).after(Micros::from_ms(ms));
     let full = |state: &mut PlausibilityState, ms| {
         checks.column(state, at(ms), Torque::from_nm(20.0), Radians::ZERO, Torque::ZERO)
     };
     let standing = |state: &mut PlausibilityState, ms| {
         let sample = lane(0.0, 0.05);
-        checks.lane(state, LaneSample { at: at(ms), ..sample })
+        checks.lane(
+            state,
+            &mut Past::new(),
+            at(ms),
+            LaneSample { at: at(ms), ..sample },
+        )
     };
     // 1 m/s to the side that does not come, and 20 N.m that turn nothing: one sample before each margin.
     assert!((0..=496).step_by(8).all(|ms| standing(&mut state, ms)));
@@ -340,10 +393,10 @@ fn what_was_lost_is_not_held_against_what_comes() {
         let (lane, column) = Plausibility::used(state);
         [lane.m(), column.nm_s()]
     };
-    // 1 - exp(-t) metres after 0.496 s; 20 N.m for 28 ms, less what 1 s of memory forgets.
+    // 1 - exp(-t) metres after 0.496 s; 20 N.m less 0.5 for 28 ms, less what 1 s of memory forgets.
     let [seen, summed] = used(&state);
     assert!((seen - 0.391).abs() < 2e-3, "{seen}");
-    assert!((summed - 0.552).abs() < 2e-3, "{summed}");
+    assert!((summed - 0.538).abs() < 2e-3, "{summed}");
     let mut lost = state;
     lost.forget_lane();
     lost.forget_column();

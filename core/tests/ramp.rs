@@ -97,9 +97,14 @@ fn trusted_is_the_last_output_kept_before_the_suspect_time() {
             "{suspect_ms}: {got} mN.m"
         );
     }
-    // Further back than anything kept: the oldest, 50 times 5 ms before the newest.
-    let oldest = history.trusted(now, Micros::from_ms(100_000)).nm() * 1e3;
-    assert!((145.0..=150.1).contains(&oldest), "{oldest}");
+    // From 300 ms on in steps of 40 ms; further back than anything kept, nothing is known.
+    let (history, last) = rising(4000);
+    for suspect_ms in [300, 1000, 1500, 2000, 2400] {
+        let got = history.trusted(last, Micros::from_ms(suspect_ms)).nm() * 1e3;
+        let newest = f64::from(4000 - suspect_ms);
+        assert!(got < newest && got > newest - 40.1, "{suspect_ms}: {got} mN.m");
+    }
+    assert_eq!(history.trusted(last, Micros::from_ms(2600)), Torque::ZERO);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use haptic_core::config::Setup;
 use haptic_core::params::{Params, VehicleParams};
-use haptic_core::stored::{BYTES, Stored, load, save};
+use haptic_core::stored::{BYTES, Set, Stored};
 
 /// CRC-32 bit by bit (ISO-HDLC).
 fn crc32(bytes: &[u8]) -> u32 {
@@ -16,17 +16,38 @@ fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
+/// The processor that writes and reads, and the vehicle.
+const HARDWARE: u32 = 0x0506_0708;
+const VEHICLE: u32 = 654_321;
+
+const fn set(params: Params) -> Set {
+    Set {
+        params,
+        vehicle: VEHICLE,
+    }
+}
+
+fn save(params: &Params, sequence: u32) -> [u8; BYTES] {
+    haptic_core::stored::save(&set(*params), sequence, HARDWARE)
+}
+
+fn load(copies: [&[u8]; 2]) -> Option<Stored> {
+    haptic_core::stored::load(copies, HARDWARE)
+}
+
 /// A block by the table in `stored.rs`.
 fn block(version: u32, sequence: u32, values: &[f64]) -> Vec<u8> {
-    let mut bytes = [version.to_le_bytes(), sequence.to_le_bytes()].concat();
+    let head = [version, sequence, HARDWARE, VEHICLE];
+    let mut bytes = head.map(u32::to_le_bytes).concat();
     bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     bytes.extend(crc32(&bytes).to_le_bytes());
     bytes
 }
 
 /// A different value in each field.
-const VALUES: [f64; 19] = [
-    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.02, 0.001, 1.25, 0.5, 0.75,
+const VALUES: [f64; 22] = [
+    0.5, 1.5, 0.25, 20.0, 2.0, 9.0, 3.0, 3.5, 7.0, 6.0, 0.1, 2.0, 0.2, 1.5, 0.75, 0.25, 0.02, 0.001, 1.25,
+    0.5, 0.75, 0.375,
 ];
 
 fn params() -> Params {
@@ -45,19 +66,22 @@ fn params() -> Params {
         probe_frequency_hz: 2.0,
         t_nms_s: 0.2,
         k_nms: 1.5,
+        low_speed_share: 0.75,
+        high_speed_share: 0.25,
         vehicle: VehicleParams {
             curvature_gain_per_m: 0.02,
             stability_factor_s2_per_m2: 0.001,
             aligning_gain_nm_s2_per_m: 1.25,
             column_damping_nm_s: 0.5,
             far_time_s: 0.75,
+            near_time_s: 0.375,
         },
     }
 }
 
 fn found(params: Params, sequence: u32, copy: usize) -> Option<Stored> {
     Some(Stored {
-        params,
+        set: set(params),
         sequence,
         copy,
     })
@@ -67,8 +91,8 @@ fn found(params: Params, sequence: u32, copy: usize) -> Option<Stored> {
 fn the_layout_is_the_documented_one() {
     assert_eq!(crc32(b"123456789"), 0xCBF4_3926);
     let bytes = save(&params(), 0x0102_0304);
-    assert_eq!(bytes.to_vec(), block(1, 0x0102_0304, &VALUES));
-    assert_eq!(bytes.len(), 164);
+    assert_eq!(bytes.to_vec(), block(2, 0x0102_0304, &VALUES));
+    assert_eq!(bytes.len(), 196);
     assert_eq!(load([&bytes, &[]]), found(params(), 0x0102_0304, 0));
 }
 
@@ -127,8 +151,8 @@ fn a_write_over_the_oldest_copy_cut_short_at_any_byte() {
 
 #[test]
 fn other_versions_and_values_out_of_range_are_no_good() {
-    assert_eq!(load([&block(2, 1, &VALUES), &[]]), None);
-    assert_eq!(load([&block(1, 1, &VALUES[..18]), &[]]), None);
+    assert_eq!(load([&block(1, 1, &VALUES), &[]]), None);
+    assert_eq!(load([&block(2, 1, &VALUES[..21]), &[]]), None);
     let ranges_end = [
         (0, 4.1),
         (5, 0.4),
@@ -140,16 +164,28 @@ fn other_versions_and_values_out_of_range_are_no_good() {
         (11, 0.9),
         (12, 1.1),
         (13, -0.1),
-        (14, 0.2),
+        (14, 1.1),
         (15, -0.1),
-        (16, 21.0),
-        (17, 10.1),
-        (18, f64::NAN),
+        (16, 0.2),
+        (17, -0.1),
+        (18, 21.0),
+        (19, 10.1),
+        (20, 3.1),
+        (21, f64::NAN),
     ];
     for (index, value) in ranges_end {
         let mut values = VALUES;
         values[index] = value;
-        assert_eq!(load([&block(1, 1, &values), &[]]), None, "value {index}");
+        assert_eq!(load([&block(2, 1, &values), &[]]), None, "value {index}");
+    }
+}
+
+/// The memory of one ECU in another: its limits may be those of another vehicle.
+#[test]
+fn what_another_processor_wrote_is_no_good() {
+    let copy = save(&params(), 1);
+    for other in [0, HARDWARE + 1, HARDWARE ^ 1 << 31] {
+        assert_eq!(haptic_core::stored::load([&copy, &copy], other), None);
     }
 }
 
@@ -158,7 +194,7 @@ fn absurd_values_within_range_are_accepted() {
     let mut values = VALUES;
     values[..5].fill(0.0);
     values[6] = 0.1;
-    let stored = load([&block(1, 1, &values), &[]]).unwrap();
-    assert_eq!(stored.params.torque_limit_nm, 0.1);
-    assert!(Setup::new(&stored.params).is_ok());
+    let stored = load([&block(2, 1, &values), &[]]).unwrap();
+    assert_eq!(stored.set.params.torque_limit_nm, 0.1);
+    assert!(Setup::new(&stored.set.params).is_ok());
 }

@@ -10,6 +10,8 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
 /// What the seal says of itself, and the CRC.
 pub type Seal = [u32; 2];
 
@@ -42,7 +44,6 @@ impl State {
 
 /// Judges an image of these parts by its seal.
 pub fn judge<'a>(seal: Seal, parts: impl Iterator<Item = &'a [u8]>) -> State {
-    const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
     let mut digest = CRC.digest();
     parts.for_each(|part| digest.update(part));
     match seal {
@@ -50,6 +51,13 @@ pub fn judge<'a>(seal: Seal, parts: impl Iterator<Item = &'a [u8]>) -> State {
         [UNSEALED, _] => State::Unsealed,
         _ => State::Damaged,
     }
+}
+
+/// A processor's number on the bus, from the words that its maker wrote into it.
+pub fn number_of(words: &[u32]) -> u32 {
+    let mut digest = CRC.digest();
+    words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
 }
 
 /// Looks at the image that runs.

@@ -16,7 +16,9 @@
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Column, Message, ParameterStatus, ParameterValue, Rejection, ResetCause};
+use haptic_core::bus::messages::{
+    Column, Identity, Message, ParameterStatus, ParameterValue, Rejection, ResetCause,
+};
 use haptic_core::config::Setup;
 use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::ecu::{Boot, Ecu, Step};
@@ -70,6 +72,13 @@ impl Service {
     fn status(&self) -> ParameterStatus {
         let is_damaged = self.found.damaged != [false, false];
         self.download.status(self.found.stored.as_ref(), is_damaged)
+    }
+
+    fn identity(&self) -> Identity {
+        Identity {
+            vehicle: self.found.stored.map_or(0, |stored| stored.set.vehicle),
+            hardware: ThisBoard::hardware(),
+        }
     }
 
     /// What a set finds that comes now.
@@ -142,9 +151,9 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
                 counts.rejected.count(frame.id(), reason);
             }
             let conditions = service.conditions(ecu, counts.steps);
-            if let Some(params) = service.download.receive(&frame, &conditions) {
+            if let Some(set) = service.download.receive(&frame, &conditions) {
                 ThisBoard::zero_torque();
-                reset::restart_with(&params);
+                reset::restart_with(&set);
             }
         }
         if board.tick() {
@@ -157,17 +166,18 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
 /// Stores the set that the last run left, if it did, looks at what there is, and repairs it.
 #[inline(never)]
 fn parameters(board: &mut ThisBoard) -> Found {
-    let mut found = storage::load(board.flash());
-    if let Some(params) = reset::take_parameters() {
-        if storage::save(board.flash(), &params, found.stored.as_ref()).is_err() {
+    let hardware = ThisBoard::hardware();
+    let mut found = storage::load(board.flash(), hardware);
+    if let Some(set) = reset::take_parameters() {
+        if storage::save(board.flash(), &set, found.stored.as_ref(), hardware).is_err() {
             defmt::error!("the parameters could not be stored");
         }
-        found = storage::load(board.flash());
+        found = storage::load(board.flash(), hardware);
     }
-    if storage::repair(board.flash(), &found).is_err() {
+    if storage::repair(board.flash(), &found, hardware).is_err() {
         defmt::error!("a copy of the parameters could not be repaired");
     }
-    storage::load(board.flash())
+    storage::load(board.flash(), hardware)
 }
 
 /// A function of its own, so that what an ECU takes to be put together is not on the stack of every step.
@@ -179,7 +189,7 @@ fn begin(ecu: &'static mut Option<Ecu>, setup: Option<&Setup>, boot: Boot) -> &'
 /// What the controller starts with; None locks it.
 fn params(found: &Found) -> Option<Params> {
     match found.stored {
-        Some(stored) => Some(stored.params),
+        Some(stored) => Some(stored.set.params),
         None if found.damaged == [true, true] => None,
         // A vehicle that was set up for less must not get the paper's 5 N.m because its flash was erased.
         None => cfg!(feature = "bench").then_some(Params::PAPER),
@@ -232,10 +242,14 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
     // The torque is on its way; what follows may take its time.
     let status = counts.steps.is_multiple_of(STEPS_PER_REPORT).then(|| {
         let turn = counts.steps / STEPS_PER_REPORT;
-        service.status().encode(turn as u8)
+        [
+            service.status().encode(turn as u8),
+            service.identity().encode(turn as u8),
+        ]
     });
     let line = line(service, counts);
-    for frame in ecu.background_step().iter().chain(&status).chain(&line) {
+    let report = status.as_slice().as_flattened();
+    for frame in ecu.background_step().iter().chain(report).chain(&line) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }

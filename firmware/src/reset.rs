@@ -242,8 +242,7 @@ mod on_target {
     use core::mem::MaybeUninit;
     use core::sync::atomic::{AtomicBool, Ordering};
 
-    use haptic_core::params::Params;
-    use haptic_core::stored::{self, BYTES};
+    use haptic_core::stored::{self, BYTES, Set};
 
     use super::{Boot, COPY, FaultSet, Found, Hardware, Record, ResetCause, Words};
 
@@ -301,21 +300,22 @@ mod on_target {
     }
 
     /// Resets the processor and leaves the next start a set to store.
-    pub fn restart_with(params: &Params) -> ! {
-        let bytes = stored::save(params, 0);
+    pub fn restart_with(set: &Set) -> ! {
+        // It does not leave this processor.
+        let bytes = stored::save(set, 0, 0);
         // SAFETY: as for `look`.
         unsafe { (&raw mut PARAMETERS).cast::<[u8; BYTES]>().write_volatile(bytes) };
         restart(ResetCause::NewParameters)
     }
 
     /// The set that [`restart_with`] left, once.
-    pub fn take_parameters() -> Option<Params> {
+    pub fn take_parameters() -> Option<Set> {
         let place = (&raw mut PARAMETERS).cast::<[u8; BYTES]>();
         // SAFETY: as for `look`.
         let bytes = unsafe { place.read_volatile() };
         // SAFETY: as for `look`. Whatever happens next must not find it again.
         unsafe { place.write_volatile([0; BYTES]) };
-        stored::load([&bytes, &[]]).map(|stored| stored.params)
+        stored::load([&bytes, &[]], 0).map(|stored| stored.set)
     }
 
     /// Resets the processor and has the next start say why.

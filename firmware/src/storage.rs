@@ -21,8 +21,7 @@ use core::task::{Context, Poll, Waker};
 
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embedded_storage::nor_flash::NorFlash;
-use haptic_core::params::Params;
-use haptic_core::stored::{self, BYTES, Stored};
+use haptic_core::stored::{self, BYTES, Set, Stored};
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
@@ -38,7 +37,7 @@ const BUFFER: usize = (1 + BYTES).next_multiple_of(32);
 pub struct Found {
     /// The newest good set.
     pub stored: Option<Stored>,
-    /// Whether each copy is there but cannot be read.
+    /// Whether each copy is there but cannot be read, or is another processor's.
     pub damaged: [bool; 2],
 }
 
@@ -46,20 +45,20 @@ pub struct Found {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WriteFailed;
 
-/// Looks at both copies.
-pub fn load<F: NorFlash>(flash: &mut F) -> Found {
+/// Looks at both copies, as the processor of that number.
+pub fn load<F: NorFlash>(flash: &mut F, hardware: u32) -> Found {
     let copies = [0, 1].map(|copy| read(flash, copy));
     // A copy alone shows whether it is good.
     let is_good = |copy: &Option<[u8; BYTES]>| {
         copy.as_ref()
-            .is_some_and(|bytes| stored::load([bytes, &[]]).is_some())
+            .is_some_and(|bytes| stored::load([bytes, &[]], hardware).is_some())
     };
     let damaged = [0, 1].map(|copy| !is_good(&copies[copy]) && !is_blank(flash, copy));
     let [a, b] = copies
         .each_ref()
         .map(|copy| copy.as_ref().map_or(&[][..], |bytes| bytes));
     Found {
-        stored: stored::load([a, b]),
+        stored: stored::load([a, b], hardware),
         damaged,
     }
 }
@@ -68,9 +67,14 @@ pub fn load<F: NorFlash>(flash: &mut F) -> Found {
 ///
 /// # Errors
 /// The first copy does not read back; the second one was not touched.
-pub fn save<F: NorFlash>(flash: &mut F, params: &Params, last: Option<&Stored>) -> Result<(), WriteFailed> {
+pub fn save<F: NorFlash>(
+    flash: &mut F,
+    set: &Set,
+    last: Option<&Stored>,
+    hardware: u32,
+) -> Result<(), WriteFailed> {
     let (copy, sequence) = last.map_or((0, 1), |last| (1 - last.copy, last.sequence.wrapping_add(1)));
-    let bytes = stored::save(params, sequence);
+    let bytes = stored::save(set, sequence, hardware);
     for copy in [copy, 1 - copy] {
         write(flash, copy, &bytes)?;
     }
@@ -81,16 +85,11 @@ pub fn save<F: NorFlash>(flash: &mut F, params: &Params, last: Option<&Stored>) 
 ///
 /// # Errors
 /// It does not read back.
-pub fn repair<F: NorFlash>(flash: &mut F, found: &Found) -> Result<(), WriteFailed> {
-    let Some(Stored {
-        params,
-        sequence,
-        copy,
-    }) = &found.stored
-    else {
+pub fn repair<F: NorFlash>(flash: &mut F, found: &Found, hardware: u32) -> Result<(), WriteFailed> {
+    let Some(Stored { set, sequence, copy }) = &found.stored else {
         return Ok(());
     };
-    let bytes = stored::save(params, *sequence);
+    let bytes = stored::save(set, *sequence, hardware);
     if read(flash, 1 - copy).as_ref() == Some(&bytes) {
         return Ok(());
     }

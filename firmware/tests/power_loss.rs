@@ -5,6 +5,7 @@
 //! cut left behind, and while pages turn over.
 
 use haptic_core::params::Params;
+use haptic_core::stored::Set;
 use haptic_firmware::nor::{Nor, PAGE};
 use haptic_firmware::storage::{Found, WriteFailed, load, repair, save};
 
@@ -13,15 +14,22 @@ type Memory = [u8; 4 * PAGE];
 const BLANK: Memory = [0xFF; 4 * PAGE];
 
 /// A set that its number tells apart.
-fn set(number: u32) -> Params {
-    Params {
+fn set(number: u32) -> Set {
+    let params = Params {
         k_1: 0.25 + f64::from(number) / 1024.0,
         ..Params::PAPER
+    };
+    Set {
+        params,
+        vehicle: 7 * number,
     }
 }
 
+/// The processor whose flash it is.
+const HARDWARE: u32 = 0x0102_0304;
+
 fn found(memory: &Memory) -> Found {
-    load(&mut Nor::new(*memory))
+    load(&mut Nor::new(*memory), HARDWARE)
 }
 
 /// Writes set `number`, with the supply cut after `operations`, and returns the memory afterwards and whether the
@@ -32,7 +40,7 @@ fn write(memory: &Memory, number: u32, operations: Option<u32>) -> (Memory, bool
     if let Some(operations) = operations {
         flash.cut_after(operations);
     }
-    let result = save(&mut flash, &set(number), last.as_ref());
+    let result = save(&mut flash, &set(number), last.as_ref(), HARDWARE);
     let is_cut = flash.is_cut();
     assert!(is_cut || result == Ok(()), "{result:?}");
     (flash.into_memory(), is_cut)
@@ -45,7 +53,7 @@ fn assert_one_of(memory: &Memory, before: u32, new: u32, what: &str) {
         .unwrap_or_else(|| panic!("{what}: no set is left"));
     let number = stored.sequence;
     assert!(number == before || number == new, "{what}: set {number}");
-    assert_eq!(stored.params, set(number), "{what}");
+    assert_eq!(stored.set, set(number), "{what}");
 }
 
 /// Cuts one write everywhere, and returns how many points that were.
@@ -73,7 +81,7 @@ fn a_write_cut_at_any_step_leaves_the_last_good_set() {
             (fewest, most) = (fewest.min(here), most.max(here));
         }
         memory = write(&memory, number, None).0;
-        assert_eq!(found(&memory).stored.unwrap().params, set(number));
+        assert_eq!(found(&memory).stored.unwrap().set, set(number));
     }
     // A block is 165 bytes, 21 words, and is written twice.
     assert!(fewest >= 2 * 21, "a write of {fewest} operations");
@@ -130,7 +138,7 @@ fn a_rotten_copy_is_told_and_the_other_one_used() {
         let mut rotten = memory;
         rotten[at] ^= 0x10;
         let after = found(&rotten);
-        assert_eq!(after.stored.map(|s| s.params), Some(set(1)), "byte {at}");
+        assert_eq!(after.stored.map(|s| s.set), Some(set(1)), "byte {at}");
         assert!(after.damaged != [true, true], "byte {at}");
         told += u32::from(after.damaged != [false, false]);
         bits += 1;
@@ -142,11 +150,11 @@ fn a_rotten_copy_is_told_and_the_other_one_used() {
 /// What a start makes of the memory, with the supply cut after `operations`, and whether it was.
 fn repaired(memory: &Memory, operations: Option<u32>) -> (Memory, bool) {
     let mut flash = Nor::new(*memory);
-    let found = load(&mut flash);
+    let found = load(&mut flash, HARDWARE);
     if let Some(operations) = operations {
         flash.cut_after(operations);
     }
-    let result = repair(&mut flash, &found);
+    let result = repair(&mut flash, &found, HARDWARE);
     let is_cut = flash.is_cut();
     assert!(is_cut || result == Ok(()), "{result:?}");
     (flash.into_memory(), is_cut)
@@ -163,7 +171,7 @@ fn a_rotten_copy_is_repaired_at_once_and_power_may_go_meanwhile() {
         let (after, _) = repaired(&rotten, None);
         assert_eq!(found(&after).damaged, [false, false], "byte {at}");
         assert_eq!(
-            found(&after).stored.map(|s| (s.params, s.sequence)),
+            found(&after).stored.map(|s| (s.set, s.sequence)),
             Some((set(1), 1))
         );
         // Every byte of the copy that was good before.
@@ -171,7 +179,7 @@ fn a_rotten_copy_is_repaired_at_once_and_power_may_go_meanwhile() {
             let mut both = after;
             both[other] ^= 0x10;
             assert_eq!(
-                found(&both).stored.map(|s| s.params),
+                found(&both).stored.map(|s| s.set),
                 Some(set(1)),
                 "bytes {at}, {other}"
             );
@@ -235,7 +243,7 @@ fn nothing_is_repaired_where_nothing_is_stored_or_wrong() {
 fn a_set_in_both_copies_rotten_is_no_set() {
     let mut memory = write(&BLANK, 1, None).0;
     // k_1 of the set, 0.2509765625 = 0x3FD0_1000_0000_0000, in each copy.
-    let k_1 = set(1).k_1.to_le_bytes();
+    let k_1 = set(1).params.k_1.to_le_bytes();
     let places: Vec<usize> = (0..memory.len() - 8)
         .filter(|at| memory[*at..*at + 8] == k_1)
         .collect();
@@ -253,6 +261,18 @@ fn a_flash_without_supply_fails_and_says_so() {
     let memory = write(&BLANK, 1, None).0;
     let mut flash = Nor::new(memory);
     flash.cut_after(0);
-    assert_eq!(save(&mut flash, &set(2), None), Err(WriteFailed));
+    assert_eq!(save(&mut flash, &set(2), None, HARDWARE), Err(WriteFailed));
     assert_eq!(flash.into_memory(), memory);
+}
+
+/// A flash that came from another board: what lies there is not this vehicle's.
+#[test]
+fn another_processor_s_copies_are_damaged_ones_and_are_replaced() {
+    let memory = write(&BLANK, 1, None).0;
+    let found = load(&mut Nor::new(memory), HARDWARE + 1);
+    assert_eq!((found.stored, found.damaged), (None, [true, true]));
+    let mut flash = Nor::new(memory);
+    assert_eq!(save(&mut flash, &set(9), None, HARDWARE + 1), Ok(()));
+    let stored = load(&mut flash, HARDWARE + 1).stored.unwrap();
+    assert_eq!((stored.set, stored.sequence), (set(9), 1));
 }

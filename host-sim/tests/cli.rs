@@ -280,6 +280,81 @@ fn a_run_records_its_bus_when_asked() {
     );
 }
 
+/// The camera fails after 3 s; 30 ms later the ECU has to hand over, and the torque to be gone in another 2 s.
+#[test]
+fn live_says_of_a_recorded_bus_what_changed_and_when() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("c.toml", "[[segment]]\nlength = 200\n");
+    write(
+        "s.toml",
+        "course = 'c.toml'\nspeed = 72\n[failure]\nkind = 'input'\ntime = 3\n",
+    );
+    let driven = host_sim(directory.path(), &["run", "s.toml", "--out", "here", "--bus-log"]);
+    assert_eq!(driven.status.code(), Some(0), "{}", stderr(&driven));
+    let log = directory.path().join("here/bus.log");
+    let mut text = std::fs::read_to_string(&log).unwrap();
+    // The last torque frame, with a bit of it flipped.
+    let at = text.rfind(" 0C0#").unwrap() + " 0C0#".len();
+    let flipped = if &text[at..=at] == "0" { "1" } else { "0" };
+    text.replace_range(at..=at, flipped);
+    std::fs::write(&log, &text).unwrap();
+
+    let output = host_sim(directory.path(), &["live", "--log", "here/bus.log", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let lines: Vec<Value> = String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let when = |change: &str| {
+        let line = lines.iter().find(|line| line["change"] == change);
+        line.unwrap_or_else(|| panic!("no {change:?} in {lines:#?}"))["time_s"]
+            .as_f64()
+            .unwrap()
+    };
+    let handover = when("mode Active -> Handover");
+    // The last picture before 3 s may be a camera's period old.
+    assert!((3.02..=3.045).contains(&handover), "{handover}");
+    assert_eq!(when("driver warning: take over"), handover);
+    assert_eq!(when("fault LaneTimeout (class B)"), handover);
+    let over = when("mode Handover -> Standby");
+    assert!((over - handover - 2.0).abs() < 0.01, "{over}");
+    let statuses = lines.iter().filter(|line| line["status"].is_object());
+    let speeds: Vec<f64> = statuses
+        .filter_map(|line| line["status"]["speed_m_per_s"].as_f64())
+        .collect();
+    assert!(
+        speeds.len() >= 8 && speeds.iter().all(|speed| (speed - 20.0).abs() < 0.01),
+        "{speeds:?}"
+    );
+    let counts = &lines.last().unwrap()["counts"];
+    let guidance = text.lines().filter(|line| line.contains(" 0C0#")).count();
+    assert_eq!(counts["frames"]["Guidance"], guidance);
+    assert_eq!(counts["damaged"], 1);
+
+    let table = host_sim(
+        directory.path(),
+        &["live", "--log", "here/bus.log", "--every", "0.5"],
+    );
+    let table = String::from_utf8(table.stdout).unwrap();
+    assert!(
+        table.contains("* mode Active -> Handover") && table.contains(" 72.0 "),
+        "{table}"
+    );
+    for (arguments, expected) in [
+        (&["live", "--log", "s.toml"][..], "s.toml: line 1"),
+        (&["live", "--can", "can99"], "can99"),
+        (&["live"], "--can"),
+        (&["live", "--can", "can99", "--record", "s.toml"], "s.toml"),
+        (&["live", "--log", "here/bus.log", "--every", "0"], "0.01 to 3600"),
+    ] {
+        let refused = host_sim(directory.path(), arguments);
+        assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&refused).contains(expected), "{}", stderr(&refused));
+    }
+}
+
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table of bad inputs")]
 fn bad_input_and_bad_usage_exit_with_2_and_say_why() {

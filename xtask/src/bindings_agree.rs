@@ -8,9 +8,11 @@ use std::process::Stdio;
 use anyhow::{Context, Result, bail};
 
 use crate::tool::{cargo, command, output, root, run};
-use crate::{c_library, wheel};
+use crate::{c_library, fmu, web, wheel};
 
 const SCENARIO: &str = "examples/relying-driver.toml";
+/// The bus as the doors read it.
+const BUS: &str = "target/bindings-agree/bus.txt";
 /// Identifiers of what the ECU hears from the camera, the column, the vehicle and the host.
 const INPUTS: [&str; 4] = ["100", "110", "120", "130"];
 
@@ -42,20 +44,45 @@ pub(crate) fn check() -> Result<()> {
     println!("{:<20} {:>9} {:>9}", "door", "frames", "differing");
     println!("{:<20} {:>9} {:>9}", "command line", expected.len(), "-");
     let mut differing = Vec::new();
-    for (door, mut program) in [("Python", in_python), ("C", in_c)] {
-        let sent = replayed(&mut program, &bus)?;
-        let sent: Vec<&str> = sent.lines().collect();
-        let same = sent.iter().zip(&expected).filter(|(a, b)| a == b).count();
-        let wrong = sent.len().max(expected.len()) - same;
-        println!("{door:<20} {:>9} {wrong:>9}", sent.len());
-        if wrong > 0 {
-            differing.push(door);
+    let mut row = |door: &str, frames: usize, wrong: usize| {
+        println!("{door:<20} {frames:>9} {wrong:>9}");
+        if wrong > 0 || frames == 0 {
+            differing.push(door.to_owned());
         }
+    };
+    for (door, mut program) in [("Python", in_python), ("C", in_c)] {
+        let (frames, wrong) = compared(&replayed(&mut program, &bus)?, &expected);
+        row(door, frames, wrong);
+    }
+    let in_file = root().join(BUS);
+    let (frames, wrong) = compared(&web::replayed(&in_file)?, &expected);
+    row("WebAssembly", frames, wrong);
+    // The units take SI values and give SI values: torque, limit and mode of each guidance frame.
+    fmu::build()?;
+    run(command(&python.to_string_lossy()).args(["-m", "pip", "install", "-q", "fmpy"]))?;
+    let mut in_fmus = command(&python.to_string_lossy());
+    in_fmus
+        .arg("bindings/fmu/agree.py")
+        .arg(root().join("target/dist"));
+    let said = replayed(&mut in_fmus, &bus)?;
+    for (door, line) in ["FMU, FMI 2.0", "FMU, FMI 3.0"].into_iter().zip(said.lines()) {
+        let (frames, wrong) = line.split_once(' ').context("two numbers are wanted")?;
+        row(door, frames.parse()?, wrong.parse()?);
+    }
+    if said.lines().count() != 2 {
+        bail!("the FMUs did not answer");
     }
     if expected.is_empty() || !differing.is_empty() {
         bail!("not the same bits: {}", differing.join(", "));
     }
     Ok(())
+}
+
+/// Frames that were sent, and how many are not those expected.
+fn compared(sent: &str, expected: &[&str]) -> (usize, usize) {
+    let sent: Vec<&str> = sent.lines().collect();
+    let same = sent.iter().zip(expected).filter(|(a, b)| a == b).count();
+    (sent.len(), sent.len().max(expected.len()) - same)
 }
 
 fn is_input(line: &str) -> bool {
@@ -81,8 +108,8 @@ fn read(log: &Path) -> Result<String> {
 /// What a program answers to the bus on its standard input.
 fn replayed(program: &mut std::process::Command, bus: &str) -> Result<String> {
     // From a file, so that neither side waits for the other.
-    let mut file = std::fs::File::create(root().join("target/bindings-agree/bus.txt"))?;
+    let mut file = std::fs::File::create(root().join(BUS))?;
     file.write_all(bus.as_bytes())?;
-    let file = std::fs::File::open(root().join("target/bindings-agree/bus.txt"))?;
+    let file = std::fs::File::open(root().join(BUS))?;
     output(program.stdin(Stdio::from(file)))
 }

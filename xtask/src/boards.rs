@@ -11,6 +11,7 @@ use serde_json::Value;
 use crate::code::{CONTROLLER, Code, PRODUCT};
 use crate::golden::{self, Figure};
 use crate::image::{self, Image, M4F};
+use crate::longest;
 use crate::seal;
 use crate::size;
 use crate::tool::{self, Usage, cargo, run};
@@ -116,7 +117,9 @@ pub(crate) fn check(bless: bool) -> Result<()> {
         for (image, roots) in [(Image::Lockstep, CONTROLLER), (Image::SteeringEcu, PRODUCT)] {
             let built =
                 of_image(&board.build(image)?, roots).with_context(|| format!("{name}, {}", image.bin()))?;
-            if image == Image::SteeringEcu {
+            if image == Image::Lockstep {
+                figures.push(longest(&board.build(image)?)?.of(name));
+            } else {
                 figures.extend(built.into_iter().map(|figure| figure.of(name)));
             }
         }
@@ -134,6 +137,18 @@ pub(crate) fn check(bless: bool) -> Result<()> {
         );
     }
     golden::check(&figures, bless)
+}
+
+/// Beside what was counted: what no state can exceed.
+fn longest(elf: &Path) -> Result<Figure> {
+    let longest = longest::of(elf)?;
+    println!(
+        "{}: at most {} instructions for a frame and {} for a step, by its machine code",
+        elf.display(),
+        longest.receive,
+        longest.step
+    );
+    Ok(figure("longest tick, bound", "instructions", longest.tick(), 1))
 }
 
 impl Figure {

@@ -5,7 +5,9 @@ use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
 use crate::tool::{cargo, ensure, run};
-use crate::{bench, bindings_agree, boards, c_library, gate, trace, wheel};
+use crate::{
+    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, trace, web, wheel,
+};
 
 /// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
 pub(crate) fn run_quick() -> Result<()> {
@@ -102,7 +104,13 @@ pub(crate) fn run_all() -> Result<()> {
         ("instructions on the host", &|| bench::run(false)),
         ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
         ("C library", &c_library::check),
+        ("recordings", &logs::check),
+        ("FMUs", &fmu::check),
+        ("lab in the browser", &web::check),
         ("bindings agree", &bindings_agree::check),
+        ("coverage of the core", &evidence::coverage),
+        ("defects made by hand", &by_hand::run),
+        ("defects in the last change", &evidence::mutants_of_last_commit),
     ]);
     if !failed.is_empty() {
         eprintln!("== failed: {}; the tests follow", failed.join(", "));

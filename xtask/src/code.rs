@@ -202,14 +202,14 @@ impl Function {
 }
 
 /// `08003aa0 <name>:`
-fn head(line: &str) -> Option<(u64, &str)> {
+pub(crate) fn head(line: &str) -> Option<(u64, &str)> {
     let (address, name) = line.split_once(" <")?;
     let address = u64::from_str_radix(address, 16).ok()?;
     Some((address, name.strip_suffix(">:")?))
 }
 
 /// ` 8003aa0:      \tpush\t{r4, lr}` as mnemonic and operands, without a comment.
-fn instruction(line: &str) -> Option<(&str, &str)> {
+pub(crate) fn instruction(line: &str) -> Option<(&str, &str)> {
     let (_, rest) = line.split_once(":")?;
     let rest = rest.trim_start_matches(' ').strip_prefix('\t')?;
     let (mnemonic, operands) = rest.split_once('\t').unwrap_or((rest, ""));
@@ -217,19 +217,22 @@ fn instruction(line: &str) -> Option<(&str, &str)> {
     Some((mnemonic.trim(), operands.trim()))
 }
 
+/// The place that `0x800133c <name+0x4>` names; None for a register.
+pub(crate) fn any_target(operands: &str) -> Option<u64> {
+    let (before, _) = operands.split_once(" <")?;
+    let (_, address) = before.rsplit_once("0x")?;
+    u64::from_str_radix(address, 16).ok()
+}
+
 /// The function that `0x800133c <name>` names; None for a place within one, or a register.
 fn target(operands: &str) -> Option<u64> {
-    let operands = operands.rsplit_once("0x").map(|(_, rest)| rest)?;
-    let (address, name) = operands.split_once(" <")?;
+    let (_, name) = operands.split_once(" <")?;
     // Names of generics hold a `+` too, but never one before a hexadecimal number at the end.
     let is_within = name
         .trim_end_matches('>')
         .rsplit_once('+')
         .is_some_and(|(_, offset)| offset.starts_with("0x"));
-    if is_within {
-        return None;
-    }
-    u64::from_str_radix(address, 16).ok()
+    if is_within { None } else { any_target(operands) }
 }
 
 /// Bytes that an instruction takes from the stack: `sub.w sp, sp, #0x200`, `push {r4, lr}`, `vpush {d8, d9}`.

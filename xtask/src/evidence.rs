@@ -1,7 +1,8 @@
-//! What the core's tests reach, and what they would notice: coverage and mutation. Both take minutes, so CI does not run
-//! them.
+//! What the core's tests reach, and what they would notice: coverage and mutation. The whole mutation takes hours; CI tries
+//! a sample of what the last commit changed.
 
 use std::fs;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
@@ -78,35 +79,92 @@ pub(crate) fn coverage() -> Result<()> {
     Ok(())
 }
 
+/// So many defects of a change does CI try: each is a build and a test.
+const SAMPLE: usize = 12;
+
+/// A sample of the defects in what the last commit changed in core, another sample for another commit. Nothing where the
+/// history is not there, as in a download of the sources.
+pub(crate) fn mutants_of_last_commit() -> Result<()> {
+    let git = |arguments: &[&str]| {
+        let output = tool::command("git").args(arguments).output();
+        let output = output.ok().filter(|output| output.status.success())?;
+        String::from_utf8(output.stdout).ok()
+    };
+    let Some(changed) = git(&["diff", "--name-only", "HEAD~1", "--", "core/src"]) else {
+        println!("no commit before this one: nothing to compare with");
+        return Ok(());
+    };
+    if changed.trim().is_empty() {
+        println!("the last commit changed nothing in core");
+        return Ok(());
+    }
+    if !tool::exists("cargo-mutants") {
+        run(cargo().args(["install", "--locked", "cargo-mutants", "--version", "27.1.0"]))?;
+    }
+    let commit = git(&["rev-parse", "--short=6", "HEAD"]).unwrap_or_default();
+    let seed = usize::from_str_radix(commit.trim(), 16).unwrap_or_default();
+    mutate(Some("HEAD~1"), Some(seed))
+}
+
 /// A defect in each expression of what guards a torque, or only in those that differ from `base`; those that no test
 /// notices are printed, and are an error where only a difference was tried.
 pub(crate) fn mutants(base: Option<&str>) -> Result<()> {
     if !tool::exists("cargo-mutants") {
         bail!("cargo-mutants is missing: cargo install cargo-mutants");
     }
-    let all = tool::root().join("target/mutants");
-    fs::create_dir_all(&all)?;
+    mutate(base, None)
+}
+
+/// `cargo mutants` for a file, with the tests that must notice; None where it does not differ from `base`.
+fn command_for(
+    file: &str,
+    tests: &[&str],
+    base: Option<&str>,
+) -> Result<Option<(PathBuf, std::process::Command)>> {
+    let source = format!("core/src/{file}");
+    let place = tool::root().join("target/mutants").join(file.replace('/', "-"));
+    fs::create_dir_all(&place)?;
+    let mut command = cargo();
+    command
+        .args(["mutants", "--package", "haptic-core", "--no-shuffle"])
+        .args(["-f", &source])
+        .arg("--output")
+        .arg(&place)
+        .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")));
+    if let Some(base) = base {
+        let difference = tool::output(tool::command("git").args(["diff", base, "--", &source]))?;
+        if difference.is_empty() {
+            return Ok(None);
+        }
+        let path = place.join("changed.diff");
+        fs::write(&path, difference)?;
+        command.arg("--in-diff").arg(path);
+    }
+    Ok(Some((place, command)))
+}
+
+/// All of them, or [`SAMPLE`] that a number picks.
+fn mutate(base: Option<&str>, sample: Option<usize>) -> Result<()> {
+    let shard = match sample {
+        Some(seed) => {
+            let mut count = 0;
+            for (file, tests) in MUTATED {
+                if let Some((_, mut command)) = command_for(file, tests, base)? {
+                    count += tool::output(command.arg("--list"))?.lines().count();
+                }
+            }
+            let shards = count.div_ceil(SAMPLE).max(1);
+            println!("{count} defects in what changed, of which every {shards}th is tried");
+            Some(format!("--shard={}/{shards}", seed % shards))
+        }
+        None => None,
+    };
     let mut survivors = Vec::new();
     for (file, tests) in MUTATED {
-        let source = format!("core/src/{file}");
-        let place = all.join(file.replace('/', "-"));
-        fs::create_dir_all(&place)?;
-        let mut command = cargo();
-        command
-            .args(["mutants", "--package", "haptic-core", "--no-shuffle"])
-            .args(["-f", &source])
-            .arg("--output")
-            .arg(&place)
-            .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")));
-        if let Some(base) = base {
-            let difference = tool::output(tool::command("git").args(["diff", base, "--", &source]))?;
-            if difference.is_empty() {
-                continue;
-            }
-            let path = place.join("changed.diff");
-            fs::write(&path, difference)?;
-            command.arg("--in-diff").arg(path);
-        }
+        let Some((place, mut command)) = command_for(file, tests, base)? else {
+            continue;
+        };
+        command.args(&shard);
         println!("== {file}");
         // A difference that holds nothing to mutate leaves the lists of an earlier run alone.
         let _ = fs::remove_dir_all(place.join("mutants.out"));

@@ -1,41 +1,100 @@
-//! The functional mock-up unit: binary and description in one archive, checked by FMPy.
+//! The functional mock-up units: one binary and two descriptions for each model, checked by FMPy.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::tool::{cargo, command, output, root, run};
+use crate::tool::{cargo, command, exists, output, root, run};
 use crate::wheel;
 
-/// Builds `target/dist/HapticController.fmu` and has FMPy judge it.
+/// A relying driver on the paper's course, as bindings/fmu/check.py couples it.
+const SCENARIO: &str = "speed = 60\ncondition = \"mid\"\n[driver]\nt_p = 0.3\n";
+const WINDOWS: &str = "x86_64-pc-windows-gnu";
+const LINKER: &str = "x86_64-w64-mingw32-gcc";
+
+/// Builds every model for FMI 2.0 (`NAME.fmu`) and 3.0 (`NAME.fmi3.fmu`) into `target/dist`, and has FMPy judge them: alone, and
+/// the three together against `host-sim run`.
 pub(crate) fn check() -> Result<()> {
-    let fmu = build()?;
+    let fmus = build()?;
+    let run_directory = root().join("target/fmu/run");
+    let scenario = root().join("target/fmu/coupled.toml");
+    std::fs::write(&scenario, SCENARIO)?;
+    run(cargo()
+        .args(["run", "-q", "--release", "-p", "host-sim", "--", "run"])
+        .arg(&scenario)
+        .arg("--out")
+        .arg(&run_directory)
+        .stdout(std::process::Stdio::null()))?;
     let python = wheel::python()?;
     let python = python.to_string_lossy();
     run(command(&python).args(["-m", "pip", "install", "-q", "fmpy"]))?;
-    run(command(&python).arg("bindings/fmu/check.py").arg(&fmu))?;
-    println!("{}", fmu.display());
+    run(command(&python)
+        .arg("bindings/fmu/check.py")
+        .arg(root().join("target/dist"))
+        .arg(run_directory.join("run.csv")))?;
+    for fmu in fmus {
+        println!("{}", fmu.display());
+    }
     Ok(())
 }
 
-fn build() -> Result<PathBuf> {
+/// The binaries that can be built here, with where each standard wants them and the extension.
+fn binaries() -> Result<Vec<(PathBuf, [&'static str; 2], &'static str)>> {
     run(cargo().args(["build", "--release", "-p", "haptic-fmu"]))?;
-    let release = root().join("target/release");
-    let describe = release.join("model-description");
-    let description = output(&mut command(&describe.to_string_lossy()))?;
-    let stage = root().join("target/fmu");
-    let binaries = stage.join("binaries/linux64");
-    std::fs::create_dir_all(&binaries).with_context(|| binaries.display().to_string())?;
-    std::fs::write(stage.join("modelDescription.xml"), description)?;
-    std::fs::copy(
-        release.join("libhaptic_fmu.so"),
-        binaries.join("HapticController.so"),
-    )?;
+    let target = root().join("target");
+    let linux = (
+        target.join("release/libhaptic_fmu.so"),
+        ["linux64", "x86_64-linux"],
+        "so",
+    );
+    let mut made = vec![linux];
+    let targets = output(command("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
+    if targets.lines().any(|line| line == WINDOWS) && exists(LINKER) {
+        run(cargo().args([
+            "build",
+            "--release",
+            "-p",
+            "haptic-fmu",
+            "--lib",
+            "--target",
+            WINDOWS,
+        ]))?;
+        let dll = target.join(WINDOWS).join("release/haptic_fmu.dll");
+        made.push((dll, ["win64", "x86_64-windows"], "dll"));
+    } else {
+        println!(
+            "Without binaries for Windows: rustup target add {WINDOWS}; apt-get install gcc-mingw-w64-x86-64-win32"
+        );
+    }
+    Ok(made)
+}
+
+pub(crate) fn build() -> Result<Vec<PathBuf>> {
+    let binaries = binaries()?;
+    let describe = root().join("target/release/model-description");
+    let describe = describe.to_string_lossy();
+    let models = output(&mut command(&describe))?;
     let dist = root().join("target/dist");
     std::fs::create_dir_all(&dist)?;
-    let fmu = dist.join("HapticController.fmu");
-    archive(&stage, &fmu)?;
-    Ok(fmu)
+    let mut fmus = Vec::new();
+    for model in models.lines() {
+        for (standard, version, ending) in [(0, "2", "fmu"), (1, "3", "fmi3.fmu")] {
+            let stage = root().join("target/fmu").join(format!("{model}-{version}"));
+            let _ = std::fs::remove_dir_all(&stage);
+            for (binary, places, extension) in &binaries {
+                let place = stage.join("binaries").join(places[standard]);
+                std::fs::create_dir_all(&place).with_context(|| place.display().to_string())?;
+                std::fs::copy(binary, place.join(format!("{model}.{extension}")))
+                    .with_context(|| binary.display().to_string())?;
+            }
+            let description = output(command(&describe).args([model, version]))?;
+            std::fs::write(stage.join("modelDescription.xml"), description)?;
+            let fmu = dist.join(format!("{model}.{ending}"));
+            archive(&stage, &fmu)?;
+            fmus.push(fmu);
+        }
+    }
+    Ok(fmus)
 }
 
 /// An FMU is a zip archive; Python, which checks it, can write one.

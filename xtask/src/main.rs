@@ -16,12 +16,15 @@ mod gate;
 mod golden;
 mod identify;
 mod image;
+mod logs;
+mod longest;
 mod qemu;
 mod seal;
 mod size;
 mod speed;
 mod tool;
 mod trace;
+mod web;
 mod wheel;
 
 use std::path::PathBuf;
@@ -87,8 +90,13 @@ enum Command {
     /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++, and runs
     /// its example natively and in QEMU.
     C,
-    /// Builds the FMU of the controller (FMI 2.0 co-simulation) into target/dist, and has FMPy check it.
+    /// Builds the FMUs of controller, driver and vehicle (FMI 2.0 and 3.0 co-simulation) into target/dist, and has FMPy check
+    /// them, alone and coupled.
     Fmu,
+    /// Builds the lab for a browser into target/dist/haptic-lab.html, and tries it in a headless Chromium.
+    Web,
+    /// Recordings: what `host-sim convert` writes is read by pandas, scipy, asammdf, python-can and mcap, and the other way.
+    Logs,
     /// Python, C and the command line on one run of the bus: a table of the frames that differ, or exit code 1.
     BindingsAgree,
     /// Builds the Python wheel into target/dist, and says what it weighs and links.
@@ -119,7 +127,7 @@ enum Command {
 #[derive(Subcommand)]
 enum Bench {
     /// Simulated seconds per wall second on one core: our closed loop, the same in C and in NumPy.
-    Speed,
+    Speed(speed::Options),
     /// The identification of a recorded drive: ours and SciPy's, to the same loss.
     Identify,
 }
@@ -138,12 +146,14 @@ fn main() -> ExitCode {
         Command::Hil(options) => boards::hil(&options),
         Command::C => c_library::check(),
         Command::Fmu => fmu::check(),
+        Command::Web => web::check(),
+        Command::Logs => logs::check(),
         Command::BindingsAgree => bindings_agree::check(),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
-            what: Some(Bench::Speed),
+            what: Some(Bench::Speed(options)),
             ..
-        } => speed::run(),
+        } => speed::run(&options),
         Command::Bench {
             what: Some(Bench::Identify),
             ..

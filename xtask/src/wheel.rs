@@ -42,12 +42,13 @@ const NOT_IN_A_WHEEL: [&str; 8] = [
 const LARGEST_MB: f64 = 5.0;
 const MATURIN: &str = "maturin>=1.9,<2";
 /// The tests, and the packages that the examples and the tests' peers need.
-const TEST_PACKAGES: [&str; 6] = [
+const TEST_PACKAGES: [&str; 7] = [
     "pytest",
     "pandas",
     "pyarrow",
     "matplotlib",
     "cantools",
+    "distributed",
     "commonroad-vehicle-models",
 ];
 
@@ -144,7 +145,7 @@ fn install(wheel: &Path) -> Result<PathBuf> {
 }
 
 /// The interpreter of a virtual environment, made if it is not there.
-fn environment(place: &Path) -> Result<PathBuf> {
+pub(crate) fn environment(place: &Path) -> Result<PathBuf> {
     let python = place.join("bin/python");
     if !python.exists() {
         run(command("python3").args(["-m", "venv"]).arg(place))

@@ -17,11 +17,11 @@ extern "C" {
 #endif
 
 /* Bytes and alignment of an ECU on every target; hg_ecu_size and hg_ecu_align say what this one takes. */
-#define HG_ECU_SIZE 2560
+#define HG_ECU_SIZE 4096
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
-#define HG_PARAMETERS 19
+#define HG_PARAMETERS 22
 
 /* Torque of one count of hg_step.torque_raw: 2^-12 N.m, as on the bus. */
 #define HG_TORQUE_LSB_NM (1.0 / 4096.0)
@@ -129,6 +129,9 @@ int32_t hg_lane_preview(double e_y_m, double e_theta_rad, uint32_t age_us, uint8
 int32_t hg_column(double driver_torque_nm, double wheel_angle_rad, double motor_torque_nm, uint8_t counter,
                   hg_frame *out);
 int32_t hg_vehicle(double speed_m_per_s, double second_speed_m_per_s, uint8_t counter, hg_frame *out);
+/* The same message of a vehicle that measures its yaw rate, positive to the left. */
+int32_t hg_vehicle_with_yaw_rate(double speed_m_per_s, double second_speed_m_per_s, double yaw_rate_rad_per_s,
+                                 uint8_t counter, hg_frame *out);
 int32_t hg_demand(uint8_t engage, double authority, uint8_t probe, uint8_t counter, hg_frame *out);
 
 #ifdef __cplusplus

@@ -12,13 +12,13 @@ use haptic_core::bus::{Frame, Reject};
 use haptic_core::config::Setup;
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::params::{PARAMETERS, Params};
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// `HG_ECU_SIZE` and `HG_ECU_ALIGN` of the header.
-const ECU_SIZE: usize = 2560;
+const ECU_SIZE: usize = 4096;
 const ECU_ALIGN: usize = 8;
 /// `HG_PARAMETERS` of the header.
-const PARAMETER_COUNT: usize = 19;
+const PARAMETER_COUNT: usize = 22;
 /// In front of an ECU that was made by [`hg_ecu_init`].
 const MADE: u32 = 0x4847_4543;
 
@@ -364,7 +364,29 @@ pub unsafe extern "C" fn hg_vehicle(
     let values = [speed_m_per_s, second_speed_m_per_s];
     let message = Vehicle {
         speeds: values.map(Speed::from_m_per_s),
+        yaw_rate: None,
     };
+    // SAFETY: as the caller vouches.
+    unsafe { send(&message, &values, counter, out) }
+}
+
+/// The vehicle's frame, with a measured yaw rate.
+///
+/// # Safety
+/// As of [`hg_lane_preview`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hg_vehicle_with_yaw_rate(
+    speed_m_per_s: f64,
+    second_speed_m_per_s: f64,
+    yaw_rate_rad_per_s: f64,
+    counter: u8,
+    out: *mut CFrame,
+) -> i32 {
+    let message = Vehicle {
+        speeds: [speed_m_per_s, second_speed_m_per_s].map(Speed::from_m_per_s),
+        yaw_rate: Some(TurningRate::from_rad_per_s(yaw_rate_rad_per_s)),
+    };
+    let values = [speed_m_per_s, second_speed_m_per_s, yaw_rate_rad_per_s];
     // SAFETY: as the caller vouches.
     unsafe { send(&message, &values, counter, out) }
 }

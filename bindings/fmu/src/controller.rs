@@ -3,75 +3,28 @@
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::config::Setup;
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::params::{PARAMETERS, ParamError, Params};
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_sim::models::sensors::camera_looks;
 
-/// What a variable is to FMI.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// Set by others at every step.
-    Input,
-    /// Read after it.
-    Output,
-    /// Set before the start.
-    Parameter,
-}
+use crate::variable::{About, Kind, Model, Role, Variable, variable};
 
-/// The type of a variable; all are kept as numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// A quantity.
-    Real,
-    /// A code or a word of bits.
-    Integer,
-    /// 0 or 1.
-    Boolean,
-}
-
-/// One variable; its value reference is its place in [`VARIABLES`].
-#[derive(Debug, Clone, Copy)]
-pub struct Variable {
-    /// Name, with its unit.
-    pub name: &'static str,
-    /// Type.
-    pub kind: Kind,
-    /// Role.
-    pub role: Role,
-    /// SI unit, empty if it has none.
-    pub unit: &'static str,
-    /// Value at the start.
-    pub start: f64,
-    /// Least and largest value, if there are such.
-    pub range: Option<[f64; 2]>,
-    /// What it is.
-    pub meaning: &'static str,
-}
-
-const fn variable(
-    name: &'static str,
-    kind: Kind,
-    role: Role,
-    unit: &'static str,
-    meaning: &'static str,
-) -> Variable {
-    Variable {
-        name,
-        kind,
-        role,
-        unit,
-        start: 0.0,
-        range: None,
-        meaning,
-    }
-}
+/// The model.
+pub static ABOUT: About = About {
+    name: "HapticController",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a01}",
+    meaning: "The shipping haptic-guidance ECU: SI values in, torque out",
+    variables: &VARIABLES,
+    make: || Box::new(Controller::default()),
+};
 
 /// Variables that are no parameters of the controller.
-const OWN: usize = 15;
+const OWN: usize = 17;
 use Kind::{Boolean, Integer, Real};
 use Role::{Input, Output, Parameter};
 
 /// Every variable, the controller's own parameters last.
-pub const VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
+pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
     let own = [
         variable(
             "e_y_m",
@@ -103,6 +56,20 @@ pub const VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
             "Torque that the motor delivers",
         ),
         variable("speed_m_per_s", Real, Input, "m/s", "Speed of the vehicle"),
+        variable(
+            "yaw_rate_rad_per_s",
+            Real,
+            Input,
+            "rad/s",
+            "Measured yaw rate of the vehicle, positive to the left",
+        ),
+        variable(
+            "yaw_rate_valid",
+            Boolean,
+            Input,
+            "",
+            "The vehicle measures its yaw rate",
+        ),
         variable(
             "authority",
             Real,
@@ -159,13 +126,11 @@ pub const VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
 };
 const AUTHORITY: usize = 6;
 const ENGAGED: usize = 9;
-const TORQUE: usize = 10;
+const TORQUE: usize = 12;
 
 /// The unit under way.
 #[derive(Debug, Clone)]
-pub struct Controller {
-    /// Values of [`VARIABLES`].
-    pub values: [f64; VARIABLES.len()],
+struct Controller {
     ecu: Ecu,
     /// Steps so far, 1 ms each: time is a whole number here, whatever a master adds up.
     steps: u64,
@@ -176,7 +141,6 @@ pub struct Controller {
 impl Default for Controller {
     fn default() -> Self {
         Self {
-            values: VARIABLES.map(|variable| variable.start),
             ecu: Ecu::new(Some(&Setup::PAPER), Boot::default(), Instant::from_us(0)),
             steps: 0,
             pictures: 0,
@@ -184,16 +148,13 @@ impl Default for Controller {
     }
 }
 
-impl Controller {
-    /// Begins with the parameters that were set.
-    ///
-    /// # Errors
-    /// The first parameter out of range.
-    pub fn begin(&mut self) -> Result<(), ParamError> {
-        let parameters = std::array::from_fn(|i| self.values[OWN + i]);
-        let setup = Setup::new(&Params::from_values(&parameters))?;
+impl Model for Controller {
+    fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
+        let parameters = std::array::from_fn(|i| values[OWN + i]);
+        let setup = Params::from_values(&parameters);
+        let setup = Setup::new(&setup).map_err(|e| e.to_string())?;
         let start = Instant::from_us(0);
-        self.ecu = if self.values[ENGAGED] != 0.0 {
+        self.ecu = if values[ENGAGED] != 0.0 {
             Ecu::engaged(&setup, start)
         } else {
             Ecu::new(Some(&setup), Boot::default(), start)
@@ -202,8 +163,8 @@ impl Controller {
         Ok(())
     }
 
-    /// One step of 1 ms: the sensors send what is due, the ECU decides.
-    pub fn step(&mut self) {
+    /// The sensors send what is due, the ECU decides.
+    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
         let [
             e_y,
             e_theta,
@@ -211,11 +172,16 @@ impl Controller {
             wheel,
             motor,
             speed,
+            yaw_rate,
+            yaw_rate_valid,
             authority,
             engage,
             probe,
             ..,
-        ] = self.values;
+        ] = *values
+        else {
+            return Err("variables are missing".into());
+        };
         let step = self.steps;
         // The ECU's clock wraps.
         let now = Instant::from_us(step.wrapping_mul(1000) as u32);
@@ -223,7 +189,8 @@ impl Controller {
             // The ECU judges by itself, and reports what it misses.
             let _ = self.ecu.receive(&frame, now);
         };
-        if step as f64 >= self.pictures as f64 * LanePreview::INFO.period_ms {
+        // 25 steps hold three pictures, so the grid of the rest is that of all.
+        if camera_looks((step % 25) as u32) {
             let preview = LanePreview {
                 e_y: Metres::from_m(e_y),
                 e_theta: Radians::from_rad(e_theta),
@@ -244,7 +211,8 @@ impl Controller {
         if step.is_multiple_of(10) {
             let counter = (step / 10) as u8;
             let speeds = [Speed::from_m_per_s(speed); 2];
-            hear(Vehicle { speeds }.encode(counter));
+            let yaw_rate = (yaw_rate_valid != 0.0).then(|| TurningRate::from_rad_per_s(yaw_rate));
+            hear(Vehicle { speeds, yaw_rate }.encode(counter));
             let demand = Demand {
                 engage: engage != 0.0,
                 authority: Ratio::from_si(authority),
@@ -254,7 +222,7 @@ impl Controller {
         }
         let command = self.ecu.step(now).command;
         let _ = self.ecu.background_step();
-        self.values[TORQUE..TORQUE + 5].copy_from_slice(&[
+        values[TORQUE..TORQUE + 5].copy_from_slice(&[
             command.torque.nm(),
             f64::from(command.mode as u8),
             f64::from(command.limit as u8),
@@ -262,10 +230,10 @@ impl Controller {
             f64::from(u8::from(command.warning)),
         ]);
         self.steps += 1;
+        Ok(())
     }
 
-    /// Time that was simulated, s.
-    pub fn time_s(&self) -> f64 {
-        self.steps as f64 * 1e-3
+    fn copy(&self) -> Box<dyn Model> {
+        Box::new(self.clone())
     }
 }

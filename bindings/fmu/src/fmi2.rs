@@ -4,10 +4,8 @@
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 
-use haptic_core::params::ParamError;
-
-use crate::controller::{Controller, Kind, Role, VARIABLES};
-use crate::{GUID, MOST_STEPS};
+use crate::instance::{Instance, State};
+use crate::variable::Kind;
 
 const OK: c_int = 0;
 const DISCARD: c_int = 2;
@@ -30,51 +28,19 @@ pub struct Callbacks {
 pub struct Unit {
     name: CString,
     callbacks: Callbacks,
-    model: Controller,
-    started: bool,
+    instance: Instance,
 }
 
 impl Unit {
     /// Says why, and that it is an error.
-    fn refuse(&self, why: &str) -> c_int {
-        tell(&self.callbacks, &self.name, why);
-        ERROR
-    }
-
-    fn get(&self, references: &[u32], kind: Kind, mut put: impl FnMut(usize, f64)) -> c_int {
-        for (i, &reference) in references.iter().enumerate() {
-            match VARIABLES.get(reference as usize) {
-                Some(variable) if variable.kind == kind => put(i, self.model.values[reference as usize]),
-                _ => return self.refuse(&format!("value reference {reference} is no {kind:?} variable")),
+    fn answer(&self, result: Result<(), String>) -> c_int {
+        match result {
+            Ok(()) => OK,
+            Err(why) => {
+                tell(&self.callbacks, &self.name, &why);
+                ERROR
             }
         }
-        OK
-    }
-
-    fn set(&mut self, references: &[u32], kind: Kind, value: impl Fn(usize) -> f64) -> c_int {
-        // Into a copy, so that a refused call sets nothing.
-        let mut values = self.model.values;
-        for (i, &reference) in references.iter().enumerate() {
-            let Some(variable) = VARIABLES.get(reference as usize).filter(|v| v.kind == kind) else {
-                return self.refuse(&format!("value reference {reference} is no {kind:?} variable"));
-            };
-            let (name, value) = (variable.name, value(i));
-            if variable.role == Role::Output || (variable.role == Role::Parameter && self.started) {
-                return self.refuse(&format!("{name} cannot be set now"));
-            }
-            if !value.is_finite() {
-                return self.refuse(&format!("{name} = {value} is no finite number"));
-            }
-            if let Some([min, max]) = variable.range
-                && !(min..=max).contains(&value)
-            {
-                let unit = variable.unit;
-                return self.refuse(&format!("{name} = {value} is outside {min} to {max} {unit}"));
-            }
-            values[reference as usize] = value;
-        }
-        self.model.values = values;
-        OK
     }
 }
 
@@ -136,9 +102,8 @@ macro_rules! values {
                 return ERROR;
             };
             // SAFETY: `values` has `count` places, and `i` is below.
-            unit.get(references, $kind, |i, value| unsafe {
-                values.add(i).write($from(value))
-            })
+            let put = |i, value| unsafe { values.add(i).write($from(value)) };
+            unit.answer(unit.instance.get(references, $kind, put))
         }
 
         /// Sets variables: all of them, or none with a reason.
@@ -162,7 +127,11 @@ macro_rules! values {
             }) else {
                 return ERROR;
             };
-            unit.set(references, $kind, |i| $to(values[i]))
+            if values.len() < references.len() {
+                return unit.answer(Err("there are no values".into()));
+            }
+            let result = unit.instance.set(references, $kind, |i| $to(values[i]));
+            unit.answer(result)
         }
     };
 }
@@ -207,19 +176,19 @@ pub unsafe extern "C" fn fmi2Instantiate(
     // SAFETY: not null, and strings and callbacks as the standard vouches.
     let (name, guid, callbacks) =
         unsafe { (CStr::from_ptr(name).to_owned(), CStr::from_ptr(guid), *callbacks) };
-    if guid.to_str() != Ok(GUID) || kind != CO_SIMULATION {
+    let instance = guid.to_str().ok().and_then(Instance::new);
+    let Some(instance) = instance.filter(|_| kind == CO_SIMULATION) else {
         tell(
             &callbacks,
             &name,
-            &format!("only co-simulation of the model with GUID {GUID}"),
+            "only co-simulation, of a model of this binary; the GUID is in modelDescription.xml",
         );
         return std::ptr::null_mut();
-    }
+    };
     let unit = Unit {
         name,
         callbacks,
-        model: Controller::default(),
-        started: false,
+        instance,
     };
     Box::into_raw(Box::new(unit)).cast()
 }
@@ -246,13 +215,8 @@ pub unsafe extern "C" fn fmi2ExitInitializationMode(component: *mut c_void) -> c
     let Some(unit) = (unsafe { unit(component) }) else {
         return ERROR;
     };
-    match unit.model.begin() {
-        Ok(()) => {
-            unit.started = true;
-            OK
-        }
-        Err(error @ ParamError { .. }) => unit.refuse(&error.to_string()),
-    }
+    let result = unit.instance.begin();
+    unit.answer(result)
 }
 
 /// Back to what was instantiated.
@@ -265,8 +229,7 @@ pub unsafe extern "C" fn fmi2Reset(component: *mut c_void) -> c_int {
     let Some(unit) = (unsafe { unit(component) }) else {
         return ERROR;
     };
-    unit.model = Controller::default();
-    unit.started = false;
+    unit.instance.reset();
     OK
 }
 
@@ -280,16 +243,8 @@ pub unsafe extern "C" fn fmi2DoStep(component: *mut c_void, _time_s: f64, step_s
     let Some(unit) = (unsafe { unit(component) }) else {
         return ERROR;
     };
-    let steps = (step_s * 1e3).round();
-    if !(1.0..=MOST_STEPS).contains(&steps) || (step_s * 1e3 - steps).abs() > 1e-6 {
-        return unit.refuse(&format!(
-            "communicationStepSize = {step_s} s is no multiple of 0.001 s"
-        ));
-    }
-    for _ in 0..steps as u32 {
-        unit.model.step();
-    }
-    OK
+    let result = unit.instance.advance(step_s);
+    unit.answer(result)
 }
 
 /// Copies the state.
@@ -302,11 +257,11 @@ pub unsafe extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mu
     let (Some(unit), Some(state)) = (unsafe { (unit(component), state.as_mut()) }) else {
         return ERROR;
     };
-    let model = unit.model.clone();
+    let copy = unit.instance.state.clone();
     // SAFETY: null, or a state that this function made.
-    match unsafe { (*state).cast::<Controller>().as_mut() } {
-        Some(old) => *old = model,
-        None => *state = Box::into_raw(Box::new(model)).cast(),
+    match unsafe { (*state).cast::<State>().as_mut() } {
+        Some(old) => *old = copy,
+        None => *state = Box::into_raw(Box::new(copy)).cast(),
     }
     OK
 }
@@ -318,11 +273,10 @@ pub unsafe extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2SetFMUstate(component: *mut c_void, state: *mut c_void) -> c_int {
     // SAFETY: as the standard vouches; the state is one of `fmi2GetFMUstate`.
-    let (Some(unit), Some(state)) = (unsafe { (unit(component), state.cast::<Controller>().as_ref()) })
-    else {
+    let (Some(unit), Some(state)) = (unsafe { (unit(component), state.cast::<State>().as_ref()) }) else {
         return ERROR;
     };
-    unit.model = state.clone();
+    unit.instance.state = state.clone();
     OK
 }
 
@@ -338,7 +292,7 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(_component: *mut c_void, state: *mut *
     };
     if !state.is_null() {
         // SAFETY: from `fmi2GetFMUstate`, and freed once.
-        drop(unsafe { Box::from_raw((*state).cast::<Controller>()) });
+        drop(unsafe { Box::from_raw((*state).cast::<State>()) });
         *state = std::ptr::null_mut();
     }
     OK
@@ -358,7 +312,7 @@ pub unsafe extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, 
     if kind != LAST_SUCCESSFUL_TIME {
         return DISCARD;
     }
-    *value = unit.model.time_s();
+    *value = unit.instance.time_s();
     OK
 }
 

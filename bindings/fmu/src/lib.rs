@@ -1,14 +1,18 @@
-//! The FMU's binary: FMI 2.0 co-simulation around [`controller::Controller`].
+//! The binaries of the FMUs: three models, FMI 2.0 and 3.0 co-simulation. Which model it is the token says that the importing
+//! tool gives.
 //!
-//! The model's variables are one list, from which its description follows. `unsafe` is here alone: pointers come from the
-//! importing tool, as the standard says.
+//! A model's variables are one list, from which both descriptions follow. `unsafe` is in [`fmi2`] and [`fmi3`] alone: pointers come
+//! from the importing tool, as the standards say.
 
 pub mod controller;
+pub mod driver;
 pub mod fmi2;
+pub mod fmi3;
+mod instance;
+pub mod variable;
+pub mod vehicle;
 
-/// Identifies model and variables; another list of variables is another GUID.
-pub const GUID: &str = "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a01}";
-/// Name of the model and of its binary.
-pub const MODEL: &str = "HapticController";
-/// Longest communication step, ms: an hour.
-pub(crate) const MOST_STEPS: f64 = 3_600_000.0;
+use variable::About;
+
+/// Every model of this binary.
+pub static MODELS: [&About; 3] = [&controller::ABOUT, &driver::ABOUT, &vehicle::ABOUT];

@@ -1,7 +1,7 @@
 //! The senders of the ECU's inputs: frames with counter and CRC, from SI values.
 
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyIterator, PyTuple};
 
@@ -125,7 +125,8 @@ impl Bus {
 
     /// Whether the next frame of a sender is due, `elapsed_us` after the start.
     fn is_due(&mut self, sender: usize, period_ms: f64, elapsed_us: u64) -> bool {
-        let due = elapsed_us as f64 >= f64::from(self.sent[sender]) * period_ms * 1e3;
+        // Half a microsecond, because 15 times 8.333 ms is a little more than 125 ms in floating point.
+        let due = elapsed_us as f64 + 0.5 >= f64::from(self.sent[sender]) * period_ms * 1e3;
         self.sent[sender] += u32::from(due);
         due
     }
@@ -208,22 +209,29 @@ impl Bus {
     ///     Speed, m/s.
     /// second_speed_m_per_s : float, optional
     ///     Of the second source, m/s; the same if not given.
+    /// yaw_rate_rad_per_s : float, optional
+    ///     Measured yaw rate, rad/s, positive to the left; None of a vehicle that does not measure it.
     ///
     /// Returns
     /// -------
     /// Frame
-    #[pyo3(signature = (speed_m_per_s, second_speed_m_per_s = None))]
+    #[pyo3(signature = (speed_m_per_s, second_speed_m_per_s = None, yaw_rate_rad_per_s = None))]
     fn vehicle(
         &mut self,
         py: Python<'_>,
         speed_m_per_s: f64,
         second_speed_m_per_s: Option<f64>,
+        yaw_rate_rad_per_s: Option<f64>,
     ) -> PyResult<Frame> {
         let first = finite(py, "speed_m_per_s", speed_m_per_s, "m/s")?;
         let second = second_speed_m_per_s.unwrap_or(first);
         let second = finite(py, "second_speed_m_per_s", second, "m/s")?;
+        let yaw_rate = yaw_rate_rad_per_s
+            .map(|rate| finite(py, "yaw_rate_rad_per_s", rate, "rad/s"))
+            .transpose()?;
         let vehicle = Vehicle {
             speeds: [first, second].map(Speed::from_m_per_s),
+            yaw_rate: yaw_rate.map(TurningRate::from_rad_per_s),
         };
         Ok(self.send(VEHICLE, &vehicle))
     }
@@ -266,12 +274,15 @@ impl Bus {
     ///     As of `vehicle`.
     /// engage, authority, probe : optional
     ///     As of `demand`.
+    /// yaw_rate_rad_per_s : float, optional
+    ///     As of `vehicle`.
     ///
     /// Returns
     /// -------
     /// list of Frame
     #[pyo3(signature = (t_us, *, e_y_m, e_theta_rad, driver_torque_nm, wheel_angle_rad, motor_torque_nm,
-                        speed_m_per_s, engage = true, authority = 1.0, probe = false))]
+                        speed_m_per_s, engage = true, authority = 1.0, probe = false,
+                        yaw_rate_rad_per_s = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn frames(
         &mut self,
@@ -286,6 +297,7 @@ impl Bus {
         engage: bool,
         authority: f64,
         probe: bool,
+        yaw_rate_rad_per_s: Option<f64>,
     ) -> PyResult<Vec<Frame>> {
         // A copy, so that a refused value sends nothing.
         let mut bus = *self;
@@ -300,7 +312,7 @@ impl Bus {
             frames.push(bus.column(py, driver_torque_nm, wheel_angle_rad, motor_torque_nm)?);
         }
         if bus.is_due(VEHICLE, Vehicle::INFO.period_ms, elapsed_us) {
-            frames.push(bus.vehicle(py, speed_m_per_s, None)?);
+            frames.push(bus.vehicle(py, speed_m_per_s, None, yaw_rate_rad_per_s)?);
             frames.push(bus.demand(py, engage, authority, probe)?);
         }
         *self = bus;

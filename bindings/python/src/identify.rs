@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{COLUMNS, DriveLog, Options, open_recording};
+use haptic_analysis::identify::{COLUMNS, DriveLog, Options, open_mapped};
 use haptic_batch::identify::Method;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -34,12 +34,12 @@ pub(crate) fn identify<'py>(
     options
         .between(&from, &to)
         .map_err(|error| errors::input(py, error))?;
-    let (name, (log, note)) = match (path, columns) {
+    let (name, (log, converted)) = match (path, columns) {
         (Some(path), _) => {
-            let opened = open_recording(&path, None, manual).map_err(|error| errors::input(py, error))?;
+            let opened = open_mapped(&path, None, &[], manual).map_err(|error| errors::input(py, error))?;
             (path.display().to_string(), opened)
         }
-        (None, Some(columns)) => ("columns".to_owned(), (log_of(py, columns, manual)?, None)),
+        (None, Some(columns)) => ("columns".to_owned(), (log_of(py, columns, manual)?, Vec::new())),
         (None, None) => return Err(errors::input(py, "neither a path nor columns")),
     };
     let method = if as_published {
@@ -52,7 +52,7 @@ pub(crate) fn identify<'py>(
     })?
     .map_err(|error| errors::input(py, error))?;
     let mut found = drive.results.identification;
-    found.notes.splice(0..0, note.map(String::from));
+    found.notes.splice(0..0, converted);
     let made = PyDict::new(py);
     made.set_item("results", python(py, &found)?)?;
     let units = PyDict::new(py);

@@ -9,6 +9,7 @@ mod interrupt;
 mod run;
 mod scenario;
 mod simulation;
+mod sweep;
 
 use pyo3::prelude::*;
 
@@ -26,4 +27,6 @@ mod _native {
     use crate::scenario::Scenario;
     #[pymodule_export]
     use crate::simulation::{Action, Outcome, Simulation};
+    #[pymodule_export]
+    use crate::sweep::Sweep;
 }

@@ -47,6 +47,7 @@ impl Action {
                 torque_lost,
                 lane_lost,
             },
+            ..
         } = self.inner;
         (engage, authority, probe, hand_torque_nm, torque_lost, lane_lost)
     }
@@ -78,6 +79,7 @@ impl Action {
                 torque_lost,
                 lane_lost,
             },
+            ..haptic_sim::Action::default()
         };
         Ok(Self { inner })
     }

@@ -138,6 +138,7 @@ def test_the_dbc_reads_what_the_bus_sends():
     for frame, values in [
         (bus.column(1.5, 0.5, -0.25), (1.5, 0.5, -0.25)),
         (bus.vehicle(16.5, 16.25), (16.5, 16.25)),
+        (bus.vehicle(16.5, yaw_rate_rad_per_s=-0.25), (16.5, -0.25, 1)),
         (bus.lane_preview(0.5, -0.125), (0.5, -0.125)),
     ]:
         decoded = database.decode_message(frame.id, frame.data, decode_choices=False)

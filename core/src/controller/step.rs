@@ -5,14 +5,20 @@ use super::{Command, Input, Inputs, Memory, READY, Request};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
+use crate::hands::{END, WARN};
 use crate::injection::Injection;
-use crate::law::LawState;
+use crate::law::{LaneSample, LawState, Since};
 use crate::modes::{Event, Events, Mode};
-use crate::plausibility::speeds_agree;
+use crate::past::Past;
 use crate::probe::ProbeState;
-use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, product};
-use crate::ramp::{HANDOVER, HISTORY, History, Ramp, smaller_of_same_sign};
+use crate::quantity::{
+    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second_times, product,
+    saturate,
+};
+use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
+/// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
+const WITHOUT_COLUMN: u32 = 2;
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
 /// A step that comes later than this after the last one missed its deadline.
@@ -26,6 +32,9 @@ const EARLY: Micros = Micros::from_us(500);
 /// So many early steps in a row are tolerated: they earn no rate limit, but a runaway timer is a fault.
 const EARLY_STEPS: u32 = 3;
 
+/// A lane sample that is no older than this when it comes needs no other making up for than its rates.
+const PROMPT: Micros = Micros::from_ms(10);
+
 /// One step, with what it must not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
@@ -37,21 +46,29 @@ pub(super) struct Step<'a, I> {
 }
 
 impl<I: Injection> Step<'_, I> {
-    pub(super) fn run(&self, v: &mut Memory, history: &mut History) -> Command {
-        let lost = self.look(v);
+    pub(super) fn run(&self, v: &mut Memory, history: &mut History, past: &mut Past) -> Command {
+        let lost = self.look(v, past);
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
         v.latched |= faults.common(FaultSet::CRITICAL).bits();
 
         let before = Mode::from_code(v.mode).unwrap_or(Mode::Fault);
+        if before == Mode::Active {
+            v.hands.guided(self.applied, self.elapsed);
+        }
+        faults.insert_if(
+            matches!(before, Mode::Active | Mode::Fade) && v.hands.without() >= WARN,
+            Fault::HandsOff,
+        );
         let mode = self.next_mode(v, before, faults);
         if mode != before {
             self.enter(v, mode, faults, history);
         }
-        let (torque, probe, limit) = self.torque(v, mode);
+        let (torque, probe, limit) = self.torque(v, mode, faults);
         v.probe_applied = probe.unwrap_or(Torque::ZERO);
-        let warning = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked);
+        let warning =
+            matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked) || faults.contains(Fault::HandsOff);
         Command {
             torque,
             probe,
@@ -63,11 +80,11 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
-    fn look(&self, v: &mut Memory) -> FaultSet {
+    fn look(&self, v: &mut Memory, past: &mut Past) -> FaultSet {
         let Inputs {
             lane,
             column,
-            speeds,
+            motion,
             request,
             ..
         } = self.inputs;
@@ -75,13 +92,14 @@ impl<I: Injection> Step<'_, I> {
         let mut lost = FaultSet::NONE;
         let mut implausible = FaultSet::from_bits(v.implausible);
 
-        v.age.speeds = self.age(speeds, v.age.speeds);
-        if let Input::New([a, b]) = speeds {
-            let agree = speeds_agree(*a, *b);
-            implausible.set(!agree, Fault::SpeedImplausible);
+        v.age.speeds = self.age(motion, v.age.speeds);
+        if let Input::New(motion) = motion {
+            let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds);
+            implausible.set(!plausible, Fault::SpeedImplausible);
             if agree {
-                checks.speed(&mut v.plausibility, *a);
+                checks.motion(&mut v.plausibility, motion.speeds[0], motion.yaw_rate());
             }
+            past.turn(self.now, v.plausibility.turning());
         }
         if !self.is_fast_enough().unwrap_or(false) {
             // Neither model holds at a walking pace, let alone at an unknown one.
@@ -91,6 +109,7 @@ impl<I: Injection> Step<'_, I> {
         v.age.column = self.age(column, v.age.column);
         match column {
             Input::New(c) => {
+                v.hands.feel(c.driver_torque);
                 let plausible = checks.column(
                     &mut v.plausibility,
                     self.now,
@@ -109,15 +128,22 @@ impl<I: Injection> Step<'_, I> {
         v.age.lane = self.age(lane, v.age.lane);
         match lane {
             Input::New(sample) => {
-                let plausible = checks.lane(&mut v.plausibility, *sample);
+                if self.inputs.line_moved {
+                    v.plausibility.forget_lane();
+                    past.forget_line();
+                    v.law.relocate(*sample);
+                }
+                let plausible = checks.lane(&mut v.plausibility, past, self.now, *sample);
                 implausible.set(!plausible, Fault::LaneImplausible);
             }
             Input::Held(_) => {}
             Input::Lost => {
                 v.plausibility.forget_lane();
+                past.forget_line();
                 implausible.set(false, Fault::LaneImplausible);
             }
         }
+        self.make_up_for_age(v, past);
         v.age.request = self.age(request, v.age.request);
 
         // A frame that arrives and is refused is no time-out: the fault that says so came with the inputs.
@@ -128,12 +154,48 @@ impl<I: Injection> Step<'_, I> {
         );
         lost.insert_if(column.value().is_none(), Fault::ColumnTimeout);
         lost.insert_if(
-            speeds.value().is_none() && !refused(Fault::SpeedStep),
+            motion.value().is_none() && !refused(Fault::SpeedStep),
             Fault::SpeedTimeout,
         );
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
         v.implausible = implausible.bits();
         lost
+    }
+
+    /// What the vehicle turned since the lane sample in use, if that was old when it came.
+    fn make_up_for_age(&self, v: &mut Memory, past: &Past) {
+        let Some(sample) = self.inputs.lane.value() else {
+            return;
+        };
+        let age = self.now.since(sample.at);
+        if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
+            (v.turned, v.rate_then) = (Radians::ZERO, TurningRate::ZERO);
+        } else if let Input::New(_) = self.inputs.lane {
+            (v.turned, v.rate_then) = past.turned(self.now, sample.at);
+        } else {
+            let turning = i64::from(v.plausibility.turning().bits());
+            let turned = i64::from(v.turned.bits()).saturating_add(per_second_times(turning, self.elapsed));
+            v.turned = Radians::from_wide(turned);
+        }
+    }
+
+    /// How its motion since then differs from going on as it did.
+    fn since(&self, v: &Memory, sample: LaneSample) -> Since {
+        let age = self.now.since(sample.at);
+        if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
+            return Since::NOTHING;
+        }
+        let went_on = per_second_times(i64::from(v.rate_then.bits()), age);
+        let turned = i64::from(v.turned.bits()).saturating_sub(went_on);
+        let faster = i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.rate_then.bits()));
+        let speed = v.plausibility.speed();
+        let near = product(self.config.plausibility.near_time.bits(), speed.bits());
+        Since::new(
+            Radians::from_wide(turned),
+            TurningRate::from_wide(faster),
+            speed,
+            Metres::from_wide(near),
+        )
     }
 
     fn age<T>(&self, input: &Input<T>, so_far: Micros) -> Micros {
@@ -147,9 +209,9 @@ impl<I: Injection> Step<'_, I> {
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
         self.inputs
-            .speeds
+            .motion
             .value()
-            .map(|speeds| speeds.iter().all(|speed| *speed >= least))
+            .map(|motion| motion.speeds.iter().all(|speed| *speed >= least))
     }
 
     /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
@@ -185,7 +247,8 @@ impl<I: Injection> Step<'_, I> {
         raised.insert_if(rising && v.ready >= READY, Event::Engage);
         // Late steps carry the ramp further than the reduction limit lets the torque follow.
         raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
-        let is_over = request == Some(false) || fast_enough == Some(false);
+        let no_hand = v.hands.without() >= END;
+        let is_over = request == Some(false) || fast_enough == Some(false) || no_hand;
         raised.insert_if(is_over, Event::Disengage);
         raised.insert_if(!inputs_ok, Event::InputLost);
         raised.insert_if(faults.intersects(FaultSet::LOCKING), Event::BootRejected);
@@ -199,7 +262,10 @@ impl<I: Injection> Step<'_, I> {
         v.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.
-            Mode::Active => (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now)),
+            Mode::Active => {
+                (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
+                v.hands.begin();
+            }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
@@ -222,10 +288,10 @@ impl<I: Injection> Step<'_, I> {
                 Micros::from_us(0)
             }
         };
-        if faults.intersects(FaultSet::IMPLAUSIBLE) {
-            return HISTORY;
-        }
-        lost_for(Fault::LaneTimeout, v.age.lane)
+        faults
+            .unseen()
+            .max(lost_for(Fault::LaneTimeout, v.age.lane))
+            .max(lost_for(Fault::LaneInvalid, v.age.lane))
             .max(lost_for(Fault::LaneStep, v.age.lane))
             .max(lost_for(Fault::SpeedStep, v.age.speeds))
             .max(lost_for(Fault::ColumnTimeout, v.age.column))
@@ -234,7 +300,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// The torque, the part of it that is the probe, and what limited it.
-    fn torque(&self, v: &mut Memory, mode: Mode) -> (Torque, Option<Torque>, LimitReason) {
+    fn torque(&self, v: &mut Memory, mode: Mode, faults: FaultSet) -> (Torque, Option<Torque>, LimitReason) {
         let (wanted, probe) = match mode {
             Mode::Active => {
                 let guidance = self.guidance(v);
@@ -242,10 +308,17 @@ impl<I: Injection> Step<'_, I> {
                 (with(guidance, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
-            Mode::Fade | Mode::Handover => (
-                smaller_of_same_sign(v.ramp.step(self.elapsed), self.applied),
-                None,
-            ),
+            Mode::Fade | Mode::Handover => {
+                let blind =
+                    faults.contains(Fault::ColumnTimeout) || faults.contains(Fault::ColumnImplausible);
+                let pace = if mode == Mode::Handover && blind {
+                    WITHOUT_COLUMN
+                } else {
+                    1
+                };
+                let passed = Micros::from_us(self.elapsed.us().saturating_mul(pace));
+                (smaller_of_same_sign(v.ramp.step(passed), self.applied), None)
+            }
             // At once: what is behind these modes must not move the wheel for another tick.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
                 return (Torque::ZERO, None, LimitReason::Mode);
@@ -282,13 +355,17 @@ impl<I: Injection> Step<'_, I> {
 
     /// The law's torque, scaled by the authority.
     fn guidance(&self, v: &mut Memory) -> Torque {
-        let law = |sample| self.config.law.step(&mut v.law, self.now, sample);
-        let asked = self.inputs.lane.value().map_or(Torque::ZERO, law);
+        let asked = self.inputs.lane.value().map_or(Torque::ZERO, |sample| {
+            let since = self.since(v, sample);
+            self.config.law.step(&mut v.law, self.now, sample, &since)
+        });
         let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ZERO, share);
-        Torque::from_wide(product(authority.bits(), asked.bits()))
+        let scheduled = self.config.schedule.share(v.plausibility.speed());
+        let share = saturate(product(authority.bits(), scheduled.bits()));
+        Torque::from_wide(product(share, asked.bits()))
     }
 }
 

@@ -128,7 +128,7 @@ impl Ecu {
             Region::Ecu => {
                 flip(&mut self.receivers.lane, bit, &mut words);
                 flip(&mut self.receivers.column, bit, &mut words);
-                flip(&mut self.receivers.speeds, bit, &mut words);
+                flip(&mut self.receivers.motion, bit, &mut words);
                 flip(&mut self.receivers.request, bit, &mut words);
                 flip(&mut self.memory, bit, &mut words);
             }

@@ -6,14 +6,14 @@
 use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
-    Column as ColumnMessage, Demand, FaultRecord, Guidance, LanePreview, Message, ParameterStatus,
+    Column as ColumnMessage, Demand, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus,
     ParameterValue, Rejection, TIMEOUT, Telemetry, Vehicle, Warning,
 };
 use crate::bus::{Frame, Reject};
-use crate::controller::{Column, Input, Inputs, Request};
+use crate::controller::{Column, Input, Inputs, Motion, Request};
 use crate::faults::{Fault, FaultSet};
 use crate::law::LaneSample;
-use crate::plausibility::{lane_step_is_possible, speed_step_is_possible};
+use crate::plausibility::{is_another_line, lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 use crate::redundant::{Redundant, Words, words};
 
@@ -33,10 +33,21 @@ pub(super) struct Slot<T> {
     state: u32,
     /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason.
     doubt: u32,
-    /// When it was true.
+    /// When it was heard.
     at: Instant,
+    /// How far apart its sender's messages come.
+    period: Micros,
     value: T,
 }
+
+/// The slowest sender of each input that is waited for: a camera of 15 Hz, a column and a vehicle's bus as they are in
+/// cars. Three periods without a message are a loss, and 30 ms at least.
+const LANE_PERIOD: Micros = Micros::from_us(66_667);
+const COLUMN_PERIOD: Micros = Micros::from_ms(20);
+const MOTION_PERIOD: Micros = Micros::from_ms(25);
+const REQUEST_PERIOD: Micros = Micros::from_ms(25);
+/// A lane sample that is older than this when it comes is none.
+const OLDEST_SAMPLE: Micros = Micros::from_ms(150);
 
 /// Its sender did not vouch for it.
 const INVALID: u32 = 1;
@@ -60,6 +71,7 @@ impl<T: Words> Words for Slot<T> {
             state: change(self.state),
             doubt: change(self.doubt),
             at: self.at.map_words(change),
+            period: self.period.map_words(change),
             value: self.value.map_words(change),
         }
     }
@@ -69,6 +81,7 @@ impl<T: Words> Words for Slot<T> {
             & self.state.is_inverse_of(&other.state)
             & self.doubt.is_inverse_of(&other.doubt)
             & self.at.is_inverse_of(&other.at)
+            & self.period.is_inverse_of(&other.period)
             & self.value.is_inverse_of(&other.value)
     }
 }
@@ -76,17 +89,38 @@ impl<T: Words> Words for Slot<T> {
 impl<T: Words> Slot<T> {
     /// Nothing heard; `value` only fills the place.
     fn redundant(e2e: ReceiverState, value: T, now: Instant) -> Redundant<Self> {
-        Redundant::new(Self {
+        Redundant::new(Self::new(e2e, value, now))
+    }
+
+    fn new(e2e: ReceiverState, value: T, now: Instant) -> Self {
+        Self {
             e2e,
             state: LOST,
             doubt: 0,
             at: now,
+            period: Micros::from_us(0),
             value,
-        })
+        }
     }
 
-    fn put(&mut self, value: T, at: Instant) {
-        (self.state, self.value, self.at) = (NEW, value, at);
+    /// Takes a value heard now. The sender's period falls at once, by half at most, and grows by an eighth: a few frames
+    /// that are lost, or that come together, do not change it by much. Unknown, it is the `slowest`.
+    fn put(&mut self, value: T, now: Instant, slowest: Micros) {
+        let (period, apart) = (self.period.us(), now.since(self.at).us());
+        let period = if self.state == LOST {
+            slowest.us()
+        } else if apart < period {
+            apart.max(period / 2)
+        } else {
+            apart.min(period.saturating_add(period / 8)).min(slowest.us())
+        };
+        self.period = Micros::from_us(period);
+        (self.state, self.value, self.at) = (NEW, value, now);
+    }
+
+    /// For how long the value may be used.
+    fn timeout(&self) -> Micros {
+        Micros::from_us(self.period.us().saturating_mul(3)).max(TIMEOUT)
     }
 
     fn last(&self) -> Option<T> {
@@ -96,7 +130,7 @@ impl<T: Words> Slot<T> {
     /// What a step sees. A stale value is dropped, so that no instant outlives a wrap of the clock, and its
     /// sender has to be trusted anew.
     fn take(&mut self, now: Instant) -> Input<T> {
-        if self.state != LOST && now.since(self.at) > TIMEOUT {
+        if self.state != LOST && now.since(self.at) > self.timeout() {
             self.state = LOST;
             self.e2e = ReceiverState::NEW;
         }
@@ -107,6 +141,87 @@ impl<T: Words> Slot<T> {
             HELD => Input::Held(self.value),
             _ => Input::New(self.value),
         }
+    }
+}
+
+words! {
+    /// A lane sample that was too far from the last one used, and whether there is one.
+    struct Refused {
+        sample: LaneSample,
+        is_there: u32,
+        /// 1 when the sample in use is of another line than the one before.
+        moved: u32,
+    }
+}
+
+/// The lane's receiver: what it hears, and what it refused last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+pub(super) struct LaneSlot {
+    slot: Slot<LaneSample>,
+    refused: Refused,
+}
+
+impl Words for LaneSlot {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self {
+            slot: self.slot.map_words(change),
+            refused: self.refused.map_words(change),
+        }
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        self.slot.is_inverse_of(&other.slot) & self.refused.is_inverse_of(&other.refused)
+    }
+}
+
+impl LaneSlot {
+    /// Takes a preview. Two in a row that agree with each other, and with a line chosen anew, begin that line.
+    fn take(&mut self, lane: &LanePreview, now: Instant) -> Result<(), Reject> {
+        let Self { slot, refused } = self;
+        slot.doubt = u32::from(!lane.valid);
+        if !lane.valid {
+            return Ok(());
+        }
+        let sample = LaneSample {
+            e_y: lane.e_y,
+            e_theta: lane.e_theta,
+            at: now.before(lane.age),
+        };
+        let Some(last) = slot.last() else {
+            refused.is_there = 0;
+            return Self::use_if_young(slot, sample, lane.age, now);
+        };
+        // A span of almost a whole wrap of the clock is a step back in time: what differences samples would take it
+        // for a gap and start anew.
+        if sample.at.since(last.at) > HALF_WRAP {
+            return Err(Reject::Older);
+        }
+        if lane_step_is_possible(&last, &sample) {
+            refused.is_there = 0;
+            return Self::use_if_young(slot, sample, lane.age, now);
+        }
+        let agrees = refused.is_there != 0 && lane_step_is_possible(&refused.sample, &sample);
+        if agrees && is_another_line(&last, &sample) {
+            (refused.is_there, refused.moved) = (0, 1);
+            return Self::use_if_young(slot, sample, lane.age, now);
+        }
+        (refused.sample, refused.is_there) = (sample, 1);
+        slot.doubt = STEP;
+        Err(Reject::Step)
+    }
+
+    fn use_if_young(
+        slot: &mut Slot<LaneSample>,
+        sample: LaneSample,
+        age: Micros,
+        now: Instant,
+    ) -> Result<(), Reject> {
+        if age > OLDEST_SAMPLE {
+            return Err(Reject::Older);
+        }
+        slot.put(sample, now, LANE_PERIOD);
+        Ok(())
     }
 }
 
@@ -140,9 +255,9 @@ impl From<RequestWords> for Request {
 /// The receivers of all inputs.
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
-    pub(super) lane: Redundant<Slot<LaneSample>>,
+    pub(super) lane: Redundant<LaneSlot>,
     pub(super) column: Redundant<Slot<Column>>,
-    pub(super) speeds: Redundant<Slot<[Speed; 2]>>,
+    pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
     pub(super) accepted: Accepted,
@@ -169,9 +284,16 @@ impl Receivers {
             probe: 0,
         };
         Self {
-            lane: Slot::redundant(e2e, lane, now),
+            lane: Redundant::new(LaneSlot {
+                slot: Slot::new(e2e, lane, now),
+                refused: Refused {
+                    sample: lane,
+                    is_there: 0,
+                    moved: 0,
+                },
+            }),
             column: Slot::redundant(e2e, column, now),
-            speeds: Slot::redundant(e2e, [Speed::ZERO; 2], now),
+            motion: Slot::redundant(e2e, Motion::default(), now),
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::default(),
@@ -185,31 +307,12 @@ impl Receivers {
             actuator, accepted, ..
         } = self;
         match frame.id() {
-            LanePreview::ID => self.lane.change(|slot| {
-                let lane = LanePreview::decode(&mut slot.e2e, frame)?;
-                slot.doubt = u32::from(!lane.valid);
-                if !lane.valid {
-                    return Ok(());
+            LanePreview::ID => self.lane.change(|lane| {
+                let preview = LanePreview::decode(&mut lane.slot.e2e, frame)?;
+                lane.take(&preview, now)?;
+                if preview.valid {
+                    accepted.lane = frame.full_data();
                 }
-                let at = now.before(lane.age);
-                let sample = LaneSample {
-                    e_y: lane.e_y,
-                    e_theta: lane.e_theta,
-                    at,
-                };
-                if let Some(last) = slot.last() {
-                    // A span of almost a whole wrap of the clock is a step back in time: what differences
-                    // samples would take it for a gap and start anew.
-                    if at.since(last.at) > HALF_WRAP {
-                        return Err(Reject::Older);
-                    }
-                    if !lane_step_is_possible(&last, &sample) {
-                        slot.doubt = STEP;
-                        return Err(Reject::Step);
-                    }
-                }
-                slot.put(sample, at);
-                accepted.lane = frame.full_data();
                 Ok(())
             }),
             ColumnMessage::ID => self.column.change(|slot| {
@@ -219,15 +322,16 @@ impl Receivers {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
                 };
-                slot.put(column, now);
+                slot.put(column, now, COLUMN_PERIOD);
                 actuator.deliver(c.motor_torque);
                 accepted.column = frame.full_data();
                 Ok(())
             }),
-            Vehicle::ID => self.speeds.change(|slot| {
-                let speeds = Vehicle::decode(&mut slot.e2e, frame)?.speeds;
-                let follows = |last: [Speed; 2]| {
-                    last.iter()
+            Vehicle::ID => self.motion.change(|slot| {
+                let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
+                let follows = |last: Motion| {
+                    last.speeds
+                        .iter()
                         .zip(&speeds)
                         .all(|(last, new)| speed_step_is_possible(*last, *new))
                 };
@@ -236,7 +340,7 @@ impl Receivers {
                     return Err(Reject::Step);
                 }
                 slot.doubt = 0;
-                slot.put(speeds, now);
+                slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
                 Ok(())
             }),
             Demand::ID => self.request.change(|slot| {
@@ -246,18 +350,12 @@ impl Receivers {
                     authority: demand.authority,
                     probe: u32::from(demand.probe),
                 };
-                slot.put(request, now);
+                slot.put(request, now, REQUEST_PERIOD);
                 accepted.demand = frame.full_data();
                 Ok(())
             }),
             // On a bus nobody hears itself.
-            Guidance::ID
-            | Warning::ID
-            | FaultRecord::ID
-            | Telemetry::ID
-            | ParameterStatus::ID
-            | ParameterValue::ID
-            | Rejection::ID => {
+            id if is_own(id) => {
                 self.foreign = FOREIGN_STEPS;
                 Some(Err(Reject::OwnIdentifier))
             }
@@ -267,26 +365,32 @@ impl Receivers {
 
     /// Whether the vehicle stands: both speeds are known and next to nothing.
     pub(super) fn stands(&self) -> bool {
-        let speeds = self.speeds.get().and_then(Slot::last);
-        speeds.is_some_and(|speeds| speeds.iter().all(|speed| *speed <= STANDSTILL))
+        let motion = self.motion.get().and_then(Slot::last);
+        motion.is_some_and(|motion| motion.speeds.iter().all(|speed| *speed <= STANDSTILL))
     }
 
     /// The last lane preview passes for one that came now.
     pub(super) fn renew_lane(&mut self, now: Instant) {
-        let _ = self.lane.change(|slot| slot.at = now);
+        let _ = self.lane.change(|lane| {
+            lane.slot.at = now;
+            lane.slot.value.at = now;
+        });
     }
 
     /// What a step sees, or `None` if a receiver is damaged.
     pub(super) fn take(&mut self, now: Instant) -> Option<Inputs> {
-        let (lane, lane_doubt) = self.lane.change(|slot| (slot.take(now), slot.doubt))?;
-        let (speeds, speeds_doubt) = self.speeds.change(|slot| (slot.take(now), slot.doubt))?;
+        let (lane, lane_doubt, moved) = self.lane.change(|lane| {
+            let moved = core::mem::replace(&mut lane.refused.moved, 0);
+            (lane.slot.take(now), lane.slot.doubt, moved)
+        })?;
+        let (motion, speeds_doubt) = self.motion.change(|slot| (slot.take(now), slot.doubt))?;
         let mut faults = FaultSet::NONE;
         // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
         if lane == Input::Lost {
             faults.insert_if(lane_doubt == INVALID, Fault::LaneInvalid);
             faults.insert_if(lane_doubt == STEP, Fault::LaneStep);
         }
-        faults.insert_if(speeds == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
+        faults.insert_if(motion == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
         if self.foreign > 0 {
             self.foreign = self.foreign.saturating_sub(1);
             faults.insert(Fault::OwnIdentifier);
@@ -294,7 +398,8 @@ impl Receivers {
         Some(Inputs {
             lane,
             column: self.column.change(|slot| slot.take(now))?,
-            speeds,
+            motion,
+            line_moved: moved != 0,
             request: self.request.change(|slot| slot.take(now).map(Request::from))?,
             faults,
         })
@@ -309,4 +414,19 @@ fn column_window(silence: Micros) -> u8 {
     periods
         .saturating_add(u32::from(ColumnMessage::MAX_DELTA))
         .min(14) as u8
+}
+
+/// Whether an identifier is this ECU's (`core/tests/attacks.rs` holds it to the list of messages).
+const fn is_own(id: u16) -> bool {
+    matches!(
+        id,
+        Guidance::ID
+            | Warning::ID
+            | FaultRecord::ID
+            | Telemetry::ID
+            | ParameterStatus::ID
+            | ParameterValue::ID
+            | Rejection::ID
+            | Identity::ID
+    )
 }

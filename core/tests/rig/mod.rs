@@ -14,7 +14,7 @@ use haptic_core::config::Setup;
 use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::modes::Mode;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;
@@ -40,6 +40,8 @@ pub(crate) struct Rig {
     counters: [u8; 4],
     pub(crate) lane: LanePreview,
     pub(crate) speeds: [f64; 2],
+    /// The measured yaw rate, if there is one.
+    pub(crate) yaw_rate: Option<f64>,
     pub(crate) engage: bool,
     pub(crate) authority: f64,
     pub(crate) probe: bool,
@@ -75,6 +77,7 @@ impl Rig {
                 ..LanePreview::default()
             },
             speeds: [SPEED; 2],
+            yaw_rate: None,
             engage: false,
             authority: 1.0,
             probe: false,
@@ -140,6 +143,7 @@ impl Rig {
             }
             2 => Vehicle {
                 speeds: self.speeds.map(Speed::from_m_per_s),
+                yaw_rate: self.yaw_rate.map(TurningRate::from_rad_per_s),
             }
             .encode(counter),
             _ => Demand {
@@ -161,7 +165,9 @@ impl Rig {
             let driver = (word << 34).cast_signed() >> 46;
             let heard = &mut self.heard;
             match frame.id() {
-                0x100 if word >> 55 & 1 == 1 => heard.lane = Some(((word >> 46 & 0x1FF) * 100, self.t_us)),
+                0x100 if word >> 55 & 1 == 1 => {
+                    heard.lane = Some((((word >> 46 & 0x1FF) + (word >> 56 & 3) * 512) * 100, self.t_us))
+                }
                 0x110 => heard.driver = Some((driver as f64 / 4096.0, self.t_us)),
                 0x120 => heard.speeds = Some(self.t_us),
                 0x130 => heard.engage = Some((word >> 12 & 1 == 1, self.t_us)),

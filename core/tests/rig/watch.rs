@@ -9,10 +9,15 @@ use std::collections::VecDeque;
 
 /// The resolution of the torque on the bus, N.m.
 const BUS_LSB: f64 = 1.0 / 4096.0;
-/// An output may be trusted that is so old, us, and what the ECU's own history may add: 5 ms between two outputs that
-/// it keeps, and late steps.
-const OLDEST_TRUSTED_US: u64 = 250_000;
-const KEPT_APART_US: u64 = 25_000;
+/// For how long a fault of an implausible input may have been there before it was declared, us.
+const UNSEEN: [(Fault, u64); 3] = [
+    (Fault::LaneImplausible, 2_000_000),
+    (Fault::ColumnImplausible, 1_500_000),
+    (Fault::SpeedImplausible, 500_000),
+];
+/// For how long outputs are kept here: the longest of these, with 40 ms between two outputs that the ECU keeps, and late
+/// steps, us.
+const KEPT_US: u64 = 2_100_000;
 /// A frame may have come so long before the step that took it, us.
 const LATEST_STEP_US: u64 = 13_000;
 /// The resolution inside the core, for the roundings of its bounds, N.m.
@@ -173,7 +178,8 @@ impl Watch {
                 context()
             );
         }
-        let must_warn = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked);
+        let must_warn = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
+            || step.command.faults.contains(Fault::HandsOff);
         assert_eq!(step.command.warning, must_warn, "warning: {}", context());
         if must_warn && mode != self.mode && !matches!(self.mode, Mode::Handover | Mode::Fault | Mode::Locked)
         {
@@ -208,7 +214,7 @@ impl Watch {
         (self.torque, self.t_us, self.mode, self.line) = (torque, rig.t_us, mode, line);
         let probe = step.command.probe.map_or(0.0, |probe| probe.nm());
         self.outputs.push_back((rig.t_us, (torque - probe).abs()));
-        let oldest = rig.t_us.saturating_sub(OLDEST_TRUSTED_US + KEPT_APART_US);
+        let oldest = rig.t_us.saturating_sub(KEPT_US);
         while self.outputs.front().is_some_and(|(t, _)| *t < oldest) {
             self.outputs.pop_front();
         }
@@ -217,11 +223,15 @@ impl Watch {
         self.by_limit[step.command.limit as usize] += 1;
     }
 
-    /// Whether no input was true longer ago than 30 ms.
+    /// Whether every input is one that the slowest sender may leave behind: three of its periods, and a lane sample that was
+    /// at most 150 ms old when it came. That each sender is waited for no longer than its own period asks, tests of their
+    /// own show.
     fn is_fresh(&self, heard: &Heard, t_us: u64) -> bool {
-        let lane = heard.lane.is_some_and(|(age, t)| t_us - t + age <= 30_000);
+        let lane = heard
+            .lane
+            .is_some_and(|(age, t)| t_us - t <= 200_001 && age <= 150_000);
         let others = [heard.driver.map(|d| d.1), heard.engage.map(|e| e.1), heard.speeds];
-        lane && others.iter().all(|t| t.is_some_and(|t| t_us - t <= 30_000))
+        lane && others.iter().all(|t| t.is_some_and(|t| t_us - t <= 75_000))
     }
 
     /// The largest output that may be trusted: of before the silence that the faults tell of, or of 250 ms ago.
@@ -238,12 +248,8 @@ impl Watch {
             .iter()
             .filter(|(fault, _)| faults.contains(*fault))
             .map(|(_, heard_at)| t_us - heard_at.unwrap_or(t_us));
-        let implausible = faults.intersects(FaultSet::IMPLAUSIBLE);
-        let suspect = silence
-            .max()
-            .filter(|_| !implausible)
-            .unwrap_or(OLDEST_TRUSTED_US)
-            .min(OLDEST_TRUSTED_US);
+        let unseen = UNSEEN.iter().filter(|(fault, _)| faults.contains(*fault));
+        let suspect = unseen.map(|(_, us)| *us).chain(silence).max().unwrap_or(0);
         let youngest = (t_us + LATEST_STEP_US).saturating_sub(suspect);
         // A bench that was guiding before it was watched has outputs that are not known.
         let known = self.outputs.front().is_some_and(|(t, _)| t_us - t >= suspect);

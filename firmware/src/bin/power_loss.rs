@@ -18,6 +18,7 @@ mod target {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::hprintln;
     use haptic_core::params::Params;
+    use haptic_core::stored::Set;
     use haptic_firmware::boards::{Board, ThisBoard};
     use haptic_firmware::{host, storage};
 
@@ -43,10 +44,14 @@ mod target {
     static mut PROGRESS: MaybeUninit<Progress> = MaybeUninit::uninit();
 
     /// A set that its sequence number tells apart.
-    fn set(number: u32) -> Params {
-        Params {
+    fn set(number: u32) -> Set {
+        let params = Params {
             k_1: 0.25 + f64::from(number) / 4096.0,
             ..Params::PAPER
+        };
+        Set {
+            params,
+            vehicle: number,
         }
     }
 
@@ -70,9 +75,9 @@ mod target {
             host::exit(true);
         }
         let flash = board.flash();
-        let found = storage::load(flash);
+        let found = storage::load(flash, ThisBoard::hardware());
         let number = found.stored.map_or(0, |stored| stored.sequence);
-        let is_whole = found.stored.is_none_or(|stored| stored.params == set(number));
+        let is_whole = found.stored.is_none_or(|stored| stored.set == set(number));
         if !is_whole || (number != progress.before && number != progress.before + 1) {
             let Progress { cuts, before, .. } = progress;
             hprintln!("after {} cuts: set {} instead of {}", cuts, number, before);
@@ -81,7 +86,12 @@ mod target {
         progress.before = number;
         progress.turn += 1;
         flash.cut_after(1 + progress.turn * 29 % OPERATIONS);
-        let result = storage::save(flash, &set(number + 1), found.stored.as_ref());
+        let result = storage::save(
+            flash,
+            &set(number + 1),
+            found.stored.as_ref(),
+            ThisBoard::hardware(),
+        );
         progress.cuts += u32::from(result.is_err());
         progress.writes += u32::from(result.is_ok());
         // SAFETY: as above.

@@ -71,6 +71,10 @@ pub trait Board: Sized {
         true
     }
 
+    /// This processor's own number: a CRC-32 of what its maker wrote into it. Parameters that another one stored are not
+    /// taken ([`crate::storage`]).
+    fn hardware() -> u32;
+
     /// The flash. Only touched before the tick starts: while it erases, some boards' processors stand still.
     fn flash(&mut self) -> &mut Self::Flash;
 

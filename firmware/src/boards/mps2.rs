@@ -83,6 +83,11 @@ impl Board for Mps2 {
         &mut self.led
     }
 
+    fn hardware() -> u32 {
+        // Every machine of QEMU's is alike.
+        0
+    }
+
     fn flash(&mut self) -> &mut Self::Flash {
         &mut self.flash
     }

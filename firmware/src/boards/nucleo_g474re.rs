@@ -51,7 +51,7 @@ use haptic_core::quantity::{Instant, Torque};
 use rtt_target::{ChannelMode, UpChannel, rtt_init};
 
 use super::{Board, WATCHDOG};
-use crate::{analogue, eccr, reset, stack};
+use crate::{analogue, eccr, image, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 170_000_000;
 const TICK_HZ: u32 = 1000;
@@ -155,6 +155,13 @@ impl Board for NucleoG474re {
 
     fn has_expected_options(&self) -> bool {
         pac::FLASH.optr().read().dbank()
+    }
+
+    fn hardware() -> u32 {
+        /// The unique device identifier (RM0440, section 48.1), 96 bits.
+        const UID: *const [u32; 3] = 0x1FFF_7590 as *const _;
+        // SAFETY: always readable, and never written.
+        image::number_of(&unsafe { UID.read_volatile() })
     }
 
     fn flash(&mut self) -> &mut Self::Flash {

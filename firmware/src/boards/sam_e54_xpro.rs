@@ -53,7 +53,7 @@ use mcan::prelude::*;
 use rtt_target::{ChannelMode, UpChannel, rtt_init};
 
 use super::Board;
-use crate::{reset, stack};
+use crate::{image, reset, stack};
 
 const CORE_CLOCK_HZ: u32 = 120_000_000;
 const TICK_HZ: u32 = 1000;
@@ -139,6 +139,18 @@ impl Board for SamE54Xpro {
         // SAFETY: a look at what the HAL's driver owns.
         let nvmctrl = unsafe { pac::Nvmctrl::steal() };
         nvmctrl.seestat().read().sblk().bits() == 0 && retrieve_flash_size() == 1024 * 1024
+    }
+
+    fn hardware() -> u32 {
+        /// The serial number (SAM D5x/E5x data sheet, section 9.6), 128 bits.
+        const SERIAL: [*const u32; 4] = [
+            0x0080_61FC as *const _,
+            0x0080_6010 as *const _,
+            0x0080_6014 as *const _,
+            0x0080_6018 as *const _,
+        ];
+        // SAFETY: always readable, and never written.
+        image::number_of(&SERIAL.map(|word| unsafe { word.read_volatile() }))
     }
 
     fn flash(&mut self) -> &mut Self::Flash {

@@ -9,9 +9,10 @@ use super::RunRecord;
 use super::claims::{self, Claim};
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use haptic_analysis::metrics::Window;
+use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, ScenarioError, Sensors};
-use haptic_sim::simulation::{Run, simulate};
+use haptic_sim::simulation::Run;
 
 /// Processing delays of the three drivers, s (table 7).
 pub const DRIVERS_T_P: [f64; 3] = [0.1, 0.3, 0.5];
@@ -78,14 +79,23 @@ pub fn evaluate(
 ) -> Result<Evaluation, String> {
     let window = window.unwrap_or_else(|| default_window(base.course()));
     super::check_window(window, base)?;
-    let runs: Vec<(Scenario, Run)> = scenarios(base)?
+    let groups: Vec<Vec<(Scenario, Run)>> = families(base)?
         .into_par_iter()
-        .map(|scenario| {
-            let run = simulate(&scenario);
-            progress();
-            (scenario, run)
-        })
-        .collect();
+        .map(|family| drive(family, &progress))
+        .collect::<Result<_, _>>()?;
+    let mut runs: Vec<(Scenario, Run)> = groups.into_iter().flatten().collect();
+    // Driver by driver: without failure, with the sudden loss; behind all of them the lost inputs. Stable.
+    let place = |scenario: &Scenario| match scenario.failure().kind {
+        FailureKind::Input => usize::MAX,
+        kind => {
+            let driver = DRIVERS_T_P
+                .iter()
+                .position(|t_p| *t_p == scenario.driver().t_p)
+                .unwrap_or(0);
+            2 * driver + usize::from(kind == FailureKind::Torque)
+        }
+    };
+    runs.sort_by_key(|(scenario, _)| place(scenario));
 
     let peak_without_failure = |failed: &Scenario| {
         let failure_time_s = failed.failure().at_s()?;
@@ -117,29 +127,46 @@ pub fn evaluate(
     Ok(Evaluation { runs, results })
 }
 
-fn scenarios(base: &Scenario) -> Result<Vec<Scenario>, ScenarioError> {
-    let mut scenarios = Vec::with_capacity(RUNS);
+/// A driver under a condition, and what fails: driven together until it does.
+struct Family {
+    nominal: Scenario,
+    failing: Vec<Scenario>,
+}
+
+fn families(base: &Scenario) -> Result<Vec<Family>, ScenarioError> {
+    let mut families = Vec::with_capacity(RUNS);
     for t_p in DRIVERS_T_P {
-        for kind in [FailureKind::None, FailureKind::Torque, FailureKind::Input] {
-            for condition in Condition::ALL {
-                // There is no guidance to fail.
-                if condition == Condition::Manual && kind != FailureKind::None {
-                    continue;
-                }
-                let driver = DriverParameters {
-                    t_p,
-                    ..*base.driver()
-                };
+        for condition in Condition::ALL {
+            let driver = DriverParameters {
+                t_p,
+                ..*base.driver()
+            };
+            let with = |kind| {
                 let failure = Failure {
                     kind,
                     ..base.failure()
                 };
                 let scenario = base.to_builder().condition(condition).driver(driver);
-                scenarios.push(scenario.failure(failure).build()?);
-            }
+                scenario.failure(failure).build()
+            };
+            let failing = match condition {
+                // There is no guidance to fail.
+                Condition::Manual => Vec::new(),
+                _ => vec![with(FailureKind::Torque)?, with(FailureKind::Input)?],
+            };
+            families.push(Family {
+                nominal: with(FailureKind::None)?,
+                failing,
+            });
         }
     }
-    // Stable: the others stay driver by driver.
-    scenarios.sort_by_key(|scenario| scenario.failure().kind == FailureKind::Input);
-    Ok(scenarios)
+    Ok(families)
+}
+
+fn drive(family: Family, progress: &impl Fn()) -> Result<Vec<(Scenario, Run)>, ScenarioError> {
+    let Family { nominal, failing } = family;
+    let failures: Vec<Failure> = failing.iter().map(Scenario::failure).collect();
+    let (run, runs) = simulate_forked(&nominal, &failures)?;
+    let all = std::iter::once((nominal, run)).chain(failing.into_iter().zip(runs));
+    Ok(all.inspect(|_| progress()).collect())
 }

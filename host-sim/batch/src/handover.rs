@@ -153,12 +153,13 @@ fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Ve
 }
 
 /// Largest lateral error from a place on, m; `None` for a run that diverged.
-fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
+pub(crate) fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
     let samples = run.trace.samples.iter().filter(|s| s.s_m >= from_m);
     (!run.diverged()).then(|| samples.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max))
 }
 
-fn stretched_curve(k: f64) -> Result<Course, String> {
+/// The first curve of the paper's course, every length `k` and every radius `k^2` times as long.
+pub(crate) fn stretched_curve(k: f64) -> Result<Course, String> {
     let curvature = 1.0 / (300.0 * k * k);
     let (clothoid, arc) = (80.0 * k, 300.0 * k);
     let segments = vec![

@@ -9,8 +9,11 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`sweep`]: many drives with varied fields.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
+//! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
+//! - [`stability`]: who keeps the lane at which speed and with which delay.
 //! - [`reliance`]: the ECU's live estimate of the driver's reliance, against the truth.
 //!
 //! ```
@@ -28,6 +31,7 @@
 //!
 //! Not here: options and exit codes (the command line), how a metric is computed, which files are left and how they look.
 
+pub mod availability;
 pub mod bus_load;
 pub mod claims;
 pub mod course;
@@ -40,5 +44,11 @@ pub mod identify;
 mod record;
 pub mod reliance;
 pub mod run;
+pub mod sweep;
+
+pub mod stability;
 
 pub use record::{RunRecord, check_window};
+
+/// Version and commit of this program, as results name it.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("HAPTIC_COMMIT"));

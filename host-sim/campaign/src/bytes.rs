@@ -146,7 +146,7 @@ impl Status {
             faults: unsigned(frame, 37, 21),
             classes: unsigned(frame, 58, 3),
             reset: unsigned(frame, 61, 3),
-            spare: unsigned(frame, 55, 3),
+            spare: unsigned(frame, 57, 1),
         }
     }
 }

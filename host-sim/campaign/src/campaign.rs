@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::table::{Class, FaultCase, Place};
-use super::trial::{TrialOutcome, World};
+use super::trial::{Deviation, MOST_EXCESS_M, TrialOutcome, World};
 
 /// What a campaign showed.
 #[derive(Debug, Clone, Serialize)]
@@ -26,7 +26,7 @@ impl Campaign {
         }
     }
 
-    /// Every run that failed.
+    /// Every run that failed, by a rule or by where the vehicle went.
     pub fn failures(&self) -> impl Iterator<Item = &FailedTrial> {
         self.rows.iter().flat_map(|row| &row.failures)
     }
@@ -55,8 +55,32 @@ pub struct CaseResult {
     pub torque_bound_nm: f64,
     /// Largest torque seen, N.m.
     pub peak_torque_nm: f64,
+    /// Whether the row asks the ECU to leave.
+    pub asks_to_leave: bool,
+    /// Runs in which the ECU left: a handover, a fade, a latched fault.
+    pub left: u64,
+    /// From the onset until it left, ms: the median of those runs and the longest.
+    pub left_after_ms: Option<[u32; 2]>,
+    /// Largest deviation from the fault-free run, m.
+    pub deviation_m: f64,
+    /// The same had the torque been dropped in the step in which the ECU left; of the runs in which it left.
+    pub dropped_m: Option<f64>,
+    /// Most that a run went further than that, m.
+    pub excess_m: Option<f64>,
+    /// Runs in which the vehicle left its lane and the fault-free one did not.
+    pub left_lane: u64,
     /// What failed, by seed.
     pub failures: Vec<FailedTrial>,
+}
+
+/// What a run fails by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FailedBy {
+    /// A rule of every cycle, or what the row asks of the ECU.
+    Ecu,
+    /// Where the vehicle went.
+    Vehicle,
 }
 
 /// A run that failed.
@@ -66,6 +90,8 @@ pub struct FailedTrial {
     pub row: &'static str,
     /// Its seed.
     pub seed: u64,
+    /// What it fails by.
+    pub by: FailedBy,
     /// The cycle, ms after the start of the run.
     pub cycle: u32,
     /// What was wrong.
@@ -93,30 +119,47 @@ pub fn run(
             outcome
         })
         .collect();
+    let again = world
+        .kind()
+        .map_or(String::new(), |kind| format!(" --world {}", kind.name));
     let per_row = (seeds.end - seeds.start).max(1) as usize;
     let rows: Vec<CaseResult> = rows
         .iter()
         .zip(outcomes.chunks(per_row))
-        .map(|(row, outcomes)| result(row, outcomes, ""))
+        .map(|(row, outcomes)| result(row, outcomes, &again))
         .collect();
     Campaign::of(rows)
 }
 
 /// What a row's runs showed; `again` is what its command needs beside row and seed.
 pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: &str) -> CaseResult {
-    let failures = outcomes.iter().filter_map(|outcome| {
-        let violation = outcome.failure.as_ref()?;
-        Some(FailedTrial {
-            row: row.name,
-            seed: outcome.seed,
-            cycle: violation.step,
-            what: violation.what.clone(),
-            replay: format!(
-                "host-sim faults --rows {} --seed {}{again}",
-                row.name, outcome.seed
-            ),
-        })
+    let failed = |outcome: &TrialOutcome, by, cycle, what| FailedTrial {
+        row: row.name,
+        seed: outcome.seed,
+        by,
+        cycle,
+        what,
+        replay: format!(
+            "host-sim faults --rows {} --seed {}{again}",
+            row.name, outcome.seed
+        ),
+    };
+    let failures = outcomes.iter().filter_map(|outcome| match &outcome.failure {
+        Some(violation) => Some(failed(
+            outcome,
+            FailedBy::Ecu,
+            violation.step,
+            violation.what.clone(),
+        )),
+        None => {
+            let left_ms = outcome.onset_ms + outcome.left_after_ms?;
+            let what = too_far(&outcome.deviation).filter(|_| row.obeys())?;
+            Some(failed(outcome, FailedBy::Vehicle, left_ms, what))
+        }
     });
+    let most = |of: fn(&TrialOutcome) -> Option<f64>| outcomes.iter().filter_map(of).reduce(f64::max);
+    let mut left_after_ms: Vec<u32> = outcomes.iter().filter_map(|o| o.left_after_ms).collect();
+    left_after_ms.sort_unstable();
     CaseResult {
         name: row.name,
         class: row.class,
@@ -128,6 +171,26 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
         worst_reaction_ms: outcomes.iter().filter_map(|o| o.reaction_ms).max(),
         torque_bound_nm: row.torque_nm,
         peak_torque_nm: outcomes.iter().map(|o| o.peak_nm).fold(0.0, f64::max),
+        asks_to_leave: row.asks_to_leave(),
+        left: left_after_ms.len() as u64,
+        left_after_ms: left_after_ms
+            .last()
+            .map(|last| [left_after_ms[left_after_ms.len() / 2], *last]),
+        deviation_m: most(|o| Some(o.deviation.faulted_m)).unwrap_or_default(),
+        dropped_m: most(|o| o.deviation.dropped_m),
+        excess_m: most(|o| o.deviation.excess_m()),
+        left_lane: outcomes.iter().filter(|o| o.deviation.leaves_lane).count() as u64,
         failures: failures.collect(),
     }
+}
+
+/// What is wrong with where a vehicle went, if anything is.
+fn too_far(deviation: &Deviation) -> Option<String> {
+    let (excess_m, dropped_m) = (deviation.excess_m()?, deviation.dropped_m?);
+    (excess_m > MOST_EXCESS_M).then(|| {
+        format!(
+            "the vehicle went {:.2} m aside, {dropped_m:.2} m had the torque been dropped",
+            deviation.faulted_m
+        )
+    })
 }

@@ -12,7 +12,7 @@ use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::bytes::Status;
-use super::bytes::{ACTIVE, FAULT};
+use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER};
 use super::injection::{Clock, Injection, Inside};
 use super::invariants::InvariantChecker;
 use super::residual::{Residual, Seen};
@@ -29,9 +29,13 @@ use haptic_sim::scenario::Scenario;
 const DRIVER_OVERRIDE: u64 = 5;
 
 /// The ECU with everything around it, in the place of the guidance.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct EcuHarness<'a> {
     row: &'a FaultCase,
+    /// Nothing of the row goes wrong here; what the driver's hand does stays.
+    healthy: bool,
+    /// The torque is gone, whatever the ECU says.
+    dropped: bool,
     onset: u32,
     /// No ECU runs from this step on.
     end: u32,
@@ -57,6 +61,11 @@ pub(super) struct EcuHarness<'a> {
     trace: Option<EcuTrace>,
 }
 
+/// What the column's model takes for the aligning torque, N.m.s2/m.
+fn aligning_gain(scenario: &Scenario) -> f64 {
+    scenario.controller_params().vehicle.aligning_gain_nm_s2_per_m
+}
+
 impl<'a> EcuHarness<'a> {
     pub(super) fn new(
         row: &'a FaultCase,
@@ -76,10 +85,12 @@ impl<'a> EcuHarness<'a> {
         let ecu = InjectedEcu::new(start.ecu(&params).expect("a checked scenario"));
         Self {
             row,
+            healthy: false,
+            dropped: false,
             onset,
             end,
             // One run in four has the probe on.
-            senders: Senders::new(rng.random_ratio(1, 4)),
+            senders: Senders::new(rng.random_ratio(1, 4), aligning_gain(scenario)),
             bus: Bus::new(row.injections),
             ecu,
             setup: Setup::new(&params).expect("a checked scenario"),
@@ -114,6 +125,26 @@ impl<'a> EcuHarness<'a> {
         self.trace.take()
     }
 
+    /// From here on nothing of the row goes wrong.
+    pub(super) fn heal(&mut self) {
+        self.healthy = true;
+        self.trace = None;
+    }
+
+    /// From here on there is no torque.
+    pub(super) fn drop_torque(&mut self) {
+        self.dropped = true;
+        self.trace = None;
+    }
+
+    /// When the ECU left Active for good or for a handover, if it did since the onset.
+    pub(super) fn left_at(&self) -> Option<u32> {
+        let modes = self.record.modes.iter();
+        let left =
+            |(step, mode): &&(u32, u64)| *step >= self.onset && matches!(*mode, FADE | HANDOVER | FAULT);
+        modes.clone().find(left).map(|(step, _)| *step)
+    }
+
     pub(super) fn into_record(self) -> TrialRecord {
         TrialRecord {
             cycles: self.checker.cycles,
@@ -129,7 +160,7 @@ impl<'a> EcuHarness<'a> {
 
     fn acts(&self, step: u32) -> bool {
         let since = self.since(step);
-        since >= 0 && self.row.lasts_ms.is_none_or(|ms| since < i64::from(ms))
+        !self.healthy && since >= 0 && self.row.lasts_ms.is_none_or(|ms| since < i64::from(ms))
     }
 
     fn has(&self, injection: Injection) -> bool {
@@ -151,7 +182,7 @@ impl<'a> EcuHarness<'a> {
         let now = self.clock_base_us.wrapping_add(us);
         let once = ([now, now, 0, 0, 0], 1);
         let since = self.since(step);
-        if since < 0 {
+        if since < 0 || self.healthy {
             return once;
         }
         match clock {
@@ -224,7 +255,8 @@ impl<'a> EcuHarness<'a> {
         let time_s = f64::from(observation.step) * 1e-3;
         self.residual.at(time_s);
         if let Some(speeds) = readings.speeds_m_per_s {
-            self.residual.speeds(speeds);
+            let yaw_rate = readings.yaw_rate_rad_per_s.unwrap_or(0.0);
+            self.residual.motion(time_s, speeds, yaw_rate);
         }
         if let Some((driver_nm, wheel_rad)) = readings.column {
             self.residual
@@ -246,7 +278,7 @@ impl<'a> EcuHarness<'a> {
         let since = self.residual.seen_since(self.row.seen, observation.step);
         // A motor that came back within the ECU's patience has not been astray.
         let returned =
-            self.row.seen == Seen::Motor && self.record.modes.last().is_some_and(|(_, m)| *m != FAULT);
+            self.row.seen == Seen::Motor && self.record.modes.last().is_some_and(|(_, m)| *m == ACTIVE);
         self.record.seen_at = if returned {
             since
         } else {
@@ -277,7 +309,7 @@ impl Guidance for EcuHarness<'_> {
 
     fn step(&mut self, observation: &Observation) -> Actuation {
         let step = observation.step;
-        if step >= self.end {
+        if step >= self.end || self.dropped {
             return Actuation::default();
         }
         self.record.steps = step;

@@ -15,10 +15,13 @@ pub(super) enum Signal {
     WheelAngle,
     Speed1,
     Speed2,
+    YawRate,
+    /// The motor's torque as the column tells it.
+    MotorTorque,
 }
 
 impl Signal {
-    pub(super) const COUNT: usize = 6;
+    pub(super) const COUNT: usize = 8;
 }
 
 /// What becomes of a value.
@@ -40,6 +43,8 @@ pub(super) enum Change {
     StuckAt(f64),
     /// Falls or rises by so much per second until it reaches a value.
     Approaching { value: f64, per_s: f64 },
+    /// Plus so much, reached in a straight line within so many ms.
+    Sliding { by: f64, ms: u32 },
     /// A new value far away in every sample: this much up, this much down.
     Jumping(f64),
 }
@@ -53,8 +58,10 @@ pub(super) enum Wire {
     Twice,
     /// Every second frame of a message comes after the one that was sent after it.
     Swapped,
-    /// In place of what is sent comes what was sent so long ago, ms.
-    Replayed(usize),
+    /// In place of what is sent of these messages comes what was sent so long ago, ms.
+    Replayed(&'static [u16], usize),
+    /// Another node sends each lane preview first, with an e_y' so many LSB to the left and the camera's own counter.
+    Outrun(i64),
     /// Senders repeat the counter that they had at the onset.
     CounterFrozen,
     /// One bit is flipped in the first so many frames of each message; in all if `None`.
@@ -153,6 +160,13 @@ pub(super) enum Injection {
     Sensor(Signal, Change),
     /// The camera does not vouch for its errors.
     Invalid,
+    /// A node that knows the ECU's checks: e_y' goes to so many m within so many ms, and e_theta' follows the yaw rate, so
+    /// that no movement is predicted. With `hides_hand` the driver torque becomes what the column's model expects.
+    Lie {
+        to_m: f64,
+        ms: u32,
+        hides_hand: bool,
+    },
     Wire(Wire),
     Clock(Clock),
     Inside(Inside),

@@ -37,6 +37,8 @@ const WINDOW_US: u64 = 250_000;
 const OVERRIDE_FROM_NM: f64 = 0.8;
 const OVERRIDE_SLOPE: f64 = 3.0;
 const TIMEOUT_US: u32 = 30_000;
+/// What an ECU that waits for three periods of a sender may wait longer where frames come up to 25 ms apart from their time.
+const LATE_US: u32 = 8_000;
 const READY_US: u32 = 500_000;
 const FADE_NM_PER_S: f64 = 4.0;
 const HANDOVER_S: f64 = 2.0;
@@ -47,13 +49,13 @@ const LSB_NM: f64 = 1.0 / 4096.0;
 /// Rounding of the rates in the core's fixed point.
 const TINY_NM: f64 = 1e-6;
 
-/// The output that is trusted when an input was implausible, us ago: the oldest remembered, with what lies between two
-/// that are; and the most that the probe may have taken away from it.
-const TRUSTED_US: std::ops::Range<u32> = 240_000..280_000;
+/// Bits of the faults of implausible inputs, with the time before which an output is trusted, us.
+const UNSEEN_US: [(u64, u32); 3] = [(1 << 2, 2_000_000), (1 << 4, 1_500_000), (1 << 6, 500_000)];
+/// What lies between two outputs that the ECU remembers, us, and to spare; and the most that the probe may have taken away.
+const APART_US: u32 = 60_000;
 const PROBE_NM: f64 = 0.2;
-
-/// Bits of the faults of implausible inputs.
-const IMPLAUSIBLE_FAULTS: u64 = 1 << 2 | 1 << 4 | 1 << 6;
+/// For how long outputs are kept here, us.
+const KEPT_US: u32 = 2_100_000;
 /// Bit of the fault that the two copies of a redundant state differ.
 const MEMORY_FAULT: u64 = 1 << 10;
 
@@ -167,7 +169,7 @@ impl InvariantChecker {
             at_us: now_us,
         });
         self.outputs.push_back((now_us, status.torque_nm.abs()));
-        let is_old = |(at_us, _): &(u32, f64)| now_us.wrapping_sub(*at_us) > TRUSTED_US.end;
+        let is_old = |(at_us, _): &(u32, f64)| now_us.wrapping_sub(*at_us) > KEPT_US;
         while self.outputs.front().is_some_and(is_old) {
             self.outputs.pop_front();
         }
@@ -176,17 +178,23 @@ impl InvariantChecker {
     /// The largest torque that a handover may start from, beside the last one.
     fn trusted_nm(&self, status: &Status, now_us: u32) -> f64 {
         let age_us = |at_us: u32| now_us.wrapping_sub(at_us);
+        let present = UNSEEN_US.iter().filter(|(fault, _)| status.faults & fault != 0);
+        let unseen_us = present.map(|(_, us)| *us).max();
+        let Some(unseen_us) = unseen_us.filter(|_| status.mode == HANDOVER) else {
+            return f64::INFINITY;
+        };
         let known = self
             .outputs
             .front()
-            .is_some_and(|(at, _)| age_us(*at) >= TRUSTED_US.end - 10_000);
-        if status.mode != HANDOVER || status.faults & IMPLAUSIBLE_FAULTS == 0 || !known {
+            .is_some_and(|(at, _)| age_us(*at) >= unseen_us + APART_US);
+        if !known {
             return f64::INFINITY;
         }
+        let trusted = unseen_us.saturating_sub(10_000)..unseen_us + APART_US;
         let outputs = self
             .outputs
             .iter()
-            .filter(|(at, _)| TRUSTED_US.contains(&age_us(*at)));
+            .filter(|(at, _)| trusted.contains(&age_us(*at)));
         PROBE_NM + outputs.map(|(_, nm)| *nm).fold(0.0, f64::max)
     }
 
@@ -303,7 +311,7 @@ impl InvariantChecker {
         if mode == ACTIVE {
             for (at, name) in self.true_at_us.iter().zip(["lane", "column", "speed", "request"]) {
                 let age_us = at.map_or(u32::MAX, |at| now_us.wrapping_sub(at));
-                if age_us > TIMEOUT_US {
+                if age_us > TIMEOUT_US + LATE_US {
                     return Err(format!("Active with a {name} of {age_us} us"));
                 }
             }

@@ -44,4 +44,4 @@ mod wire;
 
 pub use invariants::Violation;
 pub use residual::Seen;
-pub use trial::{TrialOutcome, World};
+pub use trial::{Deviation, TrialOutcome, World};

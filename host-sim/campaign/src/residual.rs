@@ -2,10 +2,12 @@
 //!
 //! A frozen lateral error on a straight is an honest one, so a reaction can only be asked for from the moment
 //! in which what arrives contradicts itself. This file decides that moment without the core: the change of the
-//! near-point error that speed, yaw error and wheel angle predict against the change seen, and the column's
+//! near-point error that speed, yaw error and yaw rate predict against the change seen, and the column's
 //! torques against its movement, each through a memory of 1 s. Vehicle and margins are the documented ones
 //! (`docs/safety.md`), from table 9. A sample further away than a vehicle can move is passed over; when there is
 //! nothing else for 30 ms, that is seen.
+
+use std::collections::VecDeque;
 
 use haptic_sim::models::vehicle::VehicleParameters;
 
@@ -23,17 +25,40 @@ pub(super) const YAW_STEP_RAD: f64 = 0.1;
 /// Ends of the signals' ranges on the bus.
 const LANE_RANGE_M: f64 = 4.0;
 const YAW_RANGE_RAD: f64 = 0.5;
-/// Further than a motor may be from what it was told, N.m.
+/// Further than a motor may be from what it was told, N.m, and as a share of it.
 pub(super) const MOTOR_MARGIN_NM: f64 = 0.1;
-/// For this long a motor may echo an older command, steps.
+const MOTOR_ERROR: f64 = 0.125;
+/// For this long a motor may echo an older command, steps; and its lag, steps.
 const MOTOR_ECHO: usize = 8;
+const MOTOR_LAG: f64 = 64.0 / 3.0;
 /// Slowest speed that is guided, m/s.
 const LEAST_SPEED_M_PER_S: f64 = 5.0;
 const MEMORY_S: f64 = 1.0;
 const TIMEOUT_S: f64 = 0.030;
 const HALF_STEP_S: f64 = 0.0005;
-/// t'_f, s.
-const FAR_TIME_S: f64 = 0.7;
+/// t'_n, and how long before the far point is where the near point is now, s.
+const NEAR_TIME_S: f64 = 0.3;
+const BETWEEN_S: f64 = 0.4;
+/// What is learnt slowly, and its bounds: m/s of the line, N.m of the column.
+const LEARNT_WITHIN_S: f64 = 16.0;
+const LANE_BIAS_M_PER_S: f64 = 0.15;
+const COLUMN_BIAS_NM: f64 = 0.5;
+/// Friction, share of the aligning torque that is not known, and all that acts for one of the driver's torque.
+const FRICTION_NM: f64 = 0.5;
+const ALIGNING_SHARE: f64 = 77.0 / 256.0;
+const ASSIST: f64 = 5.0;
+
+/// Whether errors are further from the last than a vehicle can go.
+fn is_a_step(last: [f64; 2], new: [f64; 2]) -> bool {
+    (new[0] - last[0]).abs() > LANE_STEP_M || (new[1] - last[1]).abs() > YAW_STEP_RAD
+}
+
+/// Whether they may be those of a line chosen anew: 0.4 m aside, or a lane's width and no further away than that.
+fn is_another_line(last: [f64; 2], new: [f64; 2]) -> bool {
+    let moved = (new[0] - last[0]).abs();
+    let next_lane = (2.3..=4.3).contains(&moved) && new[0].abs() <= last[0].abs() + 0.4;
+    (new[1] - last[1]).abs() <= YAW_STEP_RAD && (moved <= 0.4 || next_lane)
+}
 
 /// What a fault can be seen by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,19 +88,28 @@ impl Seen {
 /// The checks' sums and last values.
 #[derive(Debug, Clone)]
 pub(super) struct Residual {
-    curvature_gain_per_m: f64,
-    stability_factor_s2_per_m2: f64,
     aligning_gain_nm_s2_per_m: f64,
     damping_nm_s: f64,
     speeds_m_per_s: [f64; 2],
+    yaw_rate_rad_per_s: f64,
     wheel_rad: f64,
     lane: Option<(f64, f64, f64)>,
+    /// When, the heading, and the rate of turn since.
+    headings: VecDeque<[f64; 3]>,
+    /// When, and the line's direction at the far point in the frame of the headings.
+    lines: VecDeque<[f64; 2]>,
+    /// The last pair of errors that was too far from the one before.
+    refused: Option<[f64; 2]>,
+    lane_bias_m_per_s: f64,
+    column_bias_nm: f64,
     predicted_m: f64,
     moved_m: f64,
     now_s: f64,
     column_at_s: Option<f64>,
     momentum_nm_s: f64,
     commands_nm: [f64; MOTOR_ECHO],
+    /// Least and largest torque that an honest motor may deliver.
+    motor_band_nm: [f64; 2],
     motor_nm: f64,
     /// Steps in a row in which the motor was surely away from what it was told.
     astray: u32,
@@ -89,35 +123,32 @@ impl Residual {
             l_f,
             l_r,
             k_f,
-            k_r,
             b_s,
-            k_t,
             ..
         } = *vehicle;
         let l = l_f + l_r;
         Self {
-            curvature_gain_per_m: k_t / l,
-            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
             aligning_gain_nm_s2_per_m: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
             damping_nm_s: b_s,
             speeds_m_per_s: [v_m_per_s; 2],
+            yaw_rate_rad_per_s: 0.0,
             wheel_rad: 0.0,
             lane: None,
+            headings: VecDeque::new(),
+            lines: VecDeque::new(),
+            refused: None,
+            lane_bias_m_per_s: 0.0,
+            column_bias_nm: 0.0,
             predicted_m: 0.0,
             moved_m: 0.0,
             now_s: 0.0,
             column_at_s: None,
             momentum_nm_s: 0.0,
             commands_nm: [0.0; MOTOR_ECHO],
+            motor_band_nm: [0.0; 2],
             motor_nm: 0.0,
             astray: 0,
         }
-    }
-
-    /// Rate of the direction of movement, rad/s.
-    fn turning_rad_per_s(&self) -> f64 {
-        let v = self.speeds_m_per_s[0];
-        v * self.curvature_gain_per_m * self.wheel_rad / (1.0 + self.stability_factor_s2_per_m2 * v * v)
     }
 
     /// Another step.
@@ -125,20 +156,42 @@ impl Residual {
         self.now_s = time_s;
     }
 
-    /// Takes the speeds that arrive.
-    pub(super) fn speeds(&mut self, speeds_m_per_s: [f64; 2]) {
-        self.speeds_m_per_s = speeds_m_per_s;
+    /// Takes the speeds and the yaw rate that arrive. Speeds that contradict each other move nothing.
+    pub(super) fn motion(&mut self, time_s: f64, speeds_m_per_s: [f64; 2], yaw_rate_rad_per_s: f64) {
+        let apart = speeds_m_per_s[0] - speeds_m_per_s[1];
+        if apart.abs() < 2.0 {
+            self.speeds_m_per_s = speeds_m_per_s;
+            self.yaw_rate_rad_per_s = yaw_rate_rad_per_s;
+        }
+        let psi = self.heading(time_s);
+        self.headings.push_back([time_s, psi, self.yaw_rate_rad_per_s]);
+        while self.headings.len() > 64 {
+            self.headings.pop_front();
+        }
+    }
+
+    /// The heading at a time not long ago.
+    fn heading(&self, time_s: f64) -> f64 {
+        let known = self.headings.iter().rev().find(|[at, ..]| *at <= time_s + 1e-9);
+        known.map_or(0.0, |[at, psi, rate]| psi + rate * (time_s - at))
     }
 
     /// Takes the column's values that arrive, and the guidance torque that was applied.
     pub(super) fn column(&mut self, time_s: f64, driver_nm: f64, wheel_rad: f64, applied_nm: f64) {
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
-            let aligning = self.aligning_gain_nm_s2_per_m * self.speeds_m_per_s[0] * self.turning_rad_per_s();
-            let damped = self.damping_nm_s * (wheel_rad - self.wheel_rad);
-            self.momentum_nm_s = self.momentum_nm_s * (-dt / MEMORY_S).exp()
-                + (driver_nm + applied_nm - aligning) * dt
-                - damped;
+            let aligning = self.aligning_gain_nm_s2_per_m * self.speeds_m_per_s[0] * self.yaw_rate_rad_per_s;
+            let lacking = applied_nm - aligning - self.damping_nm_s * (wheel_rad - self.wheel_rad) / dt;
+            let ends = [driver_nm, ASSIST * driver_nm].map(|t| lacking + t);
+            let beyond = |bias: f64, tolerance: f64| {
+                let [low, high] = ends.map(|end| end - bias);
+                (low.min(high) - tolerance).max(0.0) + (low.max(high) + tolerance).min(0.0)
+            };
+            let bias = self.column_bias_nm;
+            let tolerance = FRICTION_NM + ALIGNING_SHARE * aligning.abs();
+            self.momentum_nm_s = self.momentum_nm_s * (-dt / MEMORY_S).exp() + beyond(bias, tolerance) * dt;
+            let learnt = bias + (beyond(0.0, 0.0) - bias) * dt / LEARNT_WITHIN_S;
+            self.column_bias_nm = learnt.clamp(-COLUMN_BIAS_NM, COLUMN_BIAS_NM);
         }
         (self.column_at_s, self.wheel_rad) = (Some(time_s), wheel_rad);
     }
@@ -147,24 +200,58 @@ impl Residual {
     pub(super) fn lane(&mut self, time_s: f64, e_y_m: f64, e_theta_rad: f64) {
         let e_y_m = e_y_m.clamp(-LANE_RANGE_M, LANE_RANGE_M);
         let e_theta_rad = e_theta_rad.clamp(-YAW_RANGE_RAD, YAW_RANGE_RAD);
-        if let Some((before_s, y, theta)) = self.lane {
-            let dt = time_s - before_s;
-            if (e_y_m - y).abs() > LANE_STEP_M || (e_theta_rad - theta).abs() > YAW_STEP_RAD {
+        if let Some((_, y, theta)) = self.lane
+            && is_a_step([y, theta], [e_y_m, e_theta_rad])
+        {
+            let agrees = self
+                .refused
+                .is_some_and(|before| !is_a_step(before, [e_y_m, e_theta_rad]));
+            if !(agrees && is_another_line([y, theta], [e_y_m, e_theta_rad])) {
+                self.refused = Some([e_y_m, e_theta_rad]);
                 return;
             }
-            let v = self.speeds_m_per_s[0];
-            let rate = v * 0.5 * (theta + e_theta_rad) - v * FAR_TIME_S * self.turning_rad_per_s();
+            // What comes next has no past.
+            self.lines.clear();
+            (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
+        }
+        self.refused = None;
+        if let Some((before_s, y, _)) = self.lane {
+            let dt = time_s - before_s;
+            let moved = e_y_m - y;
+            let predicted = self.line_rate(before_s).map_or(moved, |rate| rate * dt);
+            let predicted = predicted + self.lane_bias_m_per_s * dt;
+            let learnt = self.lane_bias_m_per_s + (moved - predicted) / LEARNT_WITHIN_S;
+            self.lane_bias_m_per_s = learnt.clamp(-LANE_BIAS_M_PER_S, LANE_BIAS_M_PER_S);
             let kept = (-dt / MEMORY_S).exp();
-            self.predicted_m = self.predicted_m * kept + rate * dt;
-            self.moved_m = self.moved_m * kept + e_y_m - y;
+            self.predicted_m = self.predicted_m * kept + predicted;
+            self.moved_m = self.moved_m * kept + moved;
+        }
+        let direction = self.heading(time_s) + e_theta_rad;
+        self.lines.push_back([time_s, direction]);
+        while self.lines.len() > 128 {
+            self.lines.pop_front();
         }
         self.lane = Some((time_s, e_y_m, e_theta_rad));
+    }
+
+    /// How fast the near-point error must move at a time, if the line is known for long enough.
+    fn line_rate(&self, at_s: f64) -> Option<f64> {
+        let wanted_s = at_s - BETWEEN_S;
+        let after = self.lines.iter().position(|[at, _]| *at > wanted_s)?;
+        let ([from_s, from], [to_s, to]) = (self.lines.get(after.checked_sub(1)?)?, self.lines[after]);
+        let direction = from + (to - from) * (wanted_s - from_s) / (to_s - from_s);
+        let v = self.speeds_m_per_s[0];
+        Some(v * (direction - self.heading(at_s)) - v * NEAR_TIME_S * self.yaw_rate_rad_per_s)
     }
 
     /// Takes what the motor was told and what it gave.
     pub(super) fn motor(&mut self, commanded_nm: f64, delivered_nm: f64) {
         self.commands_nm.rotate_right(1);
-        (self.commands_nm[0], self.motor_nm) = (commanded_nm, delivered_nm);
+        let oldest = std::mem::replace(&mut self.commands_nm[0], commanded_nm);
+        let [low, high] = &mut self.motor_band_nm;
+        *low = (*low + (commanded_nm.min(oldest) - *low) / MOTOR_LAG).min(commanded_nm.min(oldest));
+        *high = (*high + (commanded_nm.max(oldest) - *high) / MOTOR_LAG).max(commanded_nm.max(oldest));
+        self.motor_nm = delivered_nm;
         self.astray = if self.used(Seen::Motor) >= SURELY_SEEN {
             self.astray + 1
         } else {
@@ -203,8 +290,12 @@ impl Residual {
             Seen::AtOnce => f64::INFINITY,
             Seen::Contradiction => self.lane_used().max(self.column_used()),
             Seen::Motor => {
-                let away = |commanded: &f64| (self.motor_nm - commanded).abs();
-                self.commands_nm.iter().map(away).fold(f64::INFINITY, f64::min) / MOTOR_MARGIN_NM
+                let [low, high] = self.motor_band_nm;
+                let margin = |end: f64| MOTOR_MARGIN_NM + MOTOR_ERROR * end.abs();
+                f64::max(
+                    (self.motor_nm - high) / margin(high),
+                    (low - self.motor_nm) / margin(low),
+                )
             }
             Seen::Speed => LEAST_SPEED_M_PER_S / self.speeds_m_per_s[0].min(self.speeds_m_per_s[1]).max(1e-9),
         }

@@ -5,7 +5,7 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -16,6 +16,8 @@ use haptic_sim::models::sensors;
 
 const COLUMN_PERIOD_MS: u32 = 2;
 const HOST_PERIOD_MS: u32 = 10;
+/// t'_f, s.
+const FAR_TIME_S: f64 = 0.7;
 
 /// What the senders believe in one step.
 #[derive(Debug, Clone, Copy)]
@@ -24,6 +26,9 @@ pub(super) struct SensorReadings {
     pub(super) lane_valid: bool,
     pub(super) column: Option<(f64, f64)>,
     pub(super) speeds_m_per_s: Option<[f64; 2]>,
+    pub(super) yaw_rate_rad_per_s: Option<f64>,
+    /// The motor's torque as the column tells it, N.m.
+    pub(super) motor_torque_nm: f64,
 }
 
 /// The senders with their counters, and the values that a fault remembers.
@@ -36,11 +41,14 @@ pub(super) struct Senders {
     requests: u32,
     /// Whether the host wants the probe as well.
     probe: bool,
+    /// What the column's model takes for the aligning torque, N.m.s2/m.
+    aligning_gain_nm_s2_per_m: f64,
 }
 
 impl Senders {
-    pub(super) fn new(probe: bool) -> Self {
+    pub(super) fn new(probe: bool, aligning_gain_nm_s2_per_m: f64) -> Self {
         Self {
+            aligning_gain_nm_s2_per_m,
             counters: [0; 4],
             held: [None; Signal::COUNT],
             toggled: false,
@@ -75,6 +83,10 @@ impl Senders {
                 read(Signal::Speed2, observation.speed_m_per_s),
             ]
         });
+        let yaw_rate_rad_per_s = observation
+            .yaw_rate_rad_per_s
+            .filter(|_| at(HOST_PERIOD_MS))
+            .map(|rate| read(Signal::YawRate, rate));
         let column = at(COLUMN_PERIOD_MS).then(|| {
             (
                 read(
@@ -87,17 +99,58 @@ impl Senders {
                 ),
             )
         });
+        let motor_torque_nm = if column.is_some() {
+            read(Signal::MotorTorque, observation.motor_torque_nm)
+        } else {
+            observation.motor_torque_nm
+        };
         let lane = observation.lane.map(|errors| {
             (
                 read(Signal::LateralError, errors.e_y_m),
                 read(Signal::YawError, errors.e_theta_rad),
             )
         });
-        SensorReadings {
+        let honest = SensorReadings {
             lane,
             lane_valid: since_s.is_none() || !injections.contains(&Injection::Invalid),
             column,
+            motor_torque_nm,
             speeds_m_per_s,
+            yaw_rate_rad_per_s,
+        };
+        self.lie(honest, observation, injections, since_s)
+    }
+
+    /// What a node that knows the checks makes of the readings, if there is one.
+    fn lie(
+        &mut self,
+        honest: SensorReadings,
+        observation: &Observation,
+        injections: &[Injection],
+        since_s: Option<f64>,
+    ) -> SensorReadings {
+        let lie = injections.iter().find_map(|injection| match injection {
+            Injection::Lie { to_m, ms, hides_hand } => Some((*to_m, *ms, *hides_hand)),
+            _ => None,
+        });
+        let (Some((to_m, ms, hides_hand)), Some(since_s)) = (lie, since_s) else {
+            return honest;
+        };
+        let yaw_rate = observation.yaw_rate_rad_per_s.unwrap_or(0.0);
+        let lane = honest.lane.map(|(e_y_m, _)| {
+            let from_m = *self.held[Signal::LateralError as usize].get_or_insert(e_y_m);
+            let share = (since_s * 1e3 / f64::from(ms)).min(1.0);
+            (from_m + share * (to_m - from_m), FAR_TIME_S * yaw_rate)
+        });
+        let aligning_nm = self.aligning_gain_nm_s2_per_m * observation.speed_m_per_s * yaw_rate;
+        let column = honest.column.map(|(driver_nm, wheel_rad)| {
+            let hidden_nm = aligning_nm - observation.motor_torque_nm;
+            (if hides_hand { hidden_nm } else { driver_nm }, wheel_rad)
+        });
+        SensorReadings {
+            lane,
+            column,
+            ..honest
         }
     }
 
@@ -145,13 +198,14 @@ impl Senders {
             let message = Column {
                 driver_torque: Torque::from_nm(torque_nm),
                 wheel_angle: Radians::from_rad(angle_rad),
-                motor_torque: Torque::from_nm(observation.motor_torque_nm),
+                motor_torque: Torque::from_nm(readings.motor_torque_nm),
             };
             frames.push(message.encode(count(1)));
         }
         if let Some(speeds_m_per_s) = readings.speeds_m_per_s {
             let message = Vehicle {
                 speeds: speeds_m_per_s.map(Speed::from_m_per_s),
+                yaw_rate: readings.yaw_rate_rad_per_s.map(TurningRate::from_rad_per_s),
             };
             frames.push(message.encode(count(2)));
         }
@@ -190,6 +244,7 @@ fn changed(change: &Change, value: f64, held: f64, since_s: f64, noise: &mut Xos
             let way = end - held;
             held + way.signum() * (per_s * since_s).min(way.abs())
         }
+        Change::Sliding { by, ms } => value + by * (since_s * 1e3 / f64::from(ms)).min(1.0),
         // A period of the host's messages up, one down.
         Change::Jumping(by) => {
             let up = ((since_s * 100.0).round() as u64).is_multiple_of(2);

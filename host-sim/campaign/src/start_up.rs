@@ -3,7 +3,7 @@
 use haptic_core::ecu::Boot;
 use haptic_core::params::Params;
 use haptic_core::quantity::Instant;
-use haptic_core::stored::{BYTES, load, save};
+use haptic_core::stored::{BYTES, Set, load, save};
 use haptic_lockstep::StartState;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -45,10 +45,10 @@ pub(super) fn is_engaged(start: Start) -> bool {
 fn absurd() -> Params {
     Params {
         k_1: 4.0,
-        a_1: 8.0,
-        a_2: 8.0,
+        a_1: 0.8,
+        a_2: 0.01,
         a_3: 8.0,
-        a_4: 8.0,
+        a_4: 0.2,
         rate_corner_hz: 60.0,
         least_speed_m_per_s: 0.5,
         ..Params::PAPER
@@ -57,20 +57,21 @@ fn absurd() -> Params {
 
 /// Whether a boot finds the set in use before in the memory of the parameters.
 fn finds_previous(start: Start, rng: &mut Xoshiro256PlusPlus) -> bool {
-    let previous = Params::PAPER;
-    let other = Params {
+    let set = |params| Set { params, vehicle: 0 };
+    let previous = set(Params::PAPER);
+    let other = set(Params {
         torque_limit_nm: 3.0,
         ..Params::PAPER
-    };
-    let [mut older, mut newer] = [save(&other, 1), save(&previous, 2)];
+    });
+    let [mut older, mut newer] = [save(&other, 1, 0), save(&previous, 2, 0)];
     if start == Start::HalfWritten {
         // The older copy makes way for the third set.
         let written = rng.random_range(0..BYTES);
-        older[..written].copy_from_slice(&save(&other, 3)[..written]);
+        older[..written].copy_from_slice(&save(&other, 3, 0)[..written]);
     } else {
         for copy in [&mut older, &mut newer] {
             copy[rng.random_range(0..BYTES)] ^= 1 << rng.random_range(0..8);
         }
     }
-    load([&older, &newer]).is_some_and(|found| found.params == previous)
+    load([&older, &newer], 0).is_some_and(|found| found.set == previous)
 }

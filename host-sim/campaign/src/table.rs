@@ -11,16 +11,20 @@
 
 use std::fmt;
 
+use haptic_sim::models::real::WorldParameters;
 use serde::Serialize;
 
-use super::injection::{Injection, Start};
+use super::bytes::{FAULT, HANDOVER};
+use super::injection::{Injection, Motor, Start};
 use super::residual::Seen;
 
+mod attacks;
 mod build;
 mod bus;
 mod inputs;
 mod memory;
 mod time;
+mod vehicle;
 
 /// Class of a reaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -131,6 +135,21 @@ pub struct FaultCase {
     pub(super) start: Start,
     /// Whether the onset follows a lane preview, and not any instant.
     pub(super) after_sample: bool,
+    /// Where on the road it begins, if not anywhere.
+    pub(super) place_on_road: Option<PlaceOnRoad>,
+    /// What is less than ideal about the car or the road from the start.
+    pub(super) plant: Option<fn(&mut WorldParameters)>,
+}
+
+/// Where on its road a run is when the fault begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PlaceOnRoad {
+    /// On a straight, a curve ahead.
+    Before,
+    /// In a curve.
+    In,
+    /// On a straight behind a curve.
+    After,
 }
 
 /// A list of rows under a heading.
@@ -143,7 +162,7 @@ pub struct Group {
 }
 
 /// Every row.
-pub const GROUPS: [Group; 4] = [
+pub const GROUPS: [Group; 6] = [
     Group {
         name: "Inputs",
         rows: inputs::ROWS,
@@ -160,6 +179,14 @@ pub const GROUPS: [Group; 4] = [
         name: "Memory and power",
         rows: memory::ROWS,
     },
+    Group {
+        name: "Camera, motor and road",
+        rows: vehicle::ROWS,
+    },
+    Group {
+        name: "Attacks by legal frames",
+        rows: attacks::ROWS,
+    },
 ];
 
 /// Every row, in order.
@@ -172,9 +199,11 @@ pub fn rows() -> impl Iterator<Item = &'static FaultCase> {
 const STALE_MS: u32 = 31;
 /// Reaction to a contradiction, from the instant in which it can be seen.
 const CONTRADICTION_MS: u32 = 200;
-/// From the instant in which the motor is 0.1 N.m away from what it was told, if it stays there: 10 ms of patience, two
+/// From the instant in which the motor delivers what no honest one would, if it goes on: 10 ms of patience, two
 /// periods of the column, and the cycle in which it is seen.
 const MOTOR_MS: u32 = 15;
+/// The same where torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it is seen.
+const WEAK_MS: u32 = 55;
 /// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
 /// no fault may draw more.
 const ORDINARY_NM: f64 = 2.0;
@@ -194,10 +223,26 @@ const fn row(name: &'static str, injected: &'static str, injections: &'static [I
         lasts_ms: None,
         start: Start::Engaged,
         after_sample: false,
+        place_on_road: None,
+        plant: None,
     }
 }
 
 impl FaultCase {
+    /// Whether guidance has to end: by a handover, or for good.
+    pub fn asks_to_leave(&self) -> bool {
+        match self.expect {
+            Expect::HandsOverOrStops => true,
+            Expect::Reaches { mode, .. } => matches!(mode, HANDOVER | FAULT) && self.start == Start::Engaged,
+            _ => false,
+        }
+    }
+
+    /// Whether the motor does what the ECU says, so that the ECU decides where the vehicle goes.
+    pub(super) fn obeys(&self) -> bool {
+        !self.injections.contains(&Injection::Motor(Motor::Stuck))
+    }
+
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.
     pub fn deadline_ms(&self) -> Option<u32> {
         let asked = !matches!(

@@ -44,7 +44,7 @@ pub(super) struct Bus {
 impl Bus {
     pub(super) fn new(injections: &[Injection]) -> Self {
         let log_length = injections.iter().find_map(|injection| match injection {
-            Injection::Wire(Wire::Replayed(ms)) => Some(*ms),
+            Injection::Wire(Wire::Replayed(_, ms)) => Some(*ms),
             _ => None,
         });
         Self {
@@ -86,12 +86,15 @@ impl Bus {
             Injection::Wire(wire) if acts => Some(*wire),
             _ => None,
         });
-        if let Some(Wire::Replayed(_)) = wire {
+        if let Some(Wire::Replayed(ids, _)) = wire {
+            let of_these = |frame: &&Frame| ids.contains(&frame.id());
             let frames = replayed.unwrap_or_default();
-            arrivals.extend(frames.iter().map(|frame| Arrival {
-                frame: *frame,
-                bad: true,
-            }));
+            arrivals.extend(frames.iter().filter(of_these).map(|frame| bad(*frame)));
+            arrivals.extend(
+                sent.iter()
+                    .filter(|frame| !of_these(frame))
+                    .map(|frame| good(*frame)),
+            );
             return;
         }
         for frame in sent {
@@ -162,6 +165,13 @@ impl Bus {
                 let other = MESSAGES[(sender + 1) % MESSAGES.len()];
                 arrivals.extend([good(*frame), bad(bytes::renamed(other, frame.data()))]);
             }
+            Wire::Outrun(lsb) => {
+                if frame.id() == LANE {
+                    let e_y = (bytes::signed(frame, 12, 17) + lsb).clamp(-32_768, 32_768);
+                    arrivals.push(good(bytes::with_field(frame, 12, 17, e_y)));
+                }
+                arrivals.push(good(*frame));
+            }
             Wire::Short => arrivals.push(bad(bytes::renamed(frame.id(), &frame.data()[..7]))),
             Wire::Renamed => arrivals.push(good(bytes::renamed(frame.id() ^ 0x400, frame.data()))),
             Wire::Burst(times) => {
@@ -176,7 +186,7 @@ impl Bus {
                 self.late.insert(place, (due, *frame));
             }
             // Handled with the whole step.
-            Wire::Replayed(_) => {}
+            Wire::Replayed(..) => {}
         }
     }
 }

@@ -14,6 +14,8 @@ pub struct CandumpFrame {
     pub time_s: f64,
     /// The identifier, 11 or 29 bits.
     pub id: u32,
+    /// Whether the identifier has 29 bits.
+    pub extended: bool,
     /// Up to eight bytes.
     pub data: Vec<u8>,
 }
@@ -66,6 +68,7 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
                 (first, words.take_while(|word| !word.starts_with('\'')).collect())
             }
         };
+        let extended = id.len() > 3;
         let id = u32::from_str_radix(id, 16).map_err(|_| refuse("no identifier"))?;
         let digits = bytes.split('_').next().unwrap_or_default();
         let data = digits
@@ -79,6 +82,7 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
             line,
             time_s,
             id,
+            extended,
             data,
         });
     }
@@ -91,6 +95,24 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
 /// What `out` says.
 pub fn write(out: &mut (impl Write + ?Sized), time_s: f64, id: u16, data: &[u8]) -> io::Result<()> {
     write!(out, "({time_s:.6}) can0 {id:03X}#")?;
+    end(out, data)
+}
+
+/// Writes a frame, its identifier with eight digits if it has 29 bits.
+///
+/// # Errors
+/// What `out` says.
+pub fn write_frame(out: &mut (impl Write + ?Sized), frame: &CandumpFrame) -> io::Result<()> {
+    let (time_s, id) = (frame.time_s, frame.id);
+    if frame.extended {
+        write!(out, "({time_s:.6}) can0 {id:08X}#")?;
+    } else {
+        write!(out, "({time_s:.6}) can0 {id:03X}#")?;
+    }
+    end(out, &frame.data)
+}
+
+fn end(out: &mut (impl Write + ?Sized), data: &[u8]) -> io::Result<()> {
     for byte in data {
         write!(out, "{byte:02X}")?;
     }

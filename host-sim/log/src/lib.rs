@@ -3,7 +3,8 @@
 //! A [`trace::Trace`] is a table of evenly spaced [`trace::Sample`]s, one channel a field, with the unit in its name. It is the
 //! truth of the simulated world, not what a sensor saw. An [`Event`] says in words what happened when.
 //!
-//! Records are written in and read from two formats: tables ([`table`], CSV) and the bus ([`candump`]).
+//! Records are written in and read from tables ([`table`], CSV) and the bus ([`candump`]). With the feature `formats` a
+//! [`recording::Recording`] is read and written in the formats of other tools (`formats`).
 //!
 //! This crate knows nothing of ours, so that what reads records (metrics, identification, reports) needs no simulator.
 //!
@@ -26,7 +27,11 @@
 
 pub mod candump;
 mod event;
+#[cfg(feature = "formats")]
+pub mod formats;
+pub mod recording;
 pub mod table;
 pub mod trace;
+pub mod units;
 
 pub use event::Event;

@@ -39,6 +39,7 @@
 
 pub mod action;
 pub mod ecu_events;
+pub mod fork;
 pub mod guidance;
 pub mod input;
 pub mod models;
@@ -47,6 +48,8 @@ mod preview;
 pub mod scenario;
 pub mod seeds;
 pub mod simulation;
+pub mod stability;
+pub mod worlds;
 
 pub use action::Action;
 pub use scenario::Scenario;

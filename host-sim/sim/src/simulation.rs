@@ -20,14 +20,15 @@ use haptic_log::trace::{Sample, Trace};
 
 use crate::action::{Action, Request, WorldFaults};
 use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
-use crate::models::disturbances::{ErringCamera, SensorErrors};
+use crate::models::disturbances::{ErringCamera, ErringGyro, SensorErrors};
 use crate::models::driver::{ArmGains, Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::real::RealPlant;
 use crate::models::road::{Centreline, Projection, Tracker};
+use crate::models::tolerances::Car;
 use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::{PreviewPoints, wrapped};
-use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
+use crate::scenario::{FAILURE_REACTION_S, Failure, FailureKind, Scenario};
 use crate::seeds::Stream;
 
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
@@ -114,6 +115,7 @@ pub struct Simulation<G = AnyGuidance> {
     target_now_rad: f64,
     motor_torque_nm: f64,
     last_s_m: f64,
+    lateral_error_m: Option<f64>,
     step: u32,
     ending: Option<Ending>,
 }
@@ -160,6 +162,7 @@ impl<G: Guidance> Simulation<G> {
             target_now_rad: 0.0,
             motor_torque_nm: 0.0,
             last_s_m: 0.0,
+            lateral_error_m: None,
             step: 0,
             ending: None,
             road,
@@ -201,6 +204,7 @@ impl<G: Guidance> Simulation<G> {
             wheel_angle_rad: self.plant.wheel_angle_rad(),
             motor_torque_nm: self.motor_torque_nm,
             speed_m_per_s: self.plan.speed_m_per_s,
+            yaw_rate_rad_per_s: Some(self.plant.yaw_rate_rad_per_s()),
             request: self.plan.request(action),
         };
         let seen = match &mut self.sensing {
@@ -219,6 +223,7 @@ impl<G: Guidance> Simulation<G> {
             match self.road.project(x, y, &mut self.body) {
                 Some(projection) if projection.offset_m.abs() <= DIVERGED_M => {
                     self.last_s_m = projection.s_m;
+                    self.lateral_error_m = Some(projection.offset_m);
                     sample = Some(record(
                         &self.plant,
                         &projection,
@@ -231,7 +236,7 @@ impl<G: Guidance> Simulation<G> {
             }
         }
         if self.ending.is_none() {
-            self.move_on(preview, applied.torque_nm, remnant_nm);
+            self.move_on(preview, applied.torque_nm, remnant_nm, action.takes_over);
         }
         Some(Outcome {
             preview,
@@ -246,7 +251,7 @@ impl<G: Guidance> Simulation<G> {
 
     /// Lets the plant move for 1 ms.
     #[inline]
-    fn move_on(&mut self, preview: LaneErrors, guidance_torque_nm: f64, remnant_nm: f64) {
+    fn move_on(&mut self, preview: LaneErrors, guidance_torque_nm: f64, remnant_nm: f64, takes_over: bool) {
         let target_next_rad = self.vision.step(preview.e_y_m, preview.e_theta_rad);
         let input = PlantInput {
             target_now_rad: self.target_now_rad,
@@ -254,7 +259,11 @@ impl<G: Guidance> Simulation<G> {
             guidance_torque_nm,
             remnant_nm,
         };
-        let transition = self.plan.transition(self.step, self.failed_at);
+        let transition = if takes_over {
+            &self.plan.manual
+        } else {
+            self.plan.transition(self.step, self.failed_at)
+        };
         self.motor_torque_nm = match &mut self.real {
             None => {
                 self.plant.step(transition, &input);
@@ -300,6 +309,21 @@ impl<G: Guidance> Simulation<G> {
         }
     }
 
+    /// A clone that fails as `failure` has it in the place of what the scenario plans, if this is the step in which it
+    /// fails (it then differs from here on) or nothing fails; `None` in any other step.
+    pub fn fork_at(&self, failure: Failure) -> Option<Self>
+    where
+        G: Clone,
+    {
+        let failure_step = failure.at_s().map_or(self.step, step_of);
+        (self.step == failure_step && self.failed_at.is_none()).then(|| {
+            let mut fork = self.clone();
+            fork.plan.failure = failure.kind;
+            fork.plan.failure_step = failure.at_s().map_or(u32::MAX, step_of);
+            fork
+        })
+    }
+
     /// How the run ended, if it has.
     pub fn ending(&self) -> Option<Ending> {
         self.ending
@@ -320,6 +344,21 @@ impl<G: Guidance> Simulation<G> {
         &self.guidance
     }
 
+    /// Who guides, to be told what to do in the next step.
+    pub fn guidance_mut(&mut self) -> &mut G {
+        &mut self.guidance
+    }
+
+    /// Offset of the centre of gravity from the centreline at the last sample, m, left positive.
+    pub fn lateral_error_m(&self) -> Option<f64> {
+        self.lateral_error_m
+    }
+
+    /// Position of the centre of gravity, m, and the direction of movement, rad, not wrapped.
+    pub fn place(&self) -> ([f64; 2], f64) {
+        (self.plant.position_m(), self.plant.direction_rad())
+    }
+
     /// Who guided, for what it kept.
     pub fn into_guidance(self) -> G {
         self.guidance
@@ -329,8 +368,8 @@ impl<G: Guidance> Simulation<G> {
 impl Plan {
     fn new(scenario: &Scenario, road: &Centreline) -> Self {
         let v = scenario.speed_m_per_s();
-        let (vehicle, driver) = (scenario.vehicle(), scenario.driver());
-        let transition = |gains| Transition::new(v, vehicle, driver, gains);
+        let (vehicle, driver) = (scenario.car().vehicle, scenario.driver());
+        let transition = |gains| Transition::new(v, &vehicle, driver, gains);
         let failure = scenario.failure();
         Self {
             speed_m_per_s: v,
@@ -385,16 +424,18 @@ impl Plan {
 struct Sensing {
     errors: SensorErrors,
     camera: ErringCamera,
+    gyro: ErringGyro,
 }
 
 impl Sensing {
     fn of(scenario: &Scenario) -> Option<Box<Self>> {
-        let errors = *scenario.sensor_errors();
+        let errors = scenario.car().sensor_errors;
         if errors == SensorErrors::default() {
             return None;
         }
         let camera = ErringCamera::new(errors, Stream::Sensors.seed(scenario.seed()));
-        Some(Box::new(Self { errors, camera }))
+        let gyro = ErringGyro::new(errors, Stream::Gyro.seed(scenario.seed()));
+        Some(Box::new(Self { errors, camera, gyro }))
     }
 
     /// What the sensors make of the truth.
@@ -408,6 +449,9 @@ impl Sensing {
             driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias,
             wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias.to_radians(),
             speed_m_per_s: self.errors.speed_gain * truth.speed_m_per_s,
+            yaw_rate_rad_per_s: truth
+                .yaw_rate_rad_per_s
+                .map(|rate| self.gyro.see(truth.step, rate)),
             ..*truth
         }
     }
@@ -415,12 +459,13 @@ impl Sensing {
 
 /// The plant of a world that is not the paper's.
 fn real(scenario: &Scenario) -> Option<Box<RealPlant>> {
-    let (world, vehicle, driver) = (scenario.world(), scenario.vehicle(), scenario.driver());
+    let (car, driver) = (scenario.car(), scenario.driver());
+    let Car { world, vehicle, .. } = car;
     if world.is_ideal() && scenario.course().is_level() {
         return None;
     }
     let seed = Stream::World.seed(scenario.seed());
-    Some(Box::new(RealPlant::new(*world, vehicle, driver, seed)))
+    Some(Box::new(RealPlant::new(world, &vehicle, driver, seed)))
 }
 
 /// The step at or next to a time.

@@ -7,6 +7,7 @@ use haptic_campaign::campaign::{self, Campaign};
 use haptic_campaign::table::{self as rows, FaultCase, Place};
 use haptic_campaign::{World, document, target};
 use haptic_report::studies::faults as files;
+use haptic_sim::worlds::WORLDS;
 
 use super::output::Output;
 use super::{BadInput, Outcome, print, print_json, progress};
@@ -22,6 +23,9 @@ pub(super) struct Arguments {
     /// One seed alone, to run a failure again; shows what the ECU reported
     #[arg(long, value_name = "K", conflicts_with = "seeds")]
     seed: Option<u64>,
+    /// The world to drive in, by name (`host-sim availability --list`); default: the paper's, flat and linear
+    #[arg(long, value_name = "NAME", conflicts_with = "target")]
+    world: Option<String>,
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
     target: bool,
@@ -48,7 +52,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let bar = progress::bar(chosen.len() as u64 * (seeds.end - seeds.start), "runs");
-    let world = World::new();
+    let world = match &arguments.world {
+        None => World::new(),
+        Some(name) => match WORLDS.iter().find(|kind| kind.name == name) {
+            Some(kind) => World::real(kind),
+            None => {
+                let known: Vec<&str> = WORLDS.iter().map(|kind| kind.name).collect();
+                return Err(BadInput(format!(
+                    "--world: there is no {name}; there are {}",
+                    known.join(", ")
+                )));
+            }
+        },
+    };
     let campaign = if arguments.target {
         target::run(&world, &chosen, seeds, || bar.inc(1))?
     } else {

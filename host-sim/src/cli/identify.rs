@@ -1,35 +1,26 @@
-//! `host-sim identify LOG.csv`.
+//! `host-sim identify LOG`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use haptic_analysis::identify::{Options, Recording, SingleTrack, open_recording_with};
-use haptic_batch::files::load_scenario;
+use haptic_analysis::identify::Options;
 use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_several};
 use haptic_report::studies::identify as files;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
 use super::output::Output;
+use super::recording::RecordingArguments;
 use super::road::CourseArguments;
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recorded drive: a CSV file with time_s, e_y_m, e_theta_rad (the driver's points), wheel_angle_rad,
-    /// guidance_torque_nm, driver_torque_nm, or the bus as recorded by candump -L
-    #[arg(value_name = "LOG.csv")]
-    log: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArguments,
     /// One more drive of the same driver, of the same rate: all are one fit; may be repeated
     #[arg(long, value_name = "LOG")]
     also: Vec<PathBuf>,
-    /// What the frames of a candump recording mean, if not the built-in core/haptic.dbc
-    #[arg(long, value_name = "FILE")]
-    dbc: Option<PathBuf>,
-    /// The vehicle of a candump recording, if not that of table 9: a scenario file whose [vehicle] says what it is. The
-    /// bus does not carry the driver's far point; it is computed with this vehicle
-    #[arg(long, value_name = "FILE.toml")]
-    vehicle: Option<PathBuf>,
     /// A drive without guidance: there is no K_hg (the driver's weight on the guidance), and guidance_torque_nm may be
     /// missing
     #[arg(long)]
@@ -97,13 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out)?;
-    let recording = Recording {
-        dbc: arguments.dbc.as_deref(),
-        vehicle: arguments.vehicle.as_deref().map(vehicle).transpose()?,
-        manual: arguments.manual,
-    };
-    let (log, note) = open_recording_with(&arguments.log, &recording)?;
-    let name = arguments.log.display().to_string();
+    let (log, converted) = arguments.recording.open(arguments.manual)?;
+    let name = arguments.recording.log.display().to_string();
     let mut drive = if arguments.also.is_empty() {
         identify(&name, &log, &options, method)?
     } else {
@@ -112,7 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         let mut logs = vec![log];
         for path in &arguments.also {
-            logs.push(open_recording_with(path, &recording)?.0);
+            logs.push(arguments.recording.open_other(path, arguments.manual)?.0);
         }
         identify_several(
             &format!("{name} and {} more", arguments.also.len()),
@@ -121,7 +107,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         )?
     };
     let notes = &mut drive.results.identification.notes;
-    notes.splice(0..0, note.map(String::from));
+    notes.splice(0..0, converted);
     if let Some(course) = course {
         drive.drive_again(course, arguments.speed, &options)?;
     }
@@ -133,21 +119,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(Outcome::Good)
-}
-
-/// The vehicle of a scenario file, as far as it decides how the vehicle turns.
-fn vehicle(path: &Path) -> Result<SingleTrack, BadInput> {
-    let scenario = load_scenario(path)?;
-    let v = scenario.vehicle();
-    Ok(SingleTrack {
-        m: v.m,
-        i: v.i,
-        l_f: v.l_f,
-        l_r: v.l_r,
-        k_f: v.k_f,
-        k_r: v.k_r,
-        k_t: v.k_t,
-    })
 }
 
 fn readable(drive: &IdentifiedDrive) -> String {

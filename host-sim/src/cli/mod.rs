@@ -6,7 +6,10 @@
 //!
 //! One file per subcommand. Not here: anything that a study or a model decides.
 
+mod availability;
 mod bus;
+mod checkpoint;
+mod convert;
 mod course;
 mod design;
 mod drivers;
@@ -15,15 +18,20 @@ mod experiment;
 mod faults;
 mod handover;
 mod identify;
+mod lab;
+mod live;
 mod output;
 mod parameters;
 mod participants;
 mod pil;
 mod progress;
+mod recording;
 mod reliance;
 mod road;
 mod run;
 mod series;
+mod stability;
+mod sweep;
 
 use std::fmt::Display;
 use std::process::ExitCode;
@@ -55,6 +63,10 @@ enum Command {
     Experiment(experiment::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
+    /// A recording in another format: CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF; or a list of its channels
+    Convert(convert::Arguments),
+    /// The lab in the browser: sliders for driver, guidance and failure, and a road to drive yourself
+    Lab(lab::Arguments),
     /// Which experiment tells a driver's parameters: probe, course and length for a given error
     Design(design::Arguments),
     /// Several drivers beside each other: what differs between two, and what a group is like
@@ -65,14 +77,22 @@ enum Command {
     Run(run::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
     Faults(faults::Arguments),
+    /// How often guidance leaves for nothing on real roads: many cars, hours of driving, by cause
+    Availability(availability::Arguments),
+    /// A map over speed and delay: where a driver keeps the lane, alone and with guidance, and how well
+    Stability(stability::Arguments),
     /// What a lost input costs if the ECU hands over within 2 s, and if the torque is lost at once: 40 to 120 km/h
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
     /// What parameters an ECU on a real bus uses; new ones for it to store
     Parameters(parameters::Arguments),
+    /// What goes over the bus of a real ECU as it comes: mode, torques, faults, K_hg; and a recording of it
+    Live(live::Arguments),
     /// The worst-case load of the CAN bus, message by message
     Bus(bus::Arguments),
+    /// Many drives with varied fields (lists, ranges, distributions), a row of a table each, on threads and shards
+    Sweep(sweep::Arguments),
     /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
     Reliance(reliance::Arguments),
 }
@@ -107,15 +127,21 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
         Some(Command::Experiment(arguments)) => experiment::run(&arguments),
         Some(Command::Identify(arguments)) => identify::run(&arguments),
+        Some(Command::Convert(arguments)) => convert::run(&arguments),
+        Some(Command::Lab(arguments)) => lab::run(&arguments),
         Some(Command::Design(arguments)) => design::run(&arguments),
         Some(Command::Drivers(arguments)) => drivers::run(&arguments),
         Some(Command::Course(arguments)) => course::run(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         Some(Command::Faults(arguments)) => faults::run(&arguments),
+        Some(Command::Availability(arguments)) => availability::run(&arguments),
+        Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),
+        Some(Command::Live(arguments)) => live::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };
     match result {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
+use haptic_core::bus::messages::{Identity, ParameterStatus};
 use haptic_core::params::{PARAMETERS, Parameter, Params};
 use haptic_report::document::{Cell, Table};
 use haptic_target::PilError;
@@ -22,6 +23,13 @@ pub(super) struct Arguments {
     /// tcp:HOST:PORT
     #[arg(long, value_name = "IFACE", value_parser = NonEmptyStringValueParser::new())]
     can: String,
+    /// The number of the vehicle that the set is for, 1 to 1048575, such as the last six digits of its identification
+    /// number. Stored with the set; an ECU that has another vehicle's set is left alone
+    #[arg(long, value_name = "NUMBER", requires = "scenario", value_parser = clap::value_parser!(u32).range(1..=i64::from(Identity::VEHICLE_MAX)))]
+    vehicle_number: Option<u32>,
+    /// Store the set even if the ECU has one of another vehicle
+    #[arg(long, requires = "scenario")]
+    other_vehicle: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -34,12 +42,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let told = Product::on(&arguments.can).and_then(|mut product| {
         let status = match &params {
-            Some(params) => product.store(params),
+            Some(params) => store(&mut product, params, arguments),
             None => product.status(),
         }?;
-        Ok((status, product.values()?))
+        Ok((status, product.identity()?, product.values()?))
     });
-    let (status, in_use) = match told {
+    let (status, identity, in_use) = match told {
         Ok(told) => told,
         Err(error @ PilError::Missing(_)) => return Err(error.into()),
         Err(error) => {
@@ -52,6 +60,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             "stored": status.stored,
             "sequence": status.sequence,
             "damaged": status.damaged,
+            "vehicle_number": identity.vehicle,
+            "hardware": format!("{:08X}", identity.hardware),
             "parameters": values(&in_use).collect::<serde_json::Map<_, _>>(),
         }))?;
     } else {
@@ -65,9 +75,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         } else {
             ""
         };
-        print(&format!("the ECU uses {set}{damage}:\n\n{}", listing(&in_use)))?;
+        let vehicle = match identity.vehicle {
+            0 => "no vehicle in particular".into(),
+            number => format!("vehicle {number}"),
+        };
+        let hardware = identity.hardware;
+        print(&format!(
+            "the ECU (processor {hardware:08X}) uses {set}, for {vehicle}{damage}:\n\n{}",
+            listing(&in_use)
+        ))?;
     }
     Ok(Outcome::Good)
+}
+
+/// Unless the ECU has the set of another vehicle.
+fn store(product: &mut Product, params: &Params, arguments: &Arguments) -> Result<ParameterStatus, PilError> {
+    let (old, new) = (product.identity()?.vehicle, arguments.vehicle_number.unwrap_or(0));
+    if old != 0 && old != new && !arguments.other_vehicle {
+        return Err(PilError::Failed(format!(
+            "the ECU has the set of vehicle {old}, and this one is for {}; --other-vehicle stores it all the same",
+            if new == 0 {
+                "no vehicle in particular".into()
+            } else {
+                format!("vehicle {new}")
+            }
+        )));
+    }
+    product.store(params, new)
 }
 
 /// Names and values, in the order of the list.

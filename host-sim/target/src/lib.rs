@@ -12,7 +12,7 @@
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - `adapter`: the way to a board.
 //! - `link`: frames as bytes.
 //! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
-//!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters.
+//!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters. - [`live`]: what goes over a bus.
 //!
 //! ```
 //! use haptic_target::{Channel, PilError};
@@ -33,7 +33,9 @@ pub mod comparator;
 mod gdb;
 pub mod image;
 mod link;
+pub mod live;
 pub mod parameters;
+mod port;
 pub mod qemu;
 mod responses;
 pub mod stepped;

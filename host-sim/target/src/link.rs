@@ -20,7 +20,7 @@ pub(super) fn encode(channel: Channel, frame: &Frame) -> Vec<u8> {
     }
 }
 
-/// Collects bytes to frames. ResponseStream to our own SLCAN lines are passed over.
+/// Collects bytes to frames. Answers to our own SLCAN lines are passed over.
 pub(super) enum Decoder {
     Fifo(Vec<u8>),
     Slcan(Parser),

@@ -5,23 +5,20 @@
 //! sends any, as on a bench, the client does, while it sends the set.
 //! Not here: what is in a set, and the way to the bus (`adapter`).
 
-use std::io::Write;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome};
+use haptic_core::bus::messages::{
+    Guidance, Identity, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome,
+};
 use haptic_core::config::Config;
 use haptic_core::download::{frames, mode_for_parameters, unlock};
 use haptic_core::modes::Mode;
 use haptic_core::params::{PARAMETERS, Params};
-use haptic_core::quantity::Speed;
 
-use super::adapter::{self, Adapter};
-use super::link::{self, Decoder};
-use super::responses::pump;
-use super::{Channel, PilError};
+use super::PilError;
+use super::port::Port;
 
 /// Longest wait for a status, which comes every second, and a start takes less than another.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
@@ -34,16 +31,10 @@ const SPEEDS: u8 = 6;
 /// Before each frame of a set: those that a sender has to show anew, and one more.
 const SPEEDS_BETWEEN: u8 = 4;
 const SPEED_PERIOD: Duration = Duration::from_millis(10);
-/// A port that is silent for so long may belong to an ECU that speaks SLCAN itself and has just started anew.
-const REOPEN: Duration = Duration::from_millis(100);
 
 /// The ECU at the other end of an adapter.
 pub struct Product {
-    input: Box<dyn Write + Send>,
-    bytes: Receiver<Vec<u8>>,
-    pending: std::vec::IntoIter<u8>,
-    decoder: Decoder,
-    channel: Channel,
+    pub(super) port: Port,
     /// Somebody sends the vehicle's speed.
     hears_speed: bool,
 }
@@ -54,23 +45,10 @@ impl Product {
     /// # Errors
     /// What is missing on the way.
     pub fn on(adapter: &str) -> Result<Self, PilError> {
-        let Adapter {
-            channel,
-            input,
-            output,
-        } = adapter::open(adapter)?;
-        let mut product = Self {
-            input,
-            bytes: pump(output),
-            pending: Vec::new().into_iter(),
-            decoder: Decoder::new(channel),
-            channel,
+        Ok(Self {
+            port: Port::open(adapter)?,
             hears_speed: false,
-        };
-        if channel == Channel::Slcan {
-            product.write(link::OPEN)?;
-        }
-        Ok(product)
+        })
     }
 
     /// Which set is in use, and what became of the last one sent.
@@ -81,11 +59,12 @@ impl Product {
         Ok(self.status_and_mode()?.0)
     }
 
-    /// Sends a set and waits until it is in use. The ECU must be in Standby, and starts anew with the set.
+    /// Sends a set for the vehicle of that number (0: nobody says) and waits until it is in use. The ECU must be in Standby,
+    /// and starts anew with the set.
     ///
     /// # Errors
     /// Why it is not in use.
-    pub fn store(&mut self, params: &Params) -> Result<ParameterStatus, PilError> {
+    pub fn store(&mut self, params: &Params, vehicle: u32) -> Result<ParameterStatus, PilError> {
         let frames = frames(params);
         // The bus rounds to f32, which may be too far at the end of a range: the ECU's own judgement, before it is asked.
         let rounded = Params::from_values(&params.to_values().map(|value| f64::from(value as f32)));
@@ -103,12 +82,14 @@ impl Product {
         if !self.hears_speed {
             standstill = Some(self.send_standstill()?);
         }
-        for frame in [unlock(before.sequence)].iter().chain(&frames) {
+        for frame in [unlock(before.sequence, vehicle)].iter().chain(&frames) {
             // A slow line must not let the speed grow old on the way: three clean frames and the ECU trusts it again.
+            let mut together = Vec::new();
             if let Some(counter) = &mut standstill {
-                self.send_speeds(counter, SPEEDS_BETWEEN)?;
+                together.extend((0..SPEEDS_BETWEEN).map(|_| standing(counter)));
             }
-            self.write(&link::encode(self.channel, frame))?;
+            together.push(*frame);
+            self.port.send(&together)?;
         }
         for since in 0..STATUSES {
             if let Some(verdict) = verdict(&before, &self.status()?, since) {
@@ -125,21 +106,28 @@ impl Product {
     fn send_standstill(&mut self) -> Result<u8, PilError> {
         let mut counter = 0;
         for _ in 0..SPEEDS {
-            self.send_speeds(&mut counter, 1)?;
+            self.port.send(&[standing(&mut counter)])?;
             std::thread::sleep(SPEED_PERIOD);
         }
         Ok(counter)
     }
 
-    fn send_speeds(&mut self, counter: &mut u8, count: u8) -> Result<(), PilError> {
-        let standing = Vehicle {
-            speeds: [Speed::ZERO; 2],
-        };
-        for _ in 0..count {
-            self.write(&link::encode(self.channel, &standing.encode(*counter)))?;
-            *counter = counter.wrapping_add(1);
+    /// What the stored set is bound to.
+    ///
+    /// # Errors
+    /// The ECU does not say so.
+    pub fn identity(&mut self) -> Result<Identity, PilError> {
+        let until = Instant::now() + REPLY_TIMEOUT;
+        while Instant::now() < until {
+            if let Some(frame) = self.port.frame()?.filter(|frame| frame.id() == Identity::ID)
+                && let Ok(identity) = Identity::decode(&mut { ReceiverState::TRUSTED }, &frame)
+            {
+                return Ok(identity);
+            }
         }
-        Ok(())
+        Err(PilError::Failed(
+            "the ECU does not say what its parameters are bound to: it runs an older image".into(),
+        ))
     }
 
     /// The parameters in use, as the ECU tells them.
@@ -150,7 +138,11 @@ impl Product {
         let until = Instant::now() + VALUES_WITHIN;
         let mut values = [None; PARAMETERS.len()];
         while Instant::now() < until {
-            let Some(frame) = self.frame()?.filter(|frame| frame.id() == ParameterValue::ID) else {
+            let Some(frame) = self
+                .port
+                .frame()?
+                .filter(|frame| frame.id() == ParameterValue::ID)
+            else {
                 continue;
             };
             if let Ok(value) = ParameterValue::decode(&mut { ReceiverState::TRUSTED }, &frame) {
@@ -173,7 +165,7 @@ impl Product {
         let until = Instant::now() + REPLY_TIMEOUT;
         let mut mode = None;
         while Instant::now() < until {
-            let Some(frame) = self.frame()? else {
+            let Some(frame) = self.port.frame()? else {
                 continue;
             };
             // Two counters of one second tell nothing: each frame is judged by itself.
@@ -201,43 +193,13 @@ impl Product {
             REPLY_TIMEOUT.as_secs()
         )))
     }
-
-    /// The next frame; None when none came for [`REOPEN`].
-    fn frame(&mut self) -> Result<Option<Frame>, PilError> {
-        loop {
-            for byte in self.pending.by_ref() {
-                if let Some(frame) = self.decoder.push(byte).map_err(PilError::Failed)? {
-                    return Ok(Some(frame));
-                }
-            }
-            match self.bytes.recv_timeout(REOPEN) {
-                Ok(bytes) => self.pending = bytes.into_iter(),
-                Err(RecvTimeoutError::Timeout) => {
-                    if self.channel == Channel::Slcan {
-                        self.write(link::REOPEN)?;
-                    }
-                    return Ok(None);
-                }
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(PilError::Failed("the adapter is gone".into()));
-                }
-            }
-        }
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PilError> {
-        let written = self.input.write_all(bytes).and_then(|()| self.input.flush());
-        written.map_err(|e| PilError::Failed(format!("the adapter takes no frames: {e}")))
-    }
 }
 
-impl Drop for Product {
-    fn drop(&mut self) {
-        if self.channel == Channel::Slcan {
-            // An adapter that is gone is closed.
-            let _ = self.write(link::CLOSE);
-        }
-    }
+/// The next frame of a vehicle that stands.
+fn standing(counter: &mut u8) -> Frame {
+    let frame = Vehicle::default().encode(*counter);
+    *counter = counter.wrapping_add(1);
+    frame
 }
 
 /// What a status says of a set that was sent when the status was `before`; None: nothing yet. `since` counts the

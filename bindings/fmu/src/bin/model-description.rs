@@ -1,32 +1,78 @@
-//! Prints `modelDescription.xml` of the FMU, from the list of its variables.
+//! Prints `modelDescription.xml` of a model, from the list of its variables: `model-description NAME 2|3`. Without arguments: the
+//! models' names.
 
-use haptic_fmu::controller::{Kind, Role, VARIABLES, Variable};
-use haptic_fmu::{GUID, MODEL};
+use haptic_fmu::MODELS;
+use haptic_fmu::variable::{About, Kind, Role, Variable};
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [name, version] = &arguments[..] else {
+        for about in MODELS {
+            println!("{}", about.name);
+        }
+        return;
+    };
+    let about = MODELS.into_iter().find(|about| about.name == name);
+    match (about, version.as_str()) {
+        (Some(about), "2") => version_2(about),
+        (Some(about), "3") => version_3(about),
+        _ => {
+            eprintln!("error: {name} {version}: a model's name and 2 or 3 are wanted");
+            std::process::exit(2);
+        }
+    }
+}
+
+fn units(about: &About) -> Vec<&'static str> {
+    let mut units: Vec<_> = about.variables.iter().filter_map(unit).collect();
+    units.sort_unstable();
+    units.dedup();
+    units
+}
+
+fn print_units(about: &About) {
+    println!("  <UnitDefinitions>");
+    for unit in units(about) {
+        println!(r#"    <Unit name="{unit}"/>"#);
+    }
+    println!("  </UnitDefinitions>");
+}
+
+fn version_2(about: &About) {
+    let About {
+        name, token, meaning, ..
+    } = about;
     let version = env!("CARGO_PKG_VERSION");
     println!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="{MODEL}" guid="{GUID}" version="{version}"
-    description="The shipping haptic-guidance ECU: SI values in, torque out" generationTool="haptic-guidance">
-  <CoSimulation modelIdentifier="{MODEL}" canHandleVariableCommunicationStepSize="true"
-      canGetAndSetFMUstate="true" canBeInstantiatedOnlyOncePerProcess="false"/>
-  <UnitDefinitions>"#
+<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{token}" version="{version}"
+    description="{meaning}" generationTool="haptic-guidance">
+  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"
+      canGetAndSetFMUstate="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
     );
-    let mut units: Vec<_> = VARIABLES.iter().filter_map(unit).collect();
-    units.sort_unstable();
-    units.dedup();
-    for unit in units {
-        println!(r#"    <Unit name="{unit}"/>"#);
-    }
-    println!(
-        "  </UnitDefinitions>\n  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>"
-    );
-    for (reference, variable) in VARIABLES.iter().enumerate() {
-        print_variable(reference, variable);
+    print_units(about);
+    println!("  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>");
+    for (reference, variable) in about.variables.iter().enumerate() {
+        let (causality, variability) = roles(variable);
+        let initial = if variable.role == Role::Output {
+            r#" initial="exact""#
+        } else {
+            ""
+        };
+        println!(
+            r#"    <ScalarVariable name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}">"#,
+            variable.name,
+            escaped(variable.meaning.trim())
+        );
+        let element = match variable.kind {
+            Kind::Real => "Real",
+            Kind::Integer => "Integer",
+            Kind::Boolean => "Boolean",
+        };
+        println!("      <{element} {}/>\n    </ScalarVariable>", value(variable));
     }
     println!("  </ModelVariables>\n  <ModelStructure>\n    <Outputs>");
-    for (i, variable) in VARIABLES.iter().enumerate() {
+    for (i, variable) in about.variables.iter().enumerate() {
         if variable.role == Role::Output {
             // Outputs change with steps, so that no input reaches one within an instant.
             println!(r#"      <Unknown index="{}" dependencies=""/>"#, i + 1);
@@ -35,23 +81,69 @@ fn main() {
     println!("    </Outputs>\n  </ModelStructure>\n</fmiModelDescription>");
 }
 
+fn version_3(about: &About) {
+    let About {
+        name, token, meaning, ..
+    } = about;
+    let version = env!("CARGO_PKG_VERSION");
+    println!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{token}" version="{version}"
+    description="{meaning}" generationTool="haptic-guidance">
+  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"
+      canGetAndSetFMUState="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
+    );
+    print_units(about);
+    println!("  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>");
+    for (reference, variable) in about.variables.iter().enumerate() {
+        let (causality, variability) = roles(variable);
+        let initial = if variable.role == Role::Output {
+            r#" initial="exact""#
+        } else {
+            ""
+        };
+        let element = match variable.kind {
+            Kind::Real => "Float64",
+            Kind::Integer => "Int32",
+            Kind::Boolean => "Boolean",
+        };
+        println!(
+            r#"    <{element} name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}" {}/>"#,
+            variable.name,
+            escaped(variable.meaning.trim()),
+            value(variable)
+        );
+    }
+    let time = about.variables.len();
+    println!(
+        r#"    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous" description="Time"/>
+  </ModelVariables>
+  <ModelStructure>"#
+    );
+    for (reference, variable) in about.variables.iter().enumerate() {
+        if variable.role == Role::Output {
+            println!(r#"    <Output valueReference="{reference}" dependencies=""/>"#);
+        }
+    }
+    println!("  </ModelStructure>\n</fmiModelDescription>");
+}
+
+fn roles(variable: &Variable) -> (&'static str, &'static str) {
+    match (variable.role, variable.kind) {
+        (Role::Input, Kind::Real) => ("input", "continuous"),
+        (Role::Input, _) => ("input", "discrete"),
+        (Role::Output, Kind::Real) => ("output", "continuous"),
+        (Role::Output, _) => ("output", "discrete"),
+        (Role::Parameter, _) => ("parameter", "fixed"),
+    }
+}
+
 fn unit(variable: &Variable) -> Option<&'static str> {
     Some(variable.unit).filter(|unit| !["", "1"].contains(unit))
 }
 
-fn print_variable(reference: usize, variable: &Variable) {
-    let (causality, variability, initial) = match (variable.role, variable.kind) {
-        (Role::Input, Kind::Real) => ("input", "continuous", ""),
-        (Role::Input, _) => ("input", "discrete", ""),
-        (Role::Output, Kind::Real) => ("output", "continuous", r#" initial="exact""#),
-        (Role::Output, _) => ("output", "discrete", r#" initial="exact""#),
-        (Role::Parameter, _) => ("parameter", "fixed", ""),
-    };
-    let description = escaped(variable.meaning.trim());
-    println!(
-        r#"    <ScalarVariable name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{description}">"#,
-        variable.name
-    );
+/// Start, unit and range of a variable.
+fn value(variable: &Variable) -> String {
     let start = variable.start;
     match variable.kind {
         Kind::Real => {
@@ -59,12 +151,11 @@ fn print_variable(reference: usize, variable: &Variable) {
             let range = variable
                 .range
                 .map_or(String::new(), |[min, max]| format!(r#" min="{min}" max="{max}""#));
-            println!(r#"      <Real start="{start}"{unit}{range}/>"#);
+            format!(r#"start="{start}"{unit}{range}"#)
         }
-        Kind::Integer => println!(r#"      <Integer start="{start}"/>"#),
-        Kind::Boolean => println!(r#"      <Boolean start="{}"/>"#, start != 0.0),
+        Kind::Integer => format!(r#"start="{start}""#),
+        Kind::Boolean => format!(r#"start="{}""#, start != 0.0),
     }
-    println!("    </ScalarVariable>");
 }
 
 fn escaped(text: &str) -> String {

@@ -25,6 +25,7 @@ from ._native import (
     parameters,
 )
 from ._results import Evaluation, Fit, Parameter, Run, evaluate, identify, simulate
+from ._sweep import SweepResult, sweep
 
 __all__ = [
     "Action",
@@ -41,9 +42,11 @@ __all__ = [
     "Scenario",
     "Simulation",
     "Step",
+    "SweepResult",
     "evaluate",
     "identify",
     "metric_definitions",
     "parameters",
     "simulate",
+    "sweep",
 ]

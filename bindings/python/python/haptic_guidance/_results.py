@@ -249,7 +249,8 @@ def identify(
     Parameters
     ----------
     drive : path, mapping or Run
-        A CSV file or a recording of the bus by candump; columns by name (a DataFrame is a mapping too); or a run.
+        A CSV, MAT or MDF 4 file, a recording of the bus (candump, ASC, BLF); columns by name (a DataFrame is a mapping
+        too); or a run.
         Needed are ``time_s``, ``e_y_m``, ``e_theta_rad``, ``wheel_angle_rad``, ``guidance_torque_nm`` and
         ``driver_torque_nm``.
     manual : bool, optional

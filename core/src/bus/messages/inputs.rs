@@ -1,7 +1,7 @@
 //! What the ECU hears.
 
 use super::{Info, Message, from_lsb, info, put, signed, to_lsb, unsigned};
-use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, shift_round};
+use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, shift_round};
 
 /// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -10,7 +10,8 @@ pub struct LanePreview {
     pub e_y: Metres,
     /// e_theta' at the far point, +-0.5 rad, LSB 2^-16 rad.
     pub e_theta: Radians,
-    /// Age of the sample when the frame was sent, 0 to 51.1 ms, LSB 0.1 ms.
+    /// Age of the sample when the frame was sent, 0 to 204.7 ms, LSB 0.1 ms. In two signals: what is less than 51.2 ms, which
+    /// is all that senders of version 2.1 and before know, and how often 51.2 ms come to that.
     pub age: Micros,
     /// Whether the sender vouches for the errors.
     pub valid: bool,
@@ -24,7 +25,7 @@ impl LanePreview {
     /// +-0.5 rad, likewise.
     const E_THETA_MAX: i64 = 1 << (Self::E_THETA_LSB - 1);
     const AGE_LSB_US: u32 = 100;
-    const AGE_MAX: u32 = 511;
+    const AGE_MAX: u32 = 2047;
 }
 
 impl Message for LanePreview {
@@ -39,10 +40,11 @@ impl Message for LanePreview {
                 17,
             )
             | put(i64::from(age), 46, 9)
+            | put(i64::from(age >> 9), 56, 2)
             | put(i64::from(self.valid), 55, 1)
     }
 
-    #[expect(clippy::as_conversions, reason = "masked to nine bits")]
+    #[expect(clippy::as_conversions, reason = "masked to eleven bits")]
     fn unpack(word: u64) -> Option<Self> {
         let e_y = signed(word, 12, 17);
         let e_theta = signed(word, 29, 17);
@@ -50,7 +52,9 @@ impl Message for LanePreview {
         in_range.then(|| Self {
             e_y: Metres::from_wide(from_lsb(e_y, Self::E_Y_LSB)),
             e_theta: Radians::from_wide(from_lsb(e_theta, Self::E_THETA_LSB)),
-            age: Micros::from_us((unsigned(word, 46, 9) as u32).wrapping_mul(Self::AGE_LSB_US)),
+            age: Micros::from_us(
+                ((unsigned(word, 46, 9) | unsigned(word, 56, 2) << 9) as u32).wrapping_mul(Self::AGE_LSB_US),
+            ),
             valid: unsigned(word, 55, 1) != 0,
         })
     }
@@ -117,17 +121,23 @@ impl Message for Column {
     }
 }
 
-/// The vehicle's speed from two independent sources, every 10 ms.
+/// The vehicle's speed from two independent sources and its yaw rate, every 10 ms.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Vehicle {
     /// Both speeds, 0 to 90 m/s, LSB 2^-8 m/s.
     pub speeds: [Speed; 2],
+    /// The measured yaw rate, less than +-2 rad/s, LSB 2^-12 rad/s; `None` from a sender that has no good one. Frames
+    /// of version 2.1 and before, whose bits here are zero, say `None`.
+    pub yaw_rate: Option<TurningRate>,
 }
 
 impl Vehicle {
     const LSB: u32 = 8;
     /// 324 km/h.
     const MAX: i64 = 90 << Self::LSB;
+    const YAW_RATE_LSB: u32 = 12;
+    /// 114 deg/s: beyond what a sensor of a car measures.
+    const YAW_RATE_MAX: i64 = (1 << 13) - 1;
 }
 
 impl Message for Vehicle {
@@ -135,15 +145,22 @@ impl Message for Vehicle {
 
     fn pack(&self) -> u64 {
         let [a, b] = self.speeds.map(|v| to_lsb(v.bits(), Self::LSB, Self::MAX));
-        put(a, 12, 16) | put(b, 28, 16)
+        let yaw_rate = self.yaw_rate.unwrap_or(TurningRate::ZERO).bits();
+        put(a, 12, 16)
+            | put(b, 28, 16)
+            | put(to_lsb(yaw_rate, Self::YAW_RATE_LSB, Self::YAW_RATE_MAX), 44, 14)
+            | put(i64::from(self.yaw_rate.is_some()), 58, 1)
     }
 
     fn unpack(word: u64) -> Option<Self> {
         let raw = [signed(word, 12, 16), signed(word, 28, 16)];
         // Guidance backwards makes no sense: a negative speed is a sender's fault.
         let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(v));
-        in_range.then(|| Self {
+        let is_valid = unsigned(word, 58, 1) != 0;
+        let yaw_rate = if is_valid { signed(word, 44, 14) } else { 0 };
+        (in_range && yaw_rate.abs() <= Self::YAW_RATE_MAX).then(|| Self {
             speeds: raw.map(|v| Speed::from_wide(from_lsb(v, Self::LSB))),
+            yaw_rate: is_valid.then(|| TurningRate::from_wide(from_lsb(yaw_rate, Self::YAW_RATE_LSB))),
         })
     }
 }

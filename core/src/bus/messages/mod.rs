@@ -12,7 +12,7 @@ mod service;
 pub use inputs::{Column, Demand, LanePreview, Vehicle};
 pub use outputs::{FaultRecord, Guidance, ResetCause, Telemetry, Warning};
 pub use service::{
-    ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
+    Identity, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
 };
 
 use super::e2e::{Protection, ReceiverState, Reject};
@@ -20,7 +20,7 @@ use super::frame::Frame;
 use crate::quantity::{Micros, shift_round};
 
 /// Version of the bus: of identifiers, layouts and data IDs. `core/haptic.dbc` carries the same.
-pub const VERSION: &str = "2.1.0";
+pub const VERSION: &str = "2.3.0";
 
 /// Who sends a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,6 +94,7 @@ messages! {
     0x320 ParameterStatus, 0x99, 2, Ecu, 1000.0;
     0x330 ParameterValue, 0xCC, 14, Ecu, 100.0;
     0x340 Rejection, 0xAA, 14, Ecu, 100.0;
+    0x350 Identity, 0xDD, 2, Ecu, 1000.0;
 }
 
 /// A safety message: what the list says of it, and how its signals lie in a 64-bit little-endian word.

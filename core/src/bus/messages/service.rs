@@ -23,21 +23,32 @@ impl Message for ParameterWrite {
     const INFO: Info = info::ParameterWrite;
 
     fn pack(&self) -> u64 {
-        put(i64::from(self.index), 12, 8) | put(i64::from(self.value.to_bits()), 32, 32)
+        pack_parameter(self.index, self.value)
     }
 
     fn unpack(word: u64) -> Option<Self> {
-        let index = unsigned(word, 12, 8) as u8;
-        (usize::from(index) < PARAMETERS.len()).then(|| Self {
-            index,
-            value: f32::from_bits(unsigned(word, 32, 32) as u32),
-        })
+        let (index, value) = unpack_parameter(word)?;
+        Some(Self { index, value })
     }
+}
+
+/// A parameter lies the same way in both directions.
+fn pack_parameter(index: u8, value: f32) -> u64 {
+    put(i64::from(index), 12, 8) | put(i64::from(value.to_bits()), 32, 32)
+}
+
+/// `None`: there is no such parameter.
+fn unpack_parameter(word: u64) -> Option<(u8, f32)> {
+    let index = unsigned(word, 12, 8) as u8;
+    let value = f32::from_bits(unsigned(word, 32, 32) as u32);
+    (usize::from(index) < PARAMETERS.len()).then_some((index, value))
 }
 
 /// What has to come before a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ParameterUnlock {
+    /// The number of the vehicle that the set is for, 0 to [`Identity::VEHICLE_MAX`]; 0: nobody says.
+    pub vehicle: u32,
     /// The number of the set in use, as [`ParameterStatus`] says it: a download that was recorded names another one.
     pub sequence: u32,
 }
@@ -46,11 +57,12 @@ impl Message for ParameterUnlock {
     const INFO: Info = info::ParameterUnlock;
 
     fn pack(&self) -> u64 {
-        put(i64::from(self.sequence), 32, 32)
+        put(i64::from(self.vehicle), 12, 20) | put(i64::from(self.sequence), 32, 32)
     }
 
     fn unpack(word: u64) -> Option<Self> {
         Some(Self {
+            vehicle: unsigned(word, 12, 20) as u32,
             sequence: unsigned(word, 32, 32) as u32,
         })
     }
@@ -69,15 +81,12 @@ impl Message for ParameterValue {
     const INFO: Info = info::ParameterValue;
 
     fn pack(&self) -> u64 {
-        put(i64::from(self.index), 12, 8) | put(i64::from(self.value.to_bits()), 32, 32)
+        pack_parameter(self.index, self.value)
     }
 
     fn unpack(word: u64) -> Option<Self> {
-        let index = unsigned(word, 12, 8) as u8;
-        (usize::from(index) < PARAMETERS.len()).then(|| Self {
-            index,
-            value: f32::from_bits(unsigned(word, 32, 32) as u32),
-        })
+        let (index, value) = unpack_parameter(word)?;
+        Some(Self { index, value })
     }
 }
 
@@ -182,6 +191,35 @@ impl Message for ParameterStatus {
             damaged: unsigned(word, 13, 1) != 0,
             outcome: WriteOutcome::from_code(unsigned(word, 16, 4))?,
             sequence: unsigned(word, 32, 32) as u32,
+        })
+    }
+}
+
+/// What the stored set is bound to, every second.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// The number of the vehicle that the set in use is for; 0: nobody said.
+    pub vehicle: u32,
+    /// This processor's own number: a CRC-32 of what its maker wrote into it.
+    pub hardware: u32,
+}
+
+impl Identity {
+    /// 20 bits: the last six digits of a vehicle identification number fit.
+    pub const VEHICLE_MAX: u32 = (1 << 20) - 1;
+}
+
+impl Message for Identity {
+    const INFO: Info = info::Identity;
+
+    fn pack(&self) -> u64 {
+        put(i64::from(self.vehicle), 12, 20) | put(i64::from(self.hardware), 32, 32)
+    }
+
+    fn unpack(word: u64) -> Option<Self> {
+        Some(Self {
+            vehicle: unsigned(word, 12, 20) as u32,
+            hardware: unsigned(word, 32, 32) as u32,
         })
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Two estimators share one log, one muscle and one form of result: `noise_model` (the default) and
 //! `paper` (the published way, kept as the baseline it is compared with); `tracking` follows a driver who
-//! changes. A log is a CSV file (`log`) or a recording of the bus (`bus_trace`). Terms: *a_1, a_2, a_3, t_p,
+//! changes. A log is a CSV file (`log`), a recording of the bus (`bus_trace`) or a file of another tool (`recording`). Terms: *a_1, a_2, a_3, t_p,
 //! K_d, K_hg, K_nms, t_nms* are the paper's; *gain_i* = (K_d + K_nms)*a_i is what the torque alone can tell of K_d
 //! and a_i; the *remnant* is the part of the driver's torque that no linear model of the inputs explains.
 //!
@@ -19,6 +19,7 @@ mod noise_model;
 mod options;
 mod paper;
 mod prepare;
+mod recording;
 mod result;
 mod search;
 mod signals;
@@ -27,7 +28,7 @@ mod tracking;
 mod verdict;
 
 pub use balance::Balance;
-pub use bus_trace::{Recording, SingleTrack, open_recording, open_recording_with};
+pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use drivers::{Difference, Population, differences, population};
 pub use lane::LaneNoise;
@@ -38,6 +39,7 @@ pub use noise_model::{
 pub use options::{FixError, Options};
 pub use paper::{TABLE_4, identify as identify_as_published};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
+pub use recording::{Mapping, open as open_mapped};
 pub use result::{
     AtTNms, Combination, Correlation, Identification, InputCorrelation, Parameter, Parameters, Remnant,
     Start, Traces, Whiteness,

@@ -19,7 +19,7 @@ impl EcuHarness<'_> {
     /// What goes wrong in the ECU in this step.
     pub(super) fn disturb_inside(&mut self, step: u32, now_us: u32) {
         let since = self.since(step);
-        if since < 0 {
+        if since < 0 || self.healthy {
             return;
         }
         for injection in self.row.injections {

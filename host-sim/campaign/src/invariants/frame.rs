@@ -7,7 +7,10 @@ use crate::bytes::{self, FAULT, HANDOVER, LOCKED, Status};
 
 /// Bits of the faults of class B, of class C, and of class Locked. A copy of the core's list on purpose: a test compares
 /// them, so that a new fault is classed here by a person too.
-const CLASSES: [u64; 3] = [0x3_80FF, 0x1F00, 0x6000];
+const CLASSES: [u64; 3] = [0x7_80FF, 0x1F00, 0x6000];
+
+/// Bit of the fault that no hand is on the wheel: a warning, whatever the mode.
+const HANDS_OFF: u64 = 1 << 19;
 
 /// The classes that a guidance frame must name with these faults.
 fn classes_of(faults: u64) -> u64 {
@@ -43,7 +46,8 @@ pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status
 }
 
 pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
-    if status.warning != matches!(status.mode, HANDOVER | FAULT | LOCKED) {
+    let must_warn = matches!(status.mode, HANDOVER | FAULT | LOCKED) || status.faults & HANDS_OFF != 0;
+    if status.warning != must_warn {
         return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
     }
     if status.warning && !before && !others.iter().any(|frame| frame.id() == bytes::WARNING) {

@@ -1,9 +1,10 @@
 //! How a row of the table says what it asks for: a chain of words behind its injections.
 
-use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place};
+use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place, PlaceOnRoad};
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
 use crate::injection::Start;
 use crate::residual::Seen;
+use haptic_sim::models::real::WorldParameters;
 
 const fn reaches(mode: u64) -> Expect {
     Expect::Reaches { mode, fading: false }
@@ -178,6 +179,20 @@ impl FaultCase {
 
     pub(super) const fn from(self, start: Start) -> Self {
         Self { start, ..self }
+    }
+
+    pub(super) const fn place(self, place: PlaceOnRoad) -> Self {
+        Self {
+            place_on_road: Some(place),
+            ..self
+        }
+    }
+
+    pub(super) const fn on(self, plant: fn(&mut WorldParameters)) -> Self {
+        Self {
+            plant: Some(plant),
+            ..self
+        }
     }
 
     /// Also run in QEMU.

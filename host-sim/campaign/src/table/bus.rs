@@ -31,7 +31,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row("silent-host", "no command", &[wire(Wire::Lost(&[DEMAND], None))]).hands_over(STALE_MS).q(),
     row("duplicates", "every frame twice", &[wire(Wire::Twice)]).rejected().q(),
     row("reordering", "every second frame of a message after its successor", &[wire(Wire::Swapped)]).rejected().q(),
-    row("replay", "what was sent 1 s ago in place of what is sent: a counter of 16 lets some column frames pass, whose motor torque is then old", &[wire(Wire::Replayed(1000))]).hands_over_or_stops(STALE_MS).lasts(1000).q(),
+    row("replay", "what was sent 1 s ago in place of what is sent: a counter of 16 lets some column frames pass, whose motor torque is then old", &[wire(Wire::Replayed(ALL, 1000))]).hands_over_or_stops(STALE_MS).lasts(1000).q(),
     row("counter-frozen", "counters frozen: the first frame of each is still good", &[wire(Wire::CounterFrozen)]).hands_over(STALE_MS + 10).q(),
     row("counter-wrap", "counters wrap every 16 frames, as always", &[]).bridged().q(),
     row("crc-wrong-1", "one bit wrong in one frame of each message", &[wire(Wire::Flipped(Some(1)))]).rejected().q(),

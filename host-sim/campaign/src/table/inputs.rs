@@ -10,7 +10,7 @@ use crate::residual::Seen;
 
 use Change::{Approaching, Drifting, Frozen, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
 use Injection::{Invalid, Sensor};
-use Signal::{DriverTorque, LateralError, Speed1, Speed2, WheelAngle, YawError};
+use Signal::{DriverTorque, LateralError, Speed1, Speed2, WheelAngle, YawError, YawRate};
 
 /// Moves the vehicle aside within a second: faults of the lane errors show.
 const JERK: Injection = Injection::Hand(Hand::Jerk {
@@ -67,6 +67,7 @@ pub(super) const ROWS: &[FaultCase] = &[
             Sensor(WheelAngle, Frozen),
             Sensor(Speed1, Frozen),
             Sensor(Speed2, Frozen),
+            Sensor(YawRate, Frozen),
         ],
     )
     .contradicts(),
@@ -475,7 +476,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "second speed drifts away at 5 m/s2: 2 m/s apart after 400 ms",
         &[Sensor(Speed2, Drifting(5.0))],
     )
-    .hands_over(420),
+    .hands_over(440),
     row("heading-wraps", "the road's heading passes +-pi: no jump", &[]).from(Start::HeadingWraps),
     // The host's request.
     row(

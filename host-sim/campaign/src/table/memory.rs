@@ -2,7 +2,7 @@
 
 use haptic_core::ecu::injection::Region;
 
-use super::{FaultCase, MOTOR_MS, row};
+use super::{FaultCase, MOTOR_MS, WEAK_MS, row};
 use crate::injection::{Hand, Injection, Inside, Motor, RequestFault, Start};
 use crate::residual::Seen;
 
@@ -112,14 +112,14 @@ pub(super) const ROWS: &[FaultCase] = &[
         "the motor delivers half",
         &[Injection::Motor(Motor::Times(0.5))],
     )
-    .stops(MOTOR_MS)
+    .hands_over(WEAK_MS)
     .seen(Seen::Motor),
     row(
         "motor-dead",
         "the motor delivers nothing, as a limiter that zeroes in silence",
         &[Injection::Motor(Motor::Times(0.0))],
     )
-    .stops(MOTOR_MS)
+    .hands_over(WEAK_MS)
     .seen(Seen::Motor),
     row(
         "motor-reversed",

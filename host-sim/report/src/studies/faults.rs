@@ -20,7 +20,8 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
     let faults = document::table_of_faults();
     write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
     let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
-                   they must keep. A fault without a mark on the left has no deadline."
+                   they must keep. A fault without a mark on the left has no deadline. The deviation is that from the \
+                   fault-free run, beside what it is if the torque is dropped in the step in which the ECU leaves."
         .into();
     let mut blocks = vec![Block::Figure { figure, caption }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
@@ -71,6 +72,7 @@ pub fn table(campaign: &Campaign) -> Table {
             value: ms.map(f64::from),
             decimals: 0,
         };
+        let metres = |value: Option<f64>| Cell::Number { value, decimals: 2 };
         let verdict = match row.failures.len() {
             0 => "pass".into(),
             n => format!("FAIL in {n}"),
@@ -85,6 +87,15 @@ pub fn table(campaign: &Campaign) -> Table {
             time(row.deadline_ms),
             Cell::number(row.peak_torque_nm, 3),
             Cell::number(row.torque_bound_nm, 1),
+            count(row.left),
+            Cell::Number {
+                value: row.left_after_ms.map(|[median, _]| f64::from(median)),
+                decimals: 0,
+            },
+            Cell::number(row.deviation_m, 2),
+            metres(row.dropped_m),
+            metres(row.excess_m),
+            count(row.left_lane),
             Cell::Text(verdict),
         ]
     };
@@ -100,6 +111,12 @@ pub fn table(campaign: &Campaign) -> Table {
             "Deadline (ms)",
             "Peak torque (N.m)",
             "Bound (N.m)",
+            "ECU left",
+            "After (ms)",
+            "Deviation (m)",
+            "Dropped (m)",
+            "Excess (m)",
+            "Left lane",
             "Verdict",
         ]
         .map(String::from)
@@ -144,6 +161,14 @@ fn figure(campaign: &Campaign) -> Figure {
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.peak_torque_nm))),
                     Series::dots("limit", 3, of(&|row| Some(row.torque_bound_nm))),
+                ],
+            ),
+            panel(
+                "Largest deviation",
+                "Deviation (m)",
+                vec![
+                    Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.deviation_m))),
+                    Series::dots("torque dropped", 4, of(&|row| row.dropped_m)),
                 ],
             ),
         ],

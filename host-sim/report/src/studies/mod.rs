@@ -1,6 +1,7 @@
 //! What each study leaves: its figures, its results, and the report that shows them. Each module makes its tables
 //! once, for the report and for the terminal.
 
+pub mod availability;
 pub mod bus;
 pub mod course;
 mod curves;
@@ -14,6 +15,8 @@ pub mod handover;
 pub mod identify;
 pub mod reliance;
 pub mod run;
+pub mod stability;
+pub mod sweep;
 
 use crate::document::WriteError;
 use crate::plot::PlotError;

@@ -2,10 +2,10 @@
 //! the envelope alone.
 
 use haptic_core::config::Setup;
-use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Request};
+use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
-use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Speed, Torque, TurningRate};
 
 use super::{Actuation, Guidance, Observation, is_limited};
 
@@ -46,12 +46,16 @@ impl Guidance for Direct {
                 driver_torque: Torque::from_nm(observation.driver_torque_nm),
                 wheel_angle: Radians::from_rad(observation.wheel_angle_rad),
             }),
-            speeds: Input::New([Speed::from_m_per_s(observation.speed_m_per_s); 2]),
+            motion: Input::New(Motion::new(
+                [Speed::from_m_per_s(observation.speed_m_per_s); 2],
+                observation.yaw_rate_rad_per_s.map(TurningRate::from_rad_per_s),
+            )),
             request: Input::New(Request {
                 engage: observation.request.engage,
                 authority: Ratio::from_si(observation.request.authority),
                 probe: observation.request.probe,
             }),
+            line_moved: false,
             faults: FaultSet::NONE,
         };
         let applied = Torque::from_nm(observation.motor_torque_nm);

@@ -49,6 +49,8 @@ pub struct Observation {
     pub motor_torque_nm: f64,
     /// Speed, m/s.
     pub speed_m_per_s: f64,
+    /// Yaw rate, rad/s; `None` in a vehicle that does not measure it.
+    pub yaw_rate_rad_per_s: Option<f64>,
     /// What the host asks for.
     pub request: Request,
 }

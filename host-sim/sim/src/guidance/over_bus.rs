@@ -11,7 +11,7 @@ use haptic_core::bus::messages::{
 };
 use haptic_core::config::Setup;
 use haptic_core::ecu::Ecu;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use heapless::Vec;
 
 use super::{Actuation, Guidance, Observation, is_limited};
@@ -79,6 +79,7 @@ impl OverBus {
             let counter = (observation.step / HOST_PERIOD_STEPS) as u8;
             let vehicle = Vehicle {
                 speeds: [Speed::from_m_per_s(observation.speed_m_per_s); 2],
+                yaw_rate: observation.yaw_rate_rad_per_s.map(TurningRate::from_rad_per_s),
             };
             let _ = self.sent.push(vehicle.encode(counter));
             let demand = Demand {

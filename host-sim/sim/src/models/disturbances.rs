@@ -26,6 +26,12 @@ pub struct SensorErrors {
     pub angle_bias: f64,
     /// Gain of the speed.
     pub speed_gain: f64,
+    /// Bias of the yaw rate, mrad/s.
+    pub yaw_rate_bias: f64,
+    /// Gain of the yaw rate.
+    pub yaw_rate_gain: f64,
+    /// Standard deviation of the yaw rate's noise, mrad/s.
+    pub yaw_rate_noise: f64,
     /// Standard deviation of e_y', m.
     pub lane_noise: f64,
     /// Standard deviation of e_theta', mrad.
@@ -53,6 +59,9 @@ impl Default for SensorErrors {
             torque_gain: 1.0,
             angle_bias: 0.0,
             speed_gain: 1.0,
+            yaw_rate_bias: 0.0,
+            yaw_rate_gain: 1.0,
+            yaw_rate_noise: 0.0,
             lane_noise: 0.0,
             heading_noise: 0.0,
             camera_yaw: 0.0,
@@ -76,6 +85,9 @@ impl SensorErrors {
         in_range("torque_gain", self.torque_gain, 0.5..=1.5, "")?;
         in_range("angle_bias", self.angle_bias, -20.0..=20.0, "deg")?;
         in_range("speed_gain", self.speed_gain, 0.5..=1.5, "")?;
+        in_range("yaw_rate_bias", self.yaw_rate_bias, -100.0..=100.0, "mrad/s")?;
+        in_range("yaw_rate_gain", self.yaw_rate_gain, 0.5..=1.5, "")?;
+        in_range("yaw_rate_noise", self.yaw_rate_noise, 0.0..=100.0, "mrad/s")?;
         in_range("lane_noise", self.lane_noise, 0.0..=1.0, "m")?;
         in_range("heading_noise", self.heading_noise, 0.0..=50.0, "mrad")?;
         in_range("camera_yaw", self.camera_yaw, -50.0..=50.0, "mrad")?;
@@ -85,6 +97,35 @@ impl SensorErrors {
         in_range("dropout", self.dropout, 0.0..=10.0, "s")?;
         in_range("line_jumps", self.line_jumps, 0.0..=3600.0, "1/h")?;
         in_range("line_jump", self.line_jump, -5.0..=5.0, "m")
+    }
+}
+
+/// The yaw-rate sensor's errors. It measures every 10 ms, as often as it is sent.
+#[derive(Debug, Clone)]
+pub struct ErringGyro {
+    errors: SensorErrors,
+    noise_rad_per_s: f64,
+    generator: Xoshiro256PlusPlus,
+}
+
+impl ErringGyro {
+    /// `seed` is of the gyro's stream.
+    pub fn new(errors: SensorErrors, seed: u64) -> Self {
+        Self {
+            errors,
+            noise_rad_per_s: 0.0,
+            generator: Xoshiro256PlusPlus::seed_from_u64(seed),
+        }
+    }
+
+    /// What it makes of the truth at a step, rad/s.
+    pub fn see(&mut self, step: u32, truth_rad_per_s: f64) -> f64 {
+        let errors = &self.errors;
+        if errors.yaw_rate_noise > 0.0 && step.is_multiple_of(10) {
+            let white: f64 = StandardNormal.sample(&mut self.generator);
+            self.noise_rad_per_s = 1e-3 * errors.yaw_rate_noise * white;
+        }
+        errors.yaw_rate_gain * truth_rad_per_s + 1e-3 * errors.yaw_rate_bias + self.noise_rad_per_s
     }
 }
 
@@ -188,6 +229,29 @@ mod tests {
         for (n, seen) in (0_u32..).zip(pictures(SensorErrors::default(), 100)) {
             assert_eq!(seen, Some([f64::from(n), 0.1]));
         }
+    }
+
+    #[test]
+    fn a_yaw_rate_has_its_gain_its_bias_and_its_noise() {
+        let mut exact = ErringGyro::new(SensorErrors::default(), 1);
+        assert_eq!(exact.see(0, 0.123), 0.123);
+        let errors = SensorErrors {
+            yaw_rate_bias: 3.0,
+            yaw_rate_gain: 1.02,
+            yaw_rate_noise: 2.0,
+            ..SensorErrors::default()
+        };
+        let mut gyro = ErringGyro::new(errors, 1);
+        let seen: Vec<f64> = (0..100_000).map(|n| gyro.see(10 * n, 0.1)).collect();
+        let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+        let sd = (seen.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / seen.len() as f64).sqrt();
+        // 0.1*1.02 + 0.003, known to four standard errors of 2e-3/sqrt(1e5); the deviation to 1 %.
+        assert!(
+            (mean - 0.105).abs() < 2.6e-5 && (sd / 2e-3 - 1.0).abs() < 0.01,
+            "{mean} {sd}"
+        );
+        // Between two measurements the last one stays.
+        assert_eq!(gyro.see(1_000_001, 0.1), gyro.see(1_000_002, 0.1));
     }
 
     #[test]

@@ -4,12 +4,14 @@
 //! and knows nothing of the controller, of studies or of the command line. Equation and table numbers are
 //! those of Wang, Zheng, Nacpil and Nakano, DOI 10.1049/itr2.12163.
 
+pub mod arm;
 pub mod disturbances;
 pub mod driver;
 pub mod plant;
 pub mod real;
 pub mod road;
 pub mod sensors;
+pub mod tolerances;
 pub mod vehicle;
 
 /// One step of the simulation, s: the control period of the ECU, and the grid of every delay and hold.

@@ -208,10 +208,11 @@ impl Plant {
     #[inline]
     fn advance(&mut self, before: f64, distance_m: f64) {
         let half_turn = 0.5 * (self.direction_rad() - before);
-        let [cos, sin] = rotated(self.direction, half_turn);
+        let turn = sine_and_cosine(half_turn);
+        let [cos, sin] = rotated(self.direction, turn);
         self.x_m += distance_m * cos;
         self.y_m += distance_m * sin;
-        self.direction = rotated([cos, sin], half_turn);
+        self.direction = rotated([cos, sin], turn);
     }
 
     /// Its state.
@@ -281,17 +282,22 @@ impl Plant {
     }
 }
 
-/// `direction` turned by a small angle, kept at unit length.
+/// Of a small angle.
 #[inline]
-fn rotated([x, y]: [f64; 2], angle: f64) -> [f64; 2] {
+fn sine_and_cosine(angle: f64) -> (f64, f64) {
     let square = angle * angle;
     // Fifth-order terms are below rounding for the 1e-4 rad of a step; a wild motion that is about to be
     // flagged as diverged may turn faster and gets the library's functions.
-    let (sin, cos) = if square < 1e-6 {
+    if square < 1e-6 {
         (angle * (1.0 - square / 6.0), 1.0 - square * (0.5 - square / 24.0))
     } else {
         angle.sin_cos()
-    };
+    }
+}
+
+/// `direction` turned by an angle of that sine and cosine, kept at unit length.
+#[inline]
+fn rotated([x, y]: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
     let (x, y) = (x * cos - y * sin, x * sin + y * cos);
     // First-order correction of the length, which otherwise drifts by rounding.
     let scale = 1.5 - 0.5 * (x * x + y * y);

@@ -14,6 +14,7 @@ use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::real::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
+use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
 
 /// Chooses the values of a [`Scenario`]; each has a default.
@@ -188,6 +189,12 @@ impl ScenarioBuilder {
         self
     }
 
+    /// How far cars of this kind differ.
+    pub fn tolerances(mut self, tolerances: Tolerances) -> Self {
+        self.values.tolerances = tolerances;
+        self
+    }
+
     /// Root of all random numbers.
     pub fn seed(mut self, seed: u64) -> Self {
         self.values.seed = seed;
@@ -217,6 +224,7 @@ impl ScenarioBuilder {
         }
         values.world.check().map_err(within("world"))?;
         values.sensor_errors.check().map_err(within("sensor_errors"))?;
+        values.tolerances.check().map_err(within("tolerances"))?;
         let scenario = Scenario { values, setup };
         scenario.check_length()?;
         scenario.check_manual()?;

@@ -11,6 +11,7 @@ use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::real::WorldParameters;
 use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
+use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
 
 /// Parses a scenario; only its course is checked.
@@ -79,6 +80,7 @@ pub(super) fn parse(
         .driver_change(file.driver_change)
         .world(file.world.unwrap_or_default())
         .sensor_errors(file.sensor_errors.unwrap_or_default())
+        .tolerances(file.tolerances.unwrap_or_default())
         .seed(file.seed))
 }
 
@@ -98,6 +100,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         driver_change,
         world,
         sensor_errors,
+        tolerances,
         seed,
     } = &scenario.values;
     let built_in = *course == Course::paper();
@@ -137,6 +140,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         driver_change: *driver_change,
         world: (*world != WorldParameters::default()).then_some(*world),
         sensor_errors: (*sensor_errors != SensorErrors::default()).then_some(*sensor_errors),
+        tolerances: (*tolerances != Tolerances::default()).then_some(*tolerances),
     })
 }
 
@@ -260,6 +264,8 @@ struct ScenarioFile {
     world: Option<WorldParameters>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sensor_errors: Option<SensorErrors>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerances: Option<Tolerances>,
 }
 
 impl Default for ScenarioFile {
@@ -279,6 +285,7 @@ impl Default for ScenarioFile {
             driver_change: None,
             world: None,
             sensor_errors: None,
+            tolerances: None,
         }
     }
 }

@@ -28,7 +28,7 @@ const OLD_NAMES: [(&str, &str); 5] = [
 ];
 
 /// What is refused where the controller's parameter follows from several fields: name in the controller, formula.
-const FORMULAS: [(&str, &str); 6] = [
+const FORMULAS: [(&str, &str); 7] = [
     (
         "2 * pi * probe_amplitude_nm * probe_frequency_hz",
         "guidance: the probe's slope 2*pi*probe_amplitude_nm*probe_frequency_hz",
@@ -44,6 +44,7 @@ const FORMULAS: [(&str, &str); 6] = [
     ),
     ("vehicle.column_damping_nm_s", "vehicle.B_s"),
     ("vehicle.far_time_s", "guidance.t_f"),
+    ("vehicle.near_time_s", "guidance.t_n"),
 ];
 
 /// A field of the table.

@@ -24,7 +24,9 @@ use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::real::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
+use crate::models::tolerances::{Car, Tolerances};
 use crate::models::vehicle::VehicleParameters;
+use crate::seeds::Stream;
 
 /// Speeds that a scenario may have, km/h. The controller guides from 5 m/s on.
 pub const SPEED_KMH: std::ops::RangeInclusive<f64> = 20.0..=250.0;
@@ -217,6 +219,7 @@ struct Values {
     driver_change: Option<DriverChange>,
     world: WorldParameters,
     sensor_errors: SensorErrors,
+    tolerances: Tolerances,
     seed: u64,
 }
 
@@ -235,6 +238,7 @@ impl Default for Values {
             driver_change: None,
             world: WorldParameters::default(),
             sensor_errors: SensorErrors::default(),
+            tolerances: Tolerances::default(),
             seed: 1,
         }
     }
@@ -350,7 +354,7 @@ impl Scenario {
         self.values.gains
     }
 
-    /// The vehicle.
+    /// The vehicle on paper, which the controller knows.
     pub fn vehicle(&self) -> &VehicleParameters {
         &self.values.vehicle
     }
@@ -383,6 +387,32 @@ impl Scenario {
     /// What the sensors add to the truth.
     pub fn sensor_errors(&self) -> &SensorErrors {
         &self.values.sensor_errors
+    }
+
+    /// How far cars of this kind differ.
+    pub fn tolerances(&self) -> &Tolerances {
+        &self.values.tolerances
+    }
+
+    /// The car that drives: what vehicle, world and sensor errors say, with what the tolerances draw.
+    pub fn car(&self) -> Car {
+        let Values {
+            vehicle,
+            world,
+            sensor_errors,
+            tolerances,
+            seed,
+            ..
+        } = self.values;
+        let number = tolerances.car.unwrap_or(seed);
+        tolerances.draw(
+            Stream::Car.seed(number),
+            &Car {
+                vehicle,
+                world,
+                sensor_errors,
+            },
+        )
     }
 
     /// Root of all random numbers.
@@ -441,11 +471,12 @@ impl Values {
 
     /// The vehicle as the controller's plausibility checks know it: the true one, from tables 8 and 9.
     fn vehicle_for_plausibility(&self) -> VehicleParams {
-        let far_time_s = self.guidance.t_f;
+        let (near_time_s, far_time_s) = (self.guidance.t_n, self.guidance.t_f);
         if self.vehicle == VehicleParameters::default() {
             // The constants of the shipped image, so that host and target hold the same bits.
             return VehicleParams {
                 far_time_s,
+                near_time_s,
                 ..Params::PAPER.vehicle
             };
         }
@@ -468,6 +499,7 @@ impl Values {
             aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
             column_damping_nm_s: b_s,
             far_time_s,
+            near_time_s,
         }
     }
 }

@@ -15,15 +15,16 @@ mod protection;
 
 use std::path::Path;
 
-use can_dbc::{ByteOrder, Dbc, MessageId, Signal, ValueType};
+use can_dbc::Dbc;
 
 use super::log::{DriveLog, LogError};
 pub use far_point::SingleTrack;
 use haptic_log::candump::{self, CandumpFrame};
+use haptic_log::formats::dbc::{identifier, raw};
 use protection::{Audit, audited};
 
-/// The product's own bus.
-const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
+/// The product's own bus: core/haptic.dbc.
+pub const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
 
 /// Rows a second: the camera's.
 const RATE_HZ: f64 = 120.0;
@@ -87,20 +88,33 @@ pub fn open_recording_with(
             None,
         ));
     };
-    let dbc = match recording.dbc {
-        None => HAPTIC_DBC.to_owned(),
-        Some(dbc) => {
-            std::fs::read_to_string(dbc).map_err(|e| LogError::new(format!("{}: {e}", dbc.display())))?
-        }
-    };
+    let records = candump::parse(text).map_err(named)?;
+    let (log, note) = of_frames(&records, recording).map_err(named)?;
+    Ok((log, Some(note)))
+}
+
+/// A log of frames that were read already, and the sentence about it.
+pub(super) fn of_frames(
+    records: &[CandumpFrame],
+    recording: &Recording<'_>,
+) -> Result<(DriveLog, &'static str), String> {
+    let dbc = dbc_text(recording.dbc).map_err(|e| e.to_string())?;
     let vehicle = recording.vehicle.unwrap_or(far_point::TABLE_9);
-    let log = read_trace(text, &dbc, &vehicle, recording.manual).map_err(named)?;
+    let log = read_trace(records, &dbc, &vehicle, recording.manual)?;
     let note = if recording.vehicle.is_some() {
         NOTE_OF_OTHER
     } else {
         NOTE
     };
-    Ok((log, Some(note)))
+    Ok((log, note))
+}
+
+/// The DBC file's text, or that of the product's own.
+pub(super) fn dbc_text(dbc: Option<&Path>) -> Result<String, LogError> {
+    let Some(dbc) = dbc else {
+        return Ok(HAPTIC_DBC.to_owned());
+    };
+    std::fs::read_to_string(dbc).map_err(|e| LogError::new(format!("{}: {e}", dbc.display())))
 }
 
 /// A signal over time.
@@ -111,11 +125,15 @@ struct Course {
     value: Vec<f64>,
 }
 
-fn read_trace(text: &str, dbc: &str, vehicle: &SingleTrack, manual: bool) -> Result<DriveLog, String> {
+fn read_trace(
+    records: &[CandumpFrame],
+    dbc: &str,
+    vehicle: &SingleTrack,
+    manual: bool,
+) -> Result<DriveLog, String> {
     let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
-    let records = candump::parse(text)?;
     let mut audits: Vec<Audit> = Vec::new();
-    let mut course = |name| Course::of(name, &dbc, &records, &mut audits);
+    let mut course = |name| Course::of(name, &dbc, records, &mut audits);
 
     let mut e_y = course("LanePreview_LateralError")?;
     let mut e_theta = course("LanePreview_YawError")?;
@@ -202,20 +220,12 @@ impl Course {
         let Some((message, signal)) = found else {
             return Err(format!("the DBC file has no signal {name}"));
         };
-        if signal.byte_order != ByteOrder::LittleEndian {
-            return Err(format!(
-                "signal {name} of the DBC file is big-endian, which is not read"
-            ));
-        }
         let unit = match signal.unit.as_str() {
             "deg" => std::f64::consts::PI / 180.0,
             "ms" => 1e-3,
             _ => 1.0,
         };
-        let id = match message.id {
-            MessageId::Standard(id) => u32::from(id),
-            MessageId::Extended(id) => id,
-        };
+        let (id, _) = identifier(message.id);
         let mut course = Self {
             name,
             line: Vec::new(),
@@ -357,24 +367,4 @@ fn sampled(course: &Course, at_s: impl Iterator<Item = f64>, hold: Hold) -> Vec<
         }
     })
     .collect()
-}
-
-/// The bits of a little-endian signal, with its sign; none if the frame is too short.
-fn raw(signal: &Signal, data: &[u8]) -> Option<i64> {
-    let (start, size) = (
-        u32::try_from(signal.start_bit).ok()?,
-        u32::try_from(signal.size).ok()?,
-    );
-    let end = start.checked_add(size)?;
-    if !(1..=64).contains(&size) || end as usize > 8 * data.len() || end > 64 {
-        return None;
-    }
-    let mut bytes = [0; 8];
-    bytes[..data.len()].copy_from_slice(data);
-    // To the top, and back down with or without the sign.
-    let top = u64::from_le_bytes(bytes) << (64 - end);
-    Some(match signal.value_type {
-        ValueType::Signed => (top as i64) >> (64 - size),
-        ValueType::Unsigned => (top >> (64 - size)) as i64,
-    })
 }

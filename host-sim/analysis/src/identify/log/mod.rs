@@ -98,6 +98,14 @@ impl LogError {
     pub(crate) fn new(message: String) -> Self {
         Self(message)
     }
+
+    /// Of a file without lines: counted are the rows.
+    fn in_a_row(self) -> Self {
+        Self(match self.0.strip_prefix("line ") {
+            Some(rest) => format!("row {rest}"),
+            None => self.0,
+        })
+    }
 }
 
 fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
@@ -207,6 +215,19 @@ impl DriveLog {
         }
         let lines: Vec<u64> = (1..=rows as u64).collect();
         Self::from_table(&lines, columns, manual)
+    }
+
+    /// A log of a table's columns in the order of [`COLUMNS`]; the first is not looked at. Of a `manual` drive the guidance
+    /// may be missing.
+    pub(crate) fn from_rows(
+        time_s: Vec<f64>,
+        columns: [Option<Vec<f64>>; 6],
+        manual: bool,
+    ) -> Result<Self, LogError> {
+        let nothing = || vec![0.0; time_s.len()];
+        let mut columns = columns.map(|column| column.unwrap_or_else(nothing));
+        columns[0] = time_s;
+        Self::from_columns(columns, manual).map_err(LogError::in_a_row)
     }
 
     /// Puts columns that are in their limits on an even grid.

@@ -43,6 +43,8 @@ struct Cell {
     curvature_1pm: f64,
     /// Change of curvature with arc length, 1/m^2.
     curvature_slope_1pm2: f64,
+    /// Square of the curvature over six, and its third power: a division less in each projection.
+    curvature_powers: [f64; 2],
 }
 
 /// A point in the frame of a place on the centreline.
@@ -76,19 +78,32 @@ impl Cell {
             };
         }
         // The clothoid in the frame of the cell's middle: heading theta, position (along, across).
-        let theta = sigma * (k0 + 0.5 * k1 * sigma);
         let sigma2 = sigma * sigma;
-        let along = sigma - sigma2 * sigma * (k0 * k0 / 6.0 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
-        let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - k0 * k0 * k0 * sigma2 / 24.0);
+        let [square_over_6, cube] = self.curvature_powers;
+        let (theta, along, across, curvature) = if k1 == 0.0 {
+            // An arc: without the terms that vanish, to the same bits.
+            let along = sigma - sigma2 * sigma * square_over_6;
+            (sigma * k0, along, sigma2 * (0.5 * k0 - cube * sigma2 / 24.0), k0)
+        } else {
+            let along =
+                sigma - sigma2 * sigma * (square_over_6 + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
+            let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - cube * sigma2 / 24.0);
+            (sigma * (k0 + 0.5 * k1 * sigma), along, across, k0 + k1 * sigma)
+        };
         let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
         let (ahead, left) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
         Near {
             theta,
-            curvature: k0 + k1 * sigma,
+            curvature,
             distance_to_foot: ahead * cos + left * sin,
             offset_m: left * cos - ahead * sin,
         }
     }
+}
+
+/// What a projection needs of a curvature.
+fn powers(k: f64) -> [f64; 2] {
+    [k * k / 6.0, k * k * k]
 }
 
 /// What the surface is like in a cell: values at its middle and their change with arc length, per m.
@@ -186,6 +201,7 @@ impl Centreline {
                 heading_rad: middle.heading_rad,
                 curvature_1pm: piece.curvature_1pm,
                 curvature_slope_1pm2: piece.curvature_slope_1pm2,
+                curvature_powers: powers(piece.curvature_1pm),
             });
             let ends = (piece.bank_rad, piece.grade, piece.width_m);
             grounds.push(Ground::within(half_m, piece.length_m, ends.0, ends.1, ends.2));
@@ -235,6 +251,7 @@ impl Centreline {
                     heading_rad: heading_mid,
                     curvature_1pm: curvature,
                     curvature_slope_1pm2: slope,
+                    curvature_powers: powers(curvature),
                 });
                 grounds.push(Ground::within(middle, length_m, bank_rad, grade, width_m));
                 let (dx2, dy2) = arc(heading_mid, curvature, slope, half_m);

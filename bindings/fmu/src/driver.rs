@@ -1,0 +1,129 @@
+//! `HapticDriver`: equations (7) and (8), the delay exact.
+
+use haptic_sim::models::arm::Arm;
+use haptic_sim::models::driver::{ArmGains, DriverParameters, Vision};
+
+use crate::variable::{About, Kind, Model, Role, Variable, parameter, variable};
+use Kind::Real;
+use Role::{Input, Output};
+
+/// The model.
+pub static ABOUT: About = About {
+    name: "HapticDriver",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a02}",
+    meaning: "A driver: two-point vision with an exact delay, and an arm that weighs vision against the guidance",
+    variables: &VARIABLES,
+    make: || {
+        Box::new(Driver {
+            vision: Vision::new(&DriverParameters::default()),
+            arm: None,
+        })
+    },
+};
+
+const TORQUE: usize = 4;
+const FIRST: usize = 5;
+
+static VARIABLES: [Variable; 13] = [
+    variable(
+        "e_y_m",
+        Real,
+        Input,
+        "m",
+        "Lateral error at the driver's near point, positive: the target is to the left",
+    ),
+    variable(
+        "e_theta_rad",
+        Real,
+        Input,
+        "rad",
+        "Yaw error at the driver's far point",
+    ),
+    variable(
+        "wheel_angle_rad",
+        Real,
+        Input,
+        "rad",
+        "Angle of the steering wheel",
+    ),
+    variable(
+        "guidance_torque_nm",
+        Real,
+        Input,
+        "N.m",
+        "Guidance torque on the column",
+    ),
+    variable(
+        "driver_torque_nm",
+        Real,
+        Output,
+        "N.m",
+        "Torque of the driver on the column",
+    ),
+    parameter("a_1", "rad/m", 0.1, [0.0, 10.0], "Target angle per lateral error"),
+    parameter(
+        "a_2",
+        "rad/(m.s)",
+        0.05,
+        [0.0, 10.0],
+        "Target angle per integral of the lateral error",
+    ),
+    parameter("a_3", "", 3.7, [0.0, 100.0], "Target angle per yaw error"),
+    parameter("t_p_s", "s", 0.1, [0.001, 2.0], "Delay from seeing to acting"),
+    parameter("t_nms_s", "s", 0.1, [0.01, 2.0], "Time constant of the arm"),
+    parameter("k_nms_nm_per_rad", "N.m/rad", 1.0, [0.0, 100.0], "Reflex gain"),
+    parameter(
+        "k_d_nm_per_rad",
+        "N.m/rad",
+        2.0,
+        [0.0, 50.0],
+        "Torque per target angle",
+    ),
+    parameter(
+        "k_hg",
+        "",
+        0.0,
+        [0.0, 10.0],
+        "Share of the guidance torque that the arm works against",
+    ),
+];
+
+#[derive(Clone)]
+struct Driver {
+    vision: Vision,
+    arm: Option<Arm>,
+}
+
+impl Model for Driver {
+    fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
+        let [a_1, a_2, a_3, t_p, t_nms, k_nms, k_d, k_hg, ..] = values[FIRST..] else {
+            return Err("variables are missing".into());
+        };
+        let parameters = DriverParameters {
+            a_1,
+            a_2,
+            a_3,
+            t_p,
+            t_nms,
+            k_nms,
+            ..DriverParameters::default()
+        };
+        parameters.check().map_err(|e| e.to_string())?;
+        self.vision = Vision::new(&parameters);
+        self.arm = Some(Arm::new(&parameters, ArmGains { k_d, k_hg }));
+        values[TORQUE] = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+        let target_rad = self.vision.step(values[0], values[1]);
+        if let Some(arm) = &mut self.arm {
+            values[TORQUE] = arm.step(target_rad, values[2], values[3]);
+        }
+        Ok(())
+    }
+
+    fn copy(&self) -> Box<dyn Model> {
+        Box::new(self.clone())
+    }
+}

@@ -1,0 +1,283 @@
+//! `HapticVehicle`: vehicle, column and the road before them, under two torques. It is the simulator's closed loop whose driver
+//! has no gain and whose guidance is an input.
+
+use haptic_sim::guidance::{Actuation, Guidance, Observation};
+use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::road::Course;
+use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::scenario::Condition;
+use haptic_sim::simulation::Ending;
+use haptic_sim::{Action, Scenario, Simulation};
+
+use crate::variable::{About, Kind, Model, Role, Variable, parameter, variable};
+use Kind::Real;
+use Role::{Input, Output};
+
+/// The model.
+pub static ABOUT: About = About {
+    name: "HapticVehicle",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a03}",
+    meaning: "A vehicle with its steering column on the project's course, and what a driver and a camera see of it",
+    variables: &VARIABLES,
+    make: || {
+        Box::new(Vehicle {
+            simulation: None,
+            lateral_error_m: 0.0,
+            s_m: 0.0,
+        })
+    },
+};
+
+const OUTPUTS: usize = 2;
+const SPEED: usize = 12;
+const FIRST: usize = 13;
+
+static VARIABLES: [Variable; 24] = [
+    variable(
+        "driver_torque_nm",
+        Real,
+        Input,
+        "N.m",
+        "Torque of the driver on the column",
+    ),
+    variable(
+        "guidance_torque_nm",
+        Real,
+        Input,
+        "N.m",
+        "Torque of the guidance on the column",
+    ),
+    variable(
+        "e_y_m",
+        Real,
+        Output,
+        "m",
+        "Lateral error at the driver's near point",
+    ),
+    variable(
+        "e_theta_rad",
+        Real,
+        Output,
+        "rad",
+        "Yaw error at the driver's far point",
+    ),
+    variable(
+        "guidance_e_y_m",
+        Real,
+        Output,
+        "m",
+        "Lateral error at the guidance's near point",
+    ),
+    variable(
+        "guidance_e_theta_rad",
+        Real,
+        Output,
+        "rad",
+        "Yaw error at the guidance's far point",
+    ),
+    variable(
+        "wheel_angle_rad",
+        Real,
+        Output,
+        "rad",
+        "Angle of the steering wheel",
+    ),
+    variable(
+        "column_torque_nm",
+        Real,
+        Output,
+        "N.m",
+        "Driver torque as the column's sensor sees it",
+    ),
+    variable(
+        "motor_torque_nm",
+        Real,
+        Output,
+        "N.m",
+        "Guidance torque that acted in the last step",
+    ),
+    variable(
+        "lateral_error_m",
+        Real,
+        Output,
+        "m",
+        "Offset from the centreline, left positive; 200 values a second",
+    ),
+    variable(
+        "s_m",
+        Real,
+        Output,
+        "m",
+        "Arc length along the centreline; 200 values a second",
+    ),
+    variable("speed_m_per_s", Real, Output, "m/s", "Speed"),
+    parameter("v_m_per_s", "m/s", 60.0 / 3.6, [20.0 / 3.6, 250.0 / 3.6], "Speed"),
+    parameter("m_kg", "kg", 1100.0, [100.0, 50_000.0], "Mass"),
+    parameter("i_kg_m2", "kg.m2", 2940.0, [100.0, 500_000.0], "Yaw inertia"),
+    parameter("l_f_m", "m", 1.0, [0.1, 10.0], "Front axle to centre of gravity"),
+    parameter("l_r_m", "m", 1.635, [0.1, 10.0], "Rear axle to centre of gravity"),
+    parameter(
+        "k_f_n_per_rad",
+        "N/rad",
+        53_300.0,
+        [1e3, 1e6],
+        "Cornering stiffness of a front tyre",
+    ),
+    parameter(
+        "k_r_n_per_rad",
+        "N/rad",
+        117_000.0,
+        [1e3, 1e6],
+        "Cornering stiffness of a rear tyre",
+    ),
+    parameter(
+        "k_s_nm_per_rad",
+        "N.m/rad",
+        48_510.0,
+        [1e2, 1e7],
+        "Stiffness around the kingpin",
+    ),
+    parameter("e_t_m", "m", 0.026, [0.001, 0.2], "Pneumatic and castor trail"),
+    parameter(
+        "b_s_nms_per_rad",
+        "N.m.s/rad",
+        0.57,
+        [0.01, 10.0],
+        "Damping of the column",
+    ),
+    parameter("j_s_kg_m2", "kg.m2", 0.11, [0.01, 2.0], "Inertia of the column"),
+    parameter(
+        "k_t",
+        "",
+        1.0 / 17.0,
+        [0.02, 0.2],
+        "Front wheel angle per steering wheel angle",
+    ),
+];
+
+/// A guidance that applies what it is told.
+#[derive(Clone, Default)]
+struct Told {
+    torque_nm: f64,
+}
+
+impl Guidance for Told {
+    fn looks_at_road(&self, _step: u32) -> bool {
+        true
+    }
+
+    fn step(&mut self, _observation: &Observation) -> Actuation {
+        Actuation {
+            torque_nm: self.torque_nm,
+            limited: false,
+        }
+    }
+}
+
+#[derive(Clone)]
+struct Vehicle {
+    simulation: Option<Simulation<Told>>,
+    lateral_error_m: f64,
+    s_m: f64,
+}
+
+impl Vehicle {
+    /// What there is to be seen now: a copy looks, and is thrown away.
+    fn look(&mut self, values: &mut [f64]) -> Result<(), String> {
+        let Some(simulation) = &self.simulation else {
+            return Err("the vehicle was not started".into());
+        };
+        let action = Action {
+            hand_torque_nm: values[0],
+            ..Action::default()
+        };
+        let mut copy = simulation.clone();
+        let Some(outcome) = copy.step(&action) else {
+            return Err(ended(&copy));
+        };
+        let (preview, now, sample) = (outcome.preview, outcome.observation, outcome.sample);
+        if let Some(sample) = sample {
+            (self.lateral_error_m, self.s_m) = (sample.lateral_error_m, sample.s_m);
+        }
+        let camera = now.lane.unwrap_or_default();
+        values[OUTPUTS..SPEED].copy_from_slice(&[
+            preview.e_y_m,
+            preview.e_theta_rad,
+            camera.e_y_m,
+            camera.e_theta_rad,
+            now.wheel_angle_rad,
+            now.driver_torque_nm,
+            now.motor_torque_nm,
+            self.lateral_error_m,
+            self.s_m,
+            now.speed_m_per_s,
+        ]);
+        Ok(())
+    }
+}
+
+/// Why there is no next step.
+fn ended(simulation: &Simulation<Told>) -> String {
+    match simulation.ending() {
+        Some(Ending::Diverged { s_m }) => format!("the vehicle has left the road, at {s_m:.1} m"),
+        _ => "the course has ended".into(),
+    }
+}
+
+impl Model for Vehicle {
+    fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
+        let [m, i, l_f, l_r, k_f, k_r, k_s, e_t, b_s, j_s, k_t] = values[FIRST..] else {
+            return Err("variables are missing".into());
+        };
+        let driver = DriverParameters {
+            a_1: 0.0,
+            a_2: 0.0,
+            a_3: 0.0,
+            k_nms: 0.0,
+            ..DriverParameters::default()
+        };
+        let scenario = Scenario::builder()
+            .course(Course::paper())
+            .condition(Condition::High)
+            .speed_kmh(values[SPEED] * 3.6)
+            .vehicle(VehicleParameters {
+                m,
+                i,
+                l_f,
+                l_r,
+                k_f,
+                k_r,
+                k_s,
+                e_t,
+                b_s,
+                j_s,
+                k_t,
+            })
+            .driver(driver)
+            .gains(ArmGains { k_d: 0.0, k_hg: 0.0 })
+            .build()
+            .map_err(|e| e.to_string())?;
+        self.simulation = Some(Simulation::with(&scenario, Told::default()));
+        (self.lateral_error_m, self.s_m) = (0.0, 0.0);
+        self.look(values)
+    }
+
+    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+        let Some(simulation) = &mut self.simulation else {
+            return Err("the vehicle was not started".into());
+        };
+        simulation.guidance_mut().torque_nm = values[1];
+        let action = Action {
+            hand_torque_nm: values[0],
+            ..Action::default()
+        };
+        if simulation.step(&action).is_none() {
+            return Err(ended(simulation));
+        }
+        self.look(values)
+    }
+
+    fn copy(&self) -> Box<dyn Model> {
+        Box::new(self.clone())
+    }
+}

@@ -1,0 +1,131 @@
+"""A sweep on several engines, one whose workers are killed: the same bytes."""
+
+import csv
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import pytest
+
+import haptic_guidance as hg
+
+SPEC = """
+samples = 200
+design = "sobol"
+[scenario.failure]
+kind = "torque"
+[scenario.course]
+name = "one curve"
+lane_width = 3.6
+[[scenario.course.segment]]
+length = 60.0
+curvature_start = 0.0
+curvature_end = 0.0
+[[scenario.course.segment]]
+length = 140.0
+curvature_start = 0.003
+curvature_end = 0.003
+[vary]
+"driver.t_p" = { uniform = [0.1, 0.5] }
+"failure.time" = { uniform = [4, 8] }
+"""
+
+
+@pytest.fixture
+def spec(tmp_path):
+    path = tmp_path / "sweep.toml"
+    path.write_text(SPEC)
+    return path
+
+
+def files(result):
+    names = ["drives.csv", "drives.parquet", "sweep.toml"]
+    return [(result.directory / name).read_bytes() for name in names]
+
+
+def test_rows_are_the_runs_of_their_scenarios(spec, tmp_path):
+    result = hg.sweep(spec, out=tmp_path / "threads")
+    rows = list(csv.DictReader(result.csv.open()))
+    assert len(rows) == result.summary["drives"] == 200
+    row = rows[137]
+    scenario = hg.Scenario(
+        driver={"t_p": float(row["driver.t_p"])},
+        failure={"kind": "torque", "time": float(row["failure.time"])},
+        seed=int(row["seed"]),
+        course={
+            "name": "one curve",
+            "lane_width": 3.6,
+            "segment": [
+                {"length": 60.0, "curvature_start": 0.0, "curvature_end": 0.0},
+                {"length": 140.0, "curvature_start": 0.003, "curvature_end": 0.003},
+            ],
+        },
+    )
+    run = hg.simulate(scenario)
+    assert float(row["peak_lateral_error_m"]) == run.metrics["peak_lateral_error_m"]
+
+
+def test_the_table_is_read_by_pandas(spec, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    result = hg.sweep(spec, out=tmp_path / "threads")
+    table = pandas.read_parquet(result.parquet)
+    text = pandas.read_csv(result.csv)
+    assert list(table.columns) == list(text.columns)
+    assert (table["drive"] == range(200)).all()
+    for name in ["driver.t_p", "peak_lateral_error_m", "end_m", "min_time_to_lane_crossing_s"]:
+        pandas.testing.assert_series_equal(table[name], text[name], check_exact=False, rtol=1e-15)
+    assert table["diverged"].dtype == bool
+
+
+def test_processes_give_the_same_bytes_and_a_sweep_goes_on(spec, tmp_path):
+    whole = files(hg.sweep(spec, out=tmp_path / "threads"))
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert files(hg.sweep(spec, pool, out=tmp_path / "processes")) == whole
+    for chunk in list((tmp_path / "processes" / "chunks").iterdir())[::3]:
+        chunk.unlink()
+    calls = []
+    again = hg.sweep(spec, out=tmp_path / "processes", progress=lambda done, of: calls.append((done, of)))
+    assert files(again) == whole
+    assert 0 < len(calls) < calls[-1][1] and calls[-1][0] == calls[-1][1]
+
+
+def test_bad_input_is_not_tried_again(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text("samples = 4\n[vary]\nspeed = { uniform = [50, 300] }\n")
+    with pytest.raises(hg.InputError, match="speed = .* is outside 20 to 250 km/h"):
+        hg.sweep(path, out=tmp_path / "out")
+
+
+def test_killed_workers_of_a_dask_cluster_cost_only_their_chunk(spec, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    whole = files(hg.sweep(spec, out=tmp_path / "threads"))
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    )
+    stop = threading.Event()
+    killed = []
+
+    def kill(client):
+        while not stop.wait(0.5) and len(killed) < 4:
+            workers = [nanny.pid for nanny in cluster.workers.values() if nanny.pid]
+            if workers:
+                pid = workers[len(killed) % len(workers)]
+                os.kill(pid, signal.SIGKILL)
+                killed.append(pid)
+
+    with cluster, distributed.Client(cluster) as client:
+        killer = threading.Thread(target=kill, args=(client,))
+        killer.start()
+        try:
+            result = hg.sweep(spec, client, out=tmp_path / "dask", in_flight=8, retries=20)
+            while not killed:
+                time.sleep(0.1)
+        finally:
+            stop.set()
+            killer.join()
+    assert files(result) == whole
+    assert killed

@@ -1,0 +1,147 @@
+//! How the vehicle turned, and where its line went, in the last half second.
+//!
+//! A camera's sample is 0 to 150 ms old when it arrives, and the near point of a preview comes to where its far point
+//! was some time before. Both need the vehicle's heading at an earlier instant, which is the sum of its rate of turn.
+//!
+//! Not kept twice: rings of 32 places, of which a flip spoils one. What the law takes from here is bounded in
+//! [`crate::law`], so that a flip moves the torque by less than the monitor's band; what the checks take can declare
+//! or hide a fault for one second.
+
+use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second_times, saturate};
+
+/// A power of two, so that the place is a mask.
+const RING: usize = 32;
+/// Two directions of the line are kept so far apart, so that the ring holds the time between near and far point.
+const APART: Micros = Micros::from_ms(20);
+
+/// The time over which the rate before a sample is taken, and how often it is in a second.
+const BEFORE: Micros = Micros::from_ms(50);
+const BEFORE_PER_S: i64 = 20;
+
+/// The vehicle's heading at an instant, and the rate at which it turned from there.
+#[derive(Debug, Clone, Copy)]
+pub struct Heading {
+    at: Instant,
+    /// Against where it was when the ECU started, modulo 256 rad.
+    psi: i32,
+    /// The rate of turn.
+    pub rate: TurningRate,
+}
+
+impl Heading {
+    const NONE: Self = Self {
+        at: Instant::from_us(0),
+        psi: 0,
+        rate: TurningRate::ZERO,
+    };
+
+    /// The heading at an instant not before this one.
+    fn psi_at(&self, at: Instant) -> i32 {
+        let turned = per_second_times(i64::from(self.rate.bits()), at.since(self.at));
+        self.psi.wrapping_add(saturate(turned))
+    }
+}
+
+/// The rings.
+#[derive(Debug, Clone)]
+pub struct Past {
+    headings: [Heading; RING],
+    newest: usize,
+    /// Directions of the line at the far point, in the frame of the headings.
+    lines: [(Instant, i32); RING],
+    last_line: usize,
+    /// How many of them count.
+    known_lines: usize,
+}
+
+impl Past {
+    /// Nothing known.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            headings: [Heading::NONE; RING],
+            newest: 0,
+            lines: [(Instant::from_us(0), 0); RING],
+            last_line: 0,
+            known_lines: 0,
+        }
+    }
+
+    /// The rate of turn from now on.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    pub fn turn(&mut self, now: Instant, rate: TurningRate) {
+        let psi = self.headings[self.newest % RING].psi_at(now);
+        self.newest = self.newest.wrapping_add(1);
+        self.headings[self.newest % RING] = Heading { at: now, psi, rate };
+    }
+
+    /// The heading known last before an instant, or the oldest.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    #[must_use]
+    pub fn heading(&self, now: Instant, at: Instant) -> Heading {
+        let age = now.since(at);
+        let place = |back: usize| &self.headings[self.newest.wrapping_sub(back) % RING];
+        let found = (0..RING).map(place).find(|heading| now.since(heading.at) >= age);
+        *found.unwrap_or_else(|| place(RING.wrapping_sub(1)))
+    }
+
+    /// How far the vehicle turned from an instant until now, and the rate at which it turned before then: over 50 ms, the
+    /// middle of which is as old as the law's filtered rates are.
+    #[must_use]
+    pub fn turned(&self, now: Instant, from: Instant) -> (Radians, TurningRate) {
+        let then = self.heading(now, from);
+        let turned = self.heading(now, now).psi_at(now).wrapping_sub(then.psi_at(from));
+        let earlier = from.before(BEFORE);
+        let before = self.heading(now, earlier).psi_at(earlier);
+        let rate = i64::from(then.psi_at(from).wrapping_sub(before)).saturating_mul(BEFORE_PER_S);
+        (Radians::from_bits(turned), TurningRate::from_wide(rate))
+    }
+
+    /// The direction of the line at the far point, `e_theta` from the vehicle's heading at `at`.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    pub fn see(&mut self, now: Instant, at: Instant, e_theta: Radians) {
+        let direction = self.heading(now, at).psi_at(at).wrapping_add(e_theta.bits());
+        if self.known_lines == 0 || at.since(self.lines[self.last_line % RING].0) >= APART {
+            self.last_line = self.last_line.wrapping_add(1);
+            self.lines[self.last_line % RING] = (at, direction);
+            self.known_lines = self.known_lines.saturating_add(1).min(RING);
+        }
+    }
+
+    /// The direction of the line `before` an instant, against the vehicle's heading at that instant: where the far point
+    /// was then. `None` where that is longer ago than the line is known.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    #[must_use]
+    pub fn line(&self, now: Instant, at: Instant, before: Micros) -> Option<Radians> {
+        let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
+        let wanted = at.before(before);
+        let age = now.since(wanted);
+        let mut backs = 0..self.known_lines;
+        let back = backs.find(|back| now.since(place(*back).0) >= age)?;
+        let (from, direction) = place(back);
+        // Straight from there to the one after.
+        let (to, next) = place(back.saturating_sub(1));
+        let (span, done) = (to.since(from).us(), wanted.since(from).us());
+        let share = done
+            .min(100_000)
+            .wrapping_shl(10)
+            .checked_div(span)
+            .unwrap_or(0)
+            .min(1 << 10);
+        let way = i64::from(next.wrapping_sub(direction)).saturating_mul(i64::from(share)) >> 10;
+        let direction = direction.wrapping_add(saturate(way));
+        let psi = self.heading(now, at).psi_at(at);
+        Some(Radians::from_bits(direction.wrapping_sub(psi)))
+    }
+
+    /// The line was lost.
+    pub fn forget_line(&mut self) {
+        self.known_lines = 0;
+    }
+}
+
+impl Default for Past {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,242 @@
+//! What a real road, a real camera and a driver without hands do to the ECU on the bench.
+
+mod rig;
+
+use haptic_core::bus::Reject;
+use haptic_core::bus::messages::Message;
+use haptic_core::faults::Fault;
+use haptic_core::law::{LaneSample, LawState, Since};
+use haptic_core::modes::Mode;
+use haptic_core::past::Past;
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
+use rig::Rig;
+
+const LANE: usize = 0;
+
+/// Runs with the lane's sender at its own period and age; the bench's own is silent.
+fn run_with_camera(rig: &mut Rig, counter: &mut u8, ms: u64, period_us: u64, age_us: u32) {
+    rig.silent[LANE] = true;
+    rig.lane.age = Micros::from_us(age_us);
+    let start = rig.t_us;
+    let mut pictures = 0;
+    for _ in 0..ms {
+        if rig.t_us - start >= pictures * period_us {
+            pictures += 1;
+            let frame = rig.lane.encode(*counter);
+            *counter = counter.wrapping_add(1);
+            let result = rig.send(&frame);
+            rig.rejects.extend(result.err());
+        }
+        rig.tick();
+    }
+}
+
+fn mode(rig: &Rig) -> Mode {
+    // A step of no time changes nothing but counts: ask a copy.
+    rig.clone().step().command.mode
+}
+
+#[test]
+fn cameras_of_15_to_120_hz_and_150_ms_engage_and_stay() {
+    for (hz, age_ms) in [
+        (120, 0),
+        (120, 25),
+        (60, 50),
+        (30, 100),
+        (20, 120),
+        (15, 150),
+        (15, 50),
+    ] {
+        let (mut rig, mut counter) = (Rig::paper(), 0);
+        rig.curve(0.6);
+        let period = 1_000_000 / hz;
+        run_with_camera(&mut rig, &mut counter, 900, period, age_ms * 1000);
+        rig.engage = true;
+        run_with_camera(&mut rig, &mut counter, 3000, period, age_ms * 1000);
+        assert_eq!(mode(&rig), Mode::Active, "{hz} Hz, {age_ms} ms");
+        assert!(
+            (rig.applied - 0.6).abs() < 0.01,
+            "{hz} Hz, {age_ms} ms: {} N.m",
+            rig.applied
+        );
+        // Then silent: three of its periods, and 30 ms at least, from the last picture.
+        let (lost, step) = rig.run_until(300, |step| step.command.mode == Mode::Handover);
+        assert!(step.command.faults.contains(Fault::LaneTimeout));
+        let most = (3 * period / 1000).max(30) + 3;
+        let least = most - 3 - period / 1000 - 4;
+        assert!((least..=most).contains(&u64::from(lost)), "{hz} Hz: {lost} ms");
+    }
+}
+
+#[test]
+fn a_sample_that_is_older_than_150_ms_is_none() {
+    for (age_us, engages) in [(150_000, true), (150_100, false)] {
+        let (mut rig, mut counter) = (Rig::paper(), 0);
+        run_with_camera(&mut rig, &mut counter, 900, 33_333, age_us);
+        rig.engage = true;
+        run_with_camera(&mut rig, &mut counter, 100, 33_333, age_us);
+        assert_eq!(mode(&rig) == Mode::Active, engages, "{age_us} us");
+        assert_eq!(rig.rejects.contains(&Reject::Older), !engages);
+    }
+}
+
+/// A line that moves: a little, as in works; to the next lane when the vehicle is half way there; to the next lane out of
+/// the middle of this one.
+#[test]
+fn a_line_chosen_anew_is_told_from_one_that_jumps_away() {
+    for (from, to, stays) in [
+        (0.1, 0.45, true),
+        (-0.3, -0.65, true),
+        (0.0, 0.5, false),
+        (1.75, -1.75, true),
+        (-1.9, 1.6, true),
+        (0.0, 3.5, false),
+        (0.3, -3.2, false),
+        (1.0, -0.5, false),
+    ] {
+        let mut rig = Rig::paper();
+        rig.lane.e_y = Metres::from_m(from);
+        rig.run(600);
+        rig.engage = true;
+        rig.run(1000);
+        rig.lane.e_y = Metres::from_m(to);
+        let before = rig.applied;
+        let mut last = before;
+        let mut said = false;
+        for _ in 0..60 {
+            said |= rig.tick().command.faults.contains(Fault::LaneStep);
+            // No faster than its limits, whatever the line does.
+            assert!(
+                (rig.applied - last).abs() <= 0.0081,
+                "{from} to {to}: {last} to {}",
+                rig.applied
+            );
+            last = rig.applied;
+        }
+        let step = rig.run(1000);
+        assert_eq!(step.command.mode == Mode::Active, stays, "{from} m to {to} m");
+        if stays {
+            // K_1*a1' = 0.5 N.m/m.
+            assert!(
+                (rig.applied - 0.5 * to).abs() < 0.01,
+                "{from} to {to}: {}",
+                rig.applied
+            );
+        } else {
+            assert!(said, "{from} m to {to} m");
+        }
+    }
+}
+
+#[test]
+fn no_hand_is_warned_after_15_s_of_guidance_and_ends_it_after_30() {
+    let mut rig = Rig::active_in_curve(0.5);
+    rig.driver = Some(0.3);
+    rig.run(20);
+    let (ms, step) = rig.run_until(16_000, |step| step.command.warning);
+    assert!((14_900..=15_001).contains(&ms), "{ms}");
+    assert!(step.command.faults.contains(Fault::HandsOff) && step.command.mode == Mode::Active);
+    assert!(
+        step.others.iter().any(|frame| frame.id() == 0x0D0),
+        "a warning frame at once"
+    );
+    // A hand, and all is well.
+    let mut held = rig.clone();
+    held.driver = Some(0.4);
+    let step = held.run(10);
+    assert!(!step.command.warning && step.command.mode == Mode::Active);
+    let (ms, _) = rig.run_until(16_000, |step| step.command.mode == Mode::Fade);
+    assert!((14_990..=15_001).contains(&ms), "{ms}");
+    // 4 N.m/s, and nothing re-engages by itself.
+    let (ms, _) = rig.run_until(200, |step| step.command.mode == Mode::Standby);
+    assert!((100..=150).contains(&ms), "{ms}");
+    assert_eq!(rig.run(2000).command.mode, Mode::Standby);
+}
+
+#[test]
+fn a_hand_or_a_guidance_that_does_nothing_is_never_warned() {
+    // A hand that answers by 0.1 N.m every 5 s.
+    let mut rig = Rig::active_in_curve(0.5);
+    for k in 0..12 {
+        rig.driver = Some(if k % 2 == 0 { 0.45 } else { 0.55 });
+        for _ in 0..5000 {
+            assert!(!rig.tick().command.warning);
+        }
+    }
+    // A straight on which nothing is asked for.
+    let mut rig = Rig::active_in_curve(0.0);
+    rig.driver = Some(0.0);
+    for _ in 0..40_000 {
+        assert!(!rig.tick().command.warning);
+    }
+}
+
+/// A vehicle that swings about a straight line by 20 mrad, in f64: what the law makes of samples that are 50 to 150 ms old
+/// when they come, against equation (9) of the errors and rates of now.
+#[test]
+fn a_late_sample_is_made_up_for() {
+    let law = haptic_core::config::Config::PAPER.law;
+    for (hz, kmh, age_ms) in [
+        (0.5, 60.0, 50),
+        (0.5, 60.0, 100),
+        (0.5, 100.0, 100),
+        (0.5, 130.0, 150),
+        (1.0, 60.0, 100),
+        (1.0, 100.0, 100),
+    ] {
+        let v = kmh / 3.6;
+        let omega = hz * std::f64::consts::TAU;
+        // Heading, its rate, its rate's rate, and the way to the side.
+        let psi = |t: f64| 0.02 * (omega * t).sin();
+        let rate = |t: f64| 0.02 * omega * (omega * t).cos();
+        let y = |t: f64| -0.02 * v / omega * (omega * t).cos();
+        let errors = |t: f64| [-y(t) - 0.3 * v * psi(t), -psi(t)];
+        let exact = |t: f64| {
+            let [e_y, e_theta] = errors(t);
+            let e_y_rate = -v * psi(t) - 0.3 * v * rate(t);
+            0.25 * (2.0 * e_y + 0.05 * e_y_rate + 40.0 * e_theta - rate(t))
+        };
+        let clock = Instant::from_us(u32::MAX - 900_000);
+        let mut past = Past::new();
+        let [mut late, mut plain] = [LawState::NEW; 2];
+        let mut old = LaneSample::default();
+        let [mut worst, mut worst_plain, mut most]: [f64; 3] = [0.0; 3];
+        for ms in 0..6000_u32 {
+            let (t, now) = (f64::from(ms) * 1e-3, clock.after(Micros::from_ms(ms)));
+            if ms % 10 == 0 {
+                past.turn(now, TurningRate::from_rad_per_s(rate(t)));
+            }
+            if ms % 33 == 0 && ms >= age_ms {
+                let [e_y, e_theta] = errors(t - f64::from(age_ms) * 1e-3);
+                old = LaneSample {
+                    e_y: Metres::from_m(e_y),
+                    e_theta: Radians::from_rad(e_theta),
+                    at: clock.after(Micros::from_ms(ms - age_ms)),
+                };
+            }
+            let without = law.step(&mut plain, now, old, &Since::NOTHING).nm();
+            // What the controller makes of the past.
+            let (turned, then) = past.turned(now, old.at);
+            let age_s = f64::from(now.since(old.at).us()) * 1e-6;
+            let since = Since::new(
+                Radians::from_rad(turned.rad() - then.rad_per_s() * age_s),
+                TurningRate::from_rad_per_s(rate(t) - then.rad_per_s()),
+                Speed::from_m_per_s(v),
+                Metres::from_m(0.3 * v),
+            );
+            let with = law.step(&mut late, now, old, &since).nm();
+            if ms > 1000 {
+                most = most.max(exact(t).abs());
+                worst = worst.max((with - exact(t)).abs());
+                worst_plain = worst_plain.max((without - exact(t)).abs());
+            }
+        }
+        println!(
+            "{hz} Hz, {kmh} km/h, {age_ms} ms old at 30 Hz: {worst:.3} N.m off of {most:.3}, by its rates alone {worst_plain:.3}"
+        );
+        assert!(
+            worst < 0.25 * worst_plain,
+            "{hz} {kmh} {age_ms}: {worst} {worst_plain}"
+        );
+    }
+}

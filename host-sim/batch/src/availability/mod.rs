@@ -1,0 +1,250 @@
+//! How often the ECU hands over although nothing is wrong: many cars on many roads, for hours.
+//!
+//! A *leg* is five minutes of driving: a car of the population on a road of its own, with a driver who keeps the lane as
+//! people do. It begins engaged. After every handover the driver drives alone, and asks for guidance again 5 s later. A
+//! leg ends where the ECU latches a fault: only a standstill would end that. A *declaration* is what took guidance away; as
+//! nothing is wrong in any leg, each is a false one. A *world* says what is real (`haptic_sim::worlds`).
+//!
+//! Legs of one number and road share course, driver, car and noise in every world, so that worlds can be
+//! compared. A leg depends on the seed and on its own number alone: in whatever order and in however many sittings legs
+//! are driven, the results are the same.
+//!
+//! Not here: what is missed. `haptic-campaign` injects faults into the same world.
+
+mod leg;
+mod roads;
+
+use haptic_sim::worlds::WorldKind;
+use rayon::prelude::*;
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+pub use leg::{Declaration, Ended, Leg, LegNumber};
+pub use roads::{ROADS, Road};
+
+/// Length of a leg, s.
+pub const LEG_S: f64 = 300.0;
+/// Cars of the population.
+pub const CARS: u32 = 30;
+
+/// What to drive.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// By name; all if empty.
+    pub worlds: Vec<&'static WorldKind>,
+    /// Roads to drive on.
+    pub roads: Vec<&'static Road>,
+    /// Hours in each world on each road.
+    pub hours: f64,
+    /// Root of all random numbers.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// Every leg, in order.
+    pub fn legs(&self) -> Vec<LegNumber> {
+        let legs = (self.hours * 3600.0 / LEG_S - 1e-9).ceil().max(1.0) as u32;
+        let cells = self
+            .worlds
+            .iter()
+            .flat_map(|world| self.roads.iter().map(move |road| (*world, *road)));
+        cells
+            .flat_map(|(world, road)| (0..legs).map(move |number| LegNumber { world, road, number }))
+            .collect()
+    }
+
+    /// Whether a leg on record is one of these.
+    fn has(&self, leg: &Leg) -> bool {
+        self.legs().iter().any(|number| leg.is(number))
+    }
+}
+
+/// Counts in a time, and what they say of the rate behind them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Rate {
+    /// Events.
+    pub count: u64,
+    /// Events in an hour.
+    pub per_hour: f64,
+    /// The exact 95 % interval of the rate (Garwood 1936), 1/h.
+    pub interval: [f64; 2],
+    /// The rate that is not exceeded with 95 % confidence, 1/h: for zero events three in the time.
+    pub upper_95: f64,
+}
+
+impl Rate {
+    /// Of so many events of a Poisson process in so many hours.
+    pub fn of(count: u64, hours: f64) -> Self {
+        let quantile = |share: f64, degrees: u64| {
+            let law = ChiSquared::new(degrees as f64).expect("positive");
+            0.5 * quantile(&law, share)
+        };
+        let low = if count == 0 {
+            0.0
+        } else {
+            quantile(0.025, 2 * count)
+        };
+        let per = |events: f64| events / hours;
+        Self {
+            count,
+            per_hour: per(count as f64),
+            interval: [per(low), per(quantile(0.975, 2 * count + 2))],
+            upper_95: per(quantile(0.95, 2 * count + 2)),
+        }
+    }
+}
+
+/// By halving: the library's own inverse stops early.
+fn quantile(law: &ChiSquared, share: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    while law.cdf(high) < share {
+        high *= 2.0;
+    }
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if law.cdf(middle) < share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// What driving in a world on a road showed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cell {
+    /// Name of the world.
+    pub world: &'static str,
+    /// Name of the road.
+    pub road: &'static str,
+    /// Whether no declaration is to be expected: nothing in it is beyond what roads and cars are.
+    pub judged: bool,
+    /// Hours driven.
+    pub hours: f64,
+    /// Share of them with guidance.
+    pub available: f64,
+    /// False declarations.
+    pub declarations: Rate,
+    /// The same by the faults that the ECU named, the most frequent first.
+    pub causes: Vec<Cause>,
+    /// Cars that drove.
+    pub cars: usize,
+    /// Cars that had a false declaration.
+    pub cars_with: usize,
+    /// Legs that ended in a latched fault.
+    pub latched: usize,
+    /// Legs in which the vehicle left the road.
+    pub diverged: usize,
+    /// Standard deviation of the lateral position (SDLP), m: mean over the legs.
+    pub sdlp_m: f64,
+    /// Largest lateral error, m.
+    pub largest_error_m: f64,
+}
+
+/// Declarations of one cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cause {
+    /// The faults that the ECU named.
+    pub faults: String,
+    /// How often.
+    pub rate: Rate,
+}
+
+/// What the study found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Availability {
+    /// Root of all random numbers.
+    pub seed: u64,
+    /// Hours asked for in each world on each road.
+    pub hours: f64,
+    /// By world and road.
+    pub cells: Vec<Cell>,
+}
+
+/// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
+///
+/// # Errors
+/// A world that is no scenario; the built-in ones are.
+pub fn study(
+    plan: &Plan,
+    on_record: &[Leg],
+    done: impl Fn(&Leg) -> Result<(), String> + Sync,
+) -> Result<Availability, String> {
+    let missing: Vec<LegNumber> = plan
+        .legs()
+        .into_iter()
+        .filter(|number| !on_record.iter().any(|leg| leg.is(number)))
+        .collect();
+    let driven: Vec<Leg> = missing
+        .into_par_iter()
+        .map(|number| {
+            let leg = number.drive(plan.seed)?;
+            done(&leg)?;
+            Ok(leg)
+        })
+        .collect::<Result<_, String>>()?;
+    let on_record = on_record.iter().filter(|leg| plan.has(leg));
+    Ok(summary(plan, &on_record.chain(&driven).collect::<Vec<_>>()))
+}
+
+fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
+    let cells = plan.worlds.iter().flat_map(|world| {
+        plan.roads.iter().map(|road| {
+            let mut of_cell: Vec<&Leg> = legs
+                .iter()
+                .copied()
+                .filter(|leg| leg.world == world.name && leg.road == road.name)
+                .collect();
+            // Sums are the same in whatever order the legs were driven.
+            of_cell.sort_by_key(|leg| leg.number);
+            cell(world, road, &of_cell)
+        })
+    });
+    Availability {
+        seed: plan.seed,
+        hours: plan.hours,
+        cells: cells.collect(),
+    }
+}
+
+fn cell(world: &WorldKind, road: &Road, legs: &[&Leg]) -> Cell {
+    let sum = |of: fn(&Leg) -> f64| legs.iter().map(|leg| of(leg)).sum::<f64>();
+    let hours = sum(|leg| leg.driven_s) / 3600.0;
+    let declared = || legs.iter().flat_map(|leg| &leg.declarations);
+    let mut names: Vec<&str> = declared().map(|d| d.faults.as_str()).collect();
+    names.sort_unstable();
+    let mut causes: Vec<Cause> = names
+        .chunk_by(|a, b| a == b)
+        .map(|same| Cause {
+            faults: same[0].into(),
+            rate: Rate::of(same.len() as u64, hours),
+        })
+        .collect();
+    causes.sort_by_key(|cause| std::cmp::Reverse(cause.rate.count));
+    let cars = |with: bool| {
+        let chosen = legs.iter().filter(|leg| !with || !leg.declarations.is_empty());
+        chosen
+            .map(|leg| leg.car)
+            .collect::<std::collections::BTreeSet<_>>()
+            .len()
+    };
+    Cell {
+        world: world.name,
+        road: road.name,
+        judged: world.judged,
+        hours,
+        available: sum(|leg| leg.active_s) / (3600.0 * hours),
+        declarations: Rate::of(declared().count() as u64, hours),
+        causes,
+        cars: cars(false),
+        cars_with: cars(true),
+        latched: legs.iter().filter(|leg| leg.ended == Ended::Latched).count(),
+        diverged: legs.iter().filter(|leg| leg.ended == Ended::Diverged).count(),
+        sdlp_m: sum(|leg| leg.sdlp_m) / legs.len() as f64,
+        largest_error_m: legs.iter().map(|leg| leg.largest_error_m).fold(0.0, f64::max),
+    }
+}
+
+#[cfg(test)]
+mod tests;

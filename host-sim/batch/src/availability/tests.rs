@@ -1,0 +1,127 @@
+use haptic_sim::worlds::WORLDS;
+
+use super::*;
+
+/// Exact limits of a Poisson count as tables print them (Garwood 1936; Ulm 1990): 0 to 3.689, 0.0253 to 5.572, 4.795 to
+/// 18.39, 81.36 to 121.63; and three for the one-sided limit of none.
+#[test]
+fn intervals_are_those_of_the_tables() {
+    for (count, low, high) in [
+        (0, 0.0, 3.689),
+        (1, 0.025, 5.572),
+        (10, 4.795, 18.390),
+        (100, 81.364, 121.627),
+    ] {
+        let [from, to] = Rate::of(count, 1.0).interval;
+        assert!(
+            (from - low).abs() < 6e-4 && (to - high).abs() < 6e-4,
+            "{count}: {from} {to}"
+        );
+    }
+    assert!((Rate::of(0, 1.0).upper_95 - 2.9957).abs() < 1e-4);
+    assert!((Rate::of(0, 300.0).upper_95 - 0.009_986).abs() < 1e-6);
+}
+
+fn plan(hours: f64) -> Plan {
+    let named = |name: &str| WORLDS.iter().find(|c| c.name == name).unwrap();
+    Plan {
+        worlds: vec![named("calibrated"), named("everything")],
+        roads: vec![&ROADS[1]],
+        hours,
+        seed: 1,
+    }
+}
+
+#[test]
+fn legs_fill_the_hours_and_the_first_ones_stay_when_there_are_more() {
+    let [few, many] = [plan(0.25), plan(0.5)].map(|plan| plan.legs());
+    assert_eq!((few.len(), many.len()), (6, 12));
+    for leg in &few {
+        let same = many
+            .iter()
+            .find(|other| other.number == leg.number && other.world == leg.world && other.road == leg.road);
+        assert_eq!(same.unwrap().scenario(1), leg.scenario(1));
+    }
+}
+
+/// What is compared must differ in the world alone.
+#[test]
+fn worlds_share_road_driver_and_noise() {
+    let legs = plan(0.1).legs();
+    let of = |world: &str| {
+        let leg = legs.iter().find(|leg| leg.world.name == world && leg.number == 1);
+        leg.unwrap().scenario(3).unwrap()
+    };
+    let (paper, real) = (of("calibrated"), of("everything"));
+    assert_eq!(paper.speed_kmh(), real.speed_kmh());
+    assert_eq!((paper.driver(), paper.gains()), (real.driver(), real.gains()));
+    assert_eq!(paper.seed(), real.seed());
+    let curvatures = |scenario: &haptic_sim::Scenario| {
+        let segments = scenario.course().segments().iter();
+        segments.map(|s| s.curvature_end_1pm).collect::<Vec<_>>()
+    };
+    assert_eq!(curvatures(&paper), curvatures(&real));
+    assert!(paper.course().is_level() && !real.course().is_level());
+    assert_eq!(paper.car().vehicle, *paper.vehicle());
+    assert_ne!(real.car().vehicle, *real.vehicle());
+}
+
+/// The road that was asked for: lateral acceleration within its limit, curves to both sides, and the outer edge of every
+/// curve higher.
+#[test]
+fn roads_are_built_as_they_say() {
+    let leg = plan(0.1)
+        .legs()
+        .into_iter()
+        .find(|leg| leg.world.name == "everything")
+        .unwrap();
+    let scenario = leg.scenario(1).unwrap();
+    let v = scenario.speed_m_per_s();
+    let arcs = || {
+        let segments = scenario.course().segments().iter();
+        segments.filter(|s| s.curvature_start_1pm == s.curvature_end_1pm && s.curvature_start_1pm != 0.0)
+    };
+    assert!((12..22).contains(&arcs().count()), "{}", arcs().count());
+    let mut sides = [0, 0];
+    for arc in arcs() {
+        let lateral = arc.curvature_start_1pm * v * v;
+        assert!((0.3..=2.5).contains(&lateral.abs()), "{lateral}");
+        assert!(arc.bank_rad[0] * lateral < 0.0 && (0.024..0.0601).contains(&arc.bank_rad[0].abs()));
+        sides[usize::from(lateral < 0.0)] += 1;
+    }
+    assert!(sides.iter().all(|n| *n > 2), "{sides:?}");
+}
+
+/// Half of the legs on record: the rest is driven, nothing twice, and the results are those of one sitting.
+#[test]
+fn an_interrupted_study_goes_on_where_it_was() {
+    let plan = plan(0.05);
+    let driven = std::sync::Mutex::new(Vec::new());
+    let keep = |leg: &Leg| {
+        driven.lock().unwrap().push(leg.clone());
+        Ok(())
+    };
+    let whole = study(&plan, &[], keep).unwrap();
+    let mut legs = driven.into_inner().unwrap();
+    assert_eq!(legs.len(), 2);
+    let kept = legs.split_off(1);
+    let again = std::sync::Mutex::new(0);
+    let resumed = study(&plan, &kept, |_| {
+        *again.lock().unwrap() += 1;
+        Ok(())
+    });
+    assert_eq!((resumed, again.into_inner().unwrap()), (Ok(whole.clone()), 1));
+
+    // A competent driver: wanders as people do, and stays in a lane of 3.6 m.
+    for cell in &whole.cells {
+        assert!(
+            (0.1..0.5).contains(&cell.sdlp_m),
+            "{}: {} m",
+            cell.world,
+            cell.sdlp_m
+        );
+        assert_eq!(cell.diverged, 0);
+    }
+    // On paper nothing is declared.
+    assert_eq!(whole.cells[0].declarations.count, 0, "{:?}", whole.cells[0]);
+}

@@ -1,0 +1,67 @@
+//! One drive of a sweep: its scenario driven and measured.
+
+use haptic_analysis::metrics::Window;
+use haptic_sim::fork::simulate_forked;
+use haptic_sim::input::InputError;
+use haptic_sim::scenario::Scenario;
+use haptic_sim::simulation::{Run, simulate};
+
+use super::{Chunk, Point, Sweep};
+use crate::RunRecord;
+use crate::record::{default_window, nominal_peak_m};
+
+/// What came of a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Driven {
+    /// Whether it was stopped because it diverged. Its metrics end there.
+    pub diverged: bool,
+    /// Arc length of its last sample, m.
+    pub end_m: f64,
+    /// A value for each of [`Sweep::metrics`], if it has one.
+    pub metrics: Vec<Option<f64>>,
+}
+
+impl Sweep {
+    /// Drives one point.
+    ///
+    /// # Errors
+    /// As [`Sweep::scenario`].
+    pub fn drive(&self, point: &Point) -> Result<Driven, InputError> {
+        let scenario = self.scenario(point)?;
+        let recovery = self.metrics.iter().any(|d| d.name == "time_to_recover_s");
+        let time_s = scenario.failure().at_s().filter(|_| recovery);
+        let Some(time_s) = time_s else {
+            return Ok(self.measured(&scenario, &simulate(&scenario), None));
+        };
+        // Until the failure the two are one.
+        let forked = simulate_forked(&scenario, &[scenario.failure()]);
+        let (nominal, runs) = forked.map_err(|e| InputError::new(&self.name, e))?;
+        let peak_m = nominal_peak_m(&nominal, self.window_of(&scenario), time_s);
+        Ok(self.measured(&scenario, &runs[0], peak_m))
+    }
+
+    /// Drives a chunk. What it gives follows from the sweep and the number alone.
+    ///
+    /// # Errors
+    /// As [`Sweep::scenario`].
+    pub fn run_chunk(&self, number: u64) -> Result<Chunk, InputError> {
+        let rows = self.drives_of(number).map(|drive| self.drive(&self.point(drive)));
+        Ok(Chunk {
+            number,
+            rows: rows.collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn window_of(&self, scenario: &Scenario) -> Window {
+        self.window.unwrap_or_else(|| default_window(scenario.course()))
+    }
+
+    fn measured(&self, scenario: &Scenario, run: &Run, nominal_peak_m: Option<f64>) -> Driven {
+        let record = RunRecord::new(scenario, run, self.window_of(scenario), nominal_peak_m);
+        Driven {
+            diverged: record.diverged,
+            end_m: record.end_m,
+            metrics: self.metrics.iter().map(|d| (d.value)(&record.metrics)).collect(),
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! A shard's chunks on threads, with progress; and when enough is known.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::{Chunk, Store, Sweep};
+
+/// A part of a sweep: every n-th chunk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    number: u64,
+    of: u64,
+}
+
+impl Shard {
+    /// All of it.
+    pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    /// Shard `number` of `of`, from 1.
+    ///
+    /// # Errors
+    /// A number outside 1 to `of`.
+    pub fn new(number: u64, of: u64) -> Result<Self, String> {
+        if (1..=of).contains(&number) {
+            return Ok(Self { number, of });
+        }
+        Err(format!(
+            "shard {number} of {of}: the first number is 1 to the second"
+        ))
+    }
+
+    pub(super) fn has(self, chunk: u64) -> bool {
+        chunk % self.of == self.number - 1
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text
+            .split_once('/')
+            .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        let (number, of) = parts.ok_or_else(|| format!("{text:?}: a shard is I/N, such as 1/3"))?;
+        Self::new(number, of)
+    }
+}
+
+/// How far a shard is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Drives that are done now.
+    pub done: u64,
+    /// Of these, drives that an earlier start did.
+    pub before: u64,
+    /// Drives of the shard.
+    pub all: u64,
+}
+
+/// Drives what is missing of a shard on so many threads; `progress` is called behind each chunk.
+///
+/// # Errors
+/// A drive that cannot be; what the disk says. Chunks that were finished stay.
+pub fn drive_all(
+    store: &Store,
+    sweep: &Sweep,
+    shard: Shard,
+    threads: usize,
+    progress: impl Fn(Progress) + Sync,
+) -> Result<(), String> {
+    let count = |chunk: u64| {
+        let drives = sweep.drives_of(chunk);
+        drives.end - drives.start
+    };
+    let all = (0..sweep.chunks())
+        .filter(|chunk| shard.has(*chunk))
+        .map(count)
+        .sum();
+    let missing = store.missing(shard);
+    let before = all - missing.iter().copied().map(count).sum::<u64>();
+    let state = Mutex::new(Progress {
+        done: before,
+        before,
+        all,
+    });
+    let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let prefix = Mutex::new(Prefix {
+        watch: Watch::new(sweep),
+        next: 0,
+    });
+    progress(Progress {
+        done: before,
+        before,
+        all,
+    });
+    let work = || -> Result<(), String> {
+        while !stopped.load(Ordering::Relaxed) {
+            let Some(number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                break;
+            };
+            let chunk = sweep.run_chunk(*number).map_err(|e| e.to_string())?;
+            store
+                .put(*number, &chunk.to_bytes(store.fingerprint()))
+                .map_err(|e| e.to_string())?;
+            let mut now = state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            now.done += chunk.rows.len() as u64;
+            progress(*now);
+            drop(now);
+            if sweep.stop.is_some() {
+                let mut prefix = prefix.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                if prefix.advance(store) {
+                    stopped.store(true, Ordering::Relaxed);
+                }
+            }
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.max(1))
+            .map(|_| {
+                scope.spawn(|| {
+                    let result = work();
+                    if result.is_err() {
+                        stopped.store(true, Ordering::Relaxed);
+                    }
+                    result
+                })
+            })
+            .collect();
+        let results: Vec<_> = workers.into_iter().map(|worker| worker.join()).collect();
+        results
+            .into_iter()
+            .try_for_each(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })
+}
+
+/// The chunks from the first on without a gap, whoever drove them.
+struct Prefix {
+    watch: Watch,
+    next: u64,
+}
+
+impl Prefix {
+    fn advance(&mut self, store: &Store) -> bool {
+        while let Some(chunk) = store.get(self.next) {
+            self.next += 1;
+            if self.watch.add(&chunk) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// The mean of a metric over samples, chunk by chunk in order: whether it is known well enough. A sample's drives
+/// (grid and repeats) count as one observation, their mean: they are not independent of each other.
+#[derive(Debug, Clone)]
+pub(super) struct Watch {
+    metric: Option<usize>,
+    half_width: f64,
+    quantile: f64,
+    least: u64,
+    block: u64,
+    next_drive: u64,
+    sum: f64,
+    with_value: u64,
+    count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Watch {
+    pub(super) fn new(sweep: &Sweep) -> Self {
+        let stop = sweep.stop.as_ref();
+        let standard = Normal::standard();
+        Self {
+            metric: stop.and_then(|stop| sweep.metrics().iter().position(|d| d.name == stop.metric)),
+            half_width: stop.map_or(0.0, |stop| stop.half_width),
+            quantile: stop.map_or(0.0, |stop| standard.inverse_cdf(0.5 + stop.confidence / 2.0)),
+            least: stop.map_or(0, |stop| stop.least.max(2)),
+            // With nothing sampled the repeats are the observations.
+            block: if sweep.sampled.is_empty() {
+                1
+            } else {
+                sweep.drives_of_a_sample()
+            },
+            next_drive: 0,
+            sum: 0.0,
+            with_value: 0,
+            count: 0,
+            mean: 0.0,
+            squares: 0.0,
+        }
+    }
+
+    /// Takes the next chunk; whether it is the last that is needed.
+    pub(super) fn add(&mut self, chunk: &Chunk) -> bool {
+        let Some(metric) = self.metric else { return false };
+        for row in &chunk.rows {
+            if let Some(value) = row.metrics[metric] {
+                self.sum += value;
+                self.with_value += 1;
+            }
+            self.next_drive += 1;
+            if self.next_drive.is_multiple_of(self.block) {
+                self.observe();
+            }
+        }
+        let variance = self.squares / (self.count.max(2) - 1) as f64;
+        self.count >= self.least && self.quantile * (variance / self.count as f64).sqrt() <= self.half_width
+    }
+
+    fn observe(&mut self) {
+        if self.with_value > 0 {
+            // Welford's sums.
+            let value = self.sum / self.with_value as f64;
+            self.count += 1;
+            let before = value - self.mean;
+            self.mean += before / self.count as f64;
+            self.squares += before * (value - self.mean);
+        }
+        (self.sum, self.with_value) = (0.0, 0);
+    }
+}

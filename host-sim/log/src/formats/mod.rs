@@ -1,0 +1,258 @@
+//! Recordings in the formats of other tools, told apart by the extension of the file's name.
+//!
+//! | extension | what | read | written |
+//! |---|---|---|---|
+//! | `.csv` | a table; units in the name or in brackets behind it | yes | yes |
+//! | `.parquet` | a table; units in the file's metadata (feature `parquet`) | yes | yes |
+//! | `.mat` | MATLAB level 5, vectors with a struct `units` | yes | yes |
+//! | `.mf4` | ASAM MDF 4 | yes | yes |
+//! | `.mcap` | MCAP, JSON messages | no | yes |
+//! | `.log` | candump | frames | frames |
+//! | `.asc`, `.blf` | Vector's logs | frames | frames |
+//!
+//! What holds frames needs a DBC file to become channels. A file that is damaged is refused in one sentence: nothing here
+//! indexes or allocates by what a file says without a look at how much there is.
+
+pub mod asc;
+pub mod blf;
+mod bytes;
+mod calendar;
+mod csv;
+pub mod dbc;
+mod mat;
+mod mcap;
+mod mdf;
+#[cfg(feature = "parquet")]
+mod parquet;
+
+use std::path::Path;
+
+use crate::candump::{self, CandumpFrame};
+use crate::recording::{Group, Recording, RecordingError, Series};
+use crate::units;
+
+/// A format, by its extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Format {
+    /// `.csv`
+    Csv,
+    /// `.parquet`
+    Parquet,
+    /// `.mat`
+    Mat,
+    /// `.mf4`
+    Mdf4,
+    /// `.mcap`
+    Mcap,
+    /// `.log`
+    Candump,
+    /// `.asc`
+    Asc,
+    /// `.blf`
+    Blf,
+}
+
+/// Extensions and their formats; the first of a format is the usual one.
+const EXTENSIONS: [(&str, Format); 10] = [
+    ("csv", Format::Csv),
+    ("parquet", Format::Parquet),
+    ("mat", Format::Mat),
+    ("mf4", Format::Mdf4),
+    ("mdf", Format::Mdf4),
+    ("mcap", Format::Mcap),
+    ("log", Format::Candump),
+    ("candump", Format::Candump),
+    ("asc", Format::Asc),
+    ("blf", Format::Blf),
+];
+
+impl Format {
+    /// The format of a file's name.
+    ///
+    /// # Errors
+    /// No extension that is known, with those that are.
+    pub fn of(path: &Path) -> Result<Self, RecordingError> {
+        let extension = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
+        let found = EXTENSIONS.iter().find(|(known, _)| *known == extension);
+        found.map(|(_, format)| *format).ok_or_else(|| {
+            let known: Vec<String> = EXTENSIONS.iter().map(|(known, _)| format!(".{known}")).collect();
+            let what = if extension.is_empty() {
+                "no extension".into()
+            } else {
+                format!("the extension .{extension}")
+            };
+            RecordingError(format!(
+                "{}: {what} says which format it is; one of {} is wanted",
+                path.display(),
+                known.join(", ")
+            ))
+        })
+    }
+
+    /// Whether it holds frames of a bus.
+    #[must_use]
+    pub const fn holds_frames(self) -> bool {
+        matches!(self, Self::Candump | Self::Asc | Self::Blf)
+    }
+}
+
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Contents {
+    /// Channels.
+    Channels(Recording),
+    /// Frames of a bus, in the order of the file.
+    Frames(Vec<CandumpFrame>),
+}
+
+/// The column that is the time where it has another name than `time_s`, and what makes it seconds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeColumn {
+    /// Its name.
+    pub name: String,
+    /// What its values are multiplied by; its own unit decides if none is given.
+    pub scale: Option<f64>,
+}
+
+/// Reads the file at `path`.
+///
+/// # Errors
+/// What cannot be read, with the file, and the channel where one is the reason.
+pub fn read(path: &Path, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
+    let format = Format::of(path)?;
+    let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
+    let bytes = std::fs::read(path).map_err(|e| named(e.to_string().into()))?;
+    read_bytes(bytes, format, time).map_err(named)
+}
+
+/// Reads a file's bytes.
+///
+/// # Errors
+/// As [`read`], without the file's name.
+pub fn read_bytes(
+    bytes: Vec<u8>,
+    format: Format,
+    time: Option<&TimeColumn>,
+) -> Result<Contents, RecordingError> {
+    contents(bytes, format, time).map_err(RecordingError::printable)
+}
+
+fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result<Contents, RecordingError> {
+    let text = |bytes: Vec<u8>| {
+        String::from_utf8(bytes).map_err(|e| {
+            let place = e.utf8_error().valid_up_to();
+            RecordingError(format!("byte {place}: this is no text"))
+        })
+    };
+    let table = match format {
+        Format::Candump => return Ok(Contents::Frames(candump::parse(&text(bytes)?)?)),
+        Format::Asc => return Ok(Contents::Frames(asc::parse(&text(bytes)?)?)),
+        Format::Blf => return Ok(Contents::Frames(blf::parse(&bytes)?)),
+        Format::Mdf4 => return Ok(Contents::Channels(mdf::read(&bytes)?.described())),
+        Format::Mcap => {
+            return Err("MCAP is written, not read: convert from what it was made of"
+                .to_owned()
+                .into());
+        }
+        Format::Csv => csv::read(&bytes)?,
+        Format::Mat => mat::read(&bytes)?,
+        #[cfg(feature = "parquet")]
+        Format::Parquet => parquet::read(bytes)?,
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => return Err(NO_PARQUET.to_owned().into()),
+    };
+    Ok(Contents::Channels(with_time(table, time)?.described()))
+}
+
+#[cfg(not(feature = "parquet"))]
+const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the command line host-sim does";
+
+/// Columns of a table, the time among them, as a recording.
+fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Recording, RecordingError> {
+    let (wanted, scale) = time.map_or(("time_s", None), |t| (t.name.as_str(), t.scale));
+    let Some(place) = columns.iter().position(|c| c.name.eq_ignore_ascii_case(wanted)) else {
+        let names: Vec<&str> = columns.iter().take(8).map(|c| c.name.as_str()).collect();
+        return Err(format!(
+            "there is no channel {wanted}; if another one is the time, --map time_s=NAME says so (there are {})",
+            if names.is_empty() { "none".into() } else { names.join(", ") }
+        )
+        .into());
+    };
+    let time = columns.remove(place);
+    let unit = if time.unit.is_empty() {
+        units::of_name(&time.name).unwrap_or("s")
+    } else {
+        &time.unit
+    };
+    let factor = scale.or_else(|| units::factor(unit, "s")).ok_or_else(|| {
+        RecordingError(format!(
+            "channel {}: its unit {unit:?} is no unit of time",
+            time.name
+        ))
+    })?;
+    if let Some(other) = columns.iter().find(|c| c.values.len() != time.values.len()) {
+        let (found, rows) = (other.values.len(), time.values.len());
+        return Err(format!(
+            "channel {}: {found} values where {} has {rows}",
+            other.name, time.name
+        )
+        .into());
+    }
+    // 1.0 changes no bit.
+    let time_s = time.values.iter().map(|t| t * factor).collect();
+    Ok(Recording {
+        groups: vec![Group {
+            name: String::new(),
+            time_s,
+            channels: columns,
+        }],
+    })
+}
+
+/// Writes channels into the file at `path`.
+///
+/// # Errors
+/// A format of frames, channels that it cannot hold, what the disk says; with the file.
+pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
+    let named = |e: RecordingError| RecordingError(format!("{}: {e}", path.display()));
+    let bytes = match Format::of(path)? {
+        Format::Csv => csv::write(&recording.into_one_group().map_err(named)?),
+        Format::Mat => mat::write(&recording.into_one_group().map_err(named)?),
+        Format::Mdf4 => mdf::write(&recording),
+        Format::Mcap => mcap::write(&recording),
+        #[cfg(feature = "parquet")]
+        Format::Parquet => parquet::write(&recording.into_one_group().map_err(named)?),
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => Err(NO_PARQUET.to_owned().into()),
+        Format::Candump | Format::Asc | Format::Blf => Err(
+            "a table of channels has no frames, and a bus log nothing else; `host-sim run --bus-log` records the bus".to_owned().into(),
+        ),
+    };
+    std::fs::write(path, bytes.map_err(named)?).map_err(|e| named(e.to_string().into()))
+}
+
+/// Writes frames into the file at `path`.
+///
+/// # Errors
+/// A format of channels, what the disk says; with the file.
+pub fn write_frames(path: &Path, frames: &[CandumpFrame]) -> Result<(), RecordingError> {
+    let named = |e: String| RecordingError(format!("{}: {e}", path.display()));
+    let bytes = match Format::of(path)? {
+        Format::Candump => {
+            let mut out = Vec::new();
+            for frame in frames {
+                candump::write_frame(&mut out, frame).map_err(|e| named(e.to_string()))?;
+            }
+            out
+        }
+        Format::Asc => asc::write(frames),
+        Format::Blf => blf::write(frames),
+        _ => return Err(named("frames become channels by a DBC file first".into())),
+    };
+    std::fs::write(path, bytes).map_err(|e| named(e.to_string()))
+}

@@ -1,0 +1,170 @@
+//! Channels of several groups over one list of instants.
+
+use super::{Group, Recording, RecordingError, Series};
+
+impl Recording {
+    /// All channels over one list of instants: those of every group. Where a channel has no value of its own it is NaN.
+    ///
+    /// # Errors
+    /// Instants of a group that do not grow, where there is more than one group.
+    pub fn into_one_group(self) -> Result<Group, RecordingError> {
+        self.check_names()?;
+        if self.groups.len() <= 1 {
+            return Ok(self.groups.into_iter().next().unwrap_or_default());
+        }
+        let many = |name: &str| {
+            self.groups
+                .iter()
+                .flat_map(|g| &g.channels)
+                .filter(|c| c.name == name)
+                .count()
+                > 1
+        };
+        let mut time_s: Vec<f64> = self
+            .groups
+            .iter()
+            .flat_map(|g| g.time_s.iter().copied())
+            .collect();
+        time_s.sort_by(f64::total_cmp);
+        time_s.dedup();
+        let mut channels = Vec::new();
+        for group in &self.groups {
+            // Two frames of a message with one time stamp: the later one counts.
+            let places: Vec<usize> = group
+                .time_s
+                .iter()
+                .map(|t| time_s.partition_point(|u| u.total_cmp(t).is_lt()))
+                .collect();
+            for channel in &group.channels {
+                let mut values = vec![f64::NAN; time_s.len()];
+                for (place, value) in places.iter().zip(&channel.values) {
+                    values[*place] = *value;
+                }
+                let name = if many(&channel.name) {
+                    format!("{}.{}", group.name, channel.name)
+                } else {
+                    channel.name.clone()
+                };
+                channels.push(Series {
+                    name,
+                    values,
+                    ..channel.clone()
+                });
+            }
+        }
+        Ok(Group {
+            name: String::new(),
+            time_s,
+            channels,
+        })
+    }
+
+    /// Two channels of one group by one name could not be told apart in a file.
+    fn check_names(&self) -> Result<(), RecordingError> {
+        for group in &self.groups {
+            let mut names: Vec<&str> = group.channels.iter().map(|c| c.name.as_str()).collect();
+            names.sort_unstable();
+            if let Some(twice) = names.windows(2).find(|w| w[0] == w[1]) {
+                return Err(format!("channel {} is there twice", twice[0]).into());
+            }
+        }
+        Ok(())
+    }
+
+    /// All channels every `1/rate_hz` s, over the time that all cover: values that steps describe (integers) as held, others
+    /// on the line between their neighbours.
+    ///
+    /// # Errors
+    /// No time that all channels cover, instants that do not grow, more than 100 million values.
+    pub fn resampled(&self, rate_hz: f64) -> Result<Group, RecordingError> {
+        let whole = |name: &str| {
+            let mut all = self
+                .groups
+                .iter()
+                .flat_map(|g| &g.channels)
+                .filter(|c| c.name == name);
+            all.all(|c| c.values.iter().all(|v| v.is_nan() || v.fract() == 0.0))
+        };
+        self.on_grid(rate_hz, whole)
+    }
+
+    /// As [`Recording::resampled`], with a say in which channels are held.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn on_grid(&self, rate_hz: f64, held: impl Fn(&str) -> bool) -> Result<Group, RecordingError> {
+        const MOST_VALUES: f64 = 1e8;
+        self.check_names()?;
+        let channels: Vec<(&Group, &Series)> = self
+            .groups
+            .iter()
+            .flat_map(|g| g.channels.iter().map(move |c| (g, c)))
+            .collect();
+        let with_values = |g: &Group, c: &Series| -> (Vec<f64>, Vec<f64>) {
+            g.time_s
+                .iter()
+                .zip(&c.values)
+                .filter(|(_, v)| !v.is_nan())
+                .map(|(t, v)| (*t, *v))
+                .unzip()
+        };
+        let mut courses = Vec::new();
+        for (group, channel) in channels {
+            if let Some(k) = group.step_back() {
+                let name = &channel.name;
+                return Err(format!("channel {name}: row {}: the time does not grow", k + 2).into());
+            }
+            let (time_s, values) = with_values(group, channel);
+            if !time_s.is_empty() {
+                courses.push((channel, time_s, values));
+            }
+        }
+        let from = courses
+            .iter()
+            .map(|(_, t, _)| t[0])
+            .fold(f64::NEG_INFINITY, f64::max);
+        let to = courses
+            .iter()
+            .map(|(_, t, _)| t[t.len() - 1])
+            .fold(f64::INFINITY, f64::min);
+        let rows = ((to - from) * rate_hz + 1e-6).floor() + 1.0;
+        if courses.is_empty() || rows < 1.0 {
+            return Err("the channels have no time in common".to_owned().into());
+        }
+        if rows * courses.len() as f64 > MOST_VALUES {
+            return Err(format!("{rows_f} rows at {rate_hz} Hz are too many", rows_f = rows as u64).into());
+        }
+        let time_s: Vec<f64> = (0..rows as usize).map(|k| from + k as f64 / rate_hz).collect();
+        let channels = courses
+            .into_iter()
+            .map(|(channel, t, v)| Series {
+                values: on_grid(&t, &v, &time_s, held(&channel.name)),
+                ..channel.clone()
+            })
+            .collect();
+        Ok(Group {
+            name: String::new(),
+            time_s,
+            channels,
+        })
+    }
+}
+
+/// Values of a course at rising instants: as held, or on the line between neighbours. Instants up to a microsecond before a
+/// value have it already, as clocks round.
+fn on_grid(time_s: &[f64], values: &[f64], at_s: &[f64], held: bool) -> Vec<f64> {
+    let mut k = 0;
+    at_s.iter()
+        .map(|&t| {
+            while k + 1 < time_s.len() && time_s[k + 1] <= t + 1e-6 {
+                k += 1;
+            }
+            let next = (k + 1).min(time_s.len() - 1);
+            if held || time_s[next] <= time_s[k] {
+                values[k]
+            } else {
+                values[k] + (t - time_s[k]) / (time_s[next] - time_s[k]) * (values[next] - values[k])
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,214 @@
+//! A recording as one table of channels, whatever file it came from: each has a name, a unit, a source and the instants of
+//! its values.
+//!
+//! Channels that share their instants are a [`Group`]. A CSV file has one group, a bus one for each message. Not here: what
+//! the channels mean.
+
+mod grid;
+
+use std::fmt;
+
+use crate::trace::{CHANNELS, Trace};
+use crate::units;
+
+/// A channel of a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// Its name in the file.
+    pub name: String,
+    /// Its unit; empty if the file does not say.
+    pub unit: String,
+    /// Who measured or sent it; empty if the file does not say.
+    pub source: String,
+    /// Its values; NaN where there is none.
+    pub values: Vec<f64>,
+}
+
+/// Channels with the same instants.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Group {
+    /// Name of the group: a message, or nothing.
+    pub name: String,
+    /// The instants, s.
+    pub time_s: Vec<f64>,
+    /// The channels, each with as many values as there are instants.
+    pub channels: Vec<Series>,
+}
+
+/// Everything that a file holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recording {
+    /// The groups, in the order of the file.
+    pub groups: Vec<Group>,
+}
+
+/// Why a recording was refused: one sentence with channel and reason, and the file where one is known.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordingError(pub(crate) String);
+
+impl fmt::Display for RecordingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for RecordingError {}
+
+impl RecordingError {
+    /// One sentence to print, whatever a damaged file calls its channels.
+    #[cfg(feature = "formats")]
+    pub(crate) fn printable(self) -> Self {
+        const LONGEST: usize = 400;
+        let plain = self.0.chars().take(LONGEST);
+        Self(plain.map(|c| if c.is_control() { '?' } else { c }).collect())
+    }
+}
+
+impl From<String> for RecordingError {
+    fn from(sentence: String) -> Self {
+        Self(sentence)
+    }
+}
+
+/// A line of the table of channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Name of the channel.
+    pub name: String,
+    /// Its unit; empty if unknown.
+    pub unit: String,
+    /// Its source; empty if unknown.
+    pub source: String,
+    /// Values a second, in the mean; 0 for fewer than two.
+    pub sample_rate_hz: f64,
+    /// Values that are there.
+    pub samples: usize,
+}
+
+impl Group {
+    /// Values a second, in the mean over the group's instants.
+    #[must_use]
+    pub fn sample_rate_hz(&self) -> f64 {
+        rate_hz(&self.time_s)
+    }
+
+    /// The first instant that is not after the one before it.
+    #[must_use]
+    pub fn step_back(&self) -> Option<usize> {
+        let steps = self.time_s.windows(2);
+        steps
+            .into_iter()
+            .position(|w| w[1].partial_cmp(&w[0]) != Some(std::cmp::Ordering::Greater))
+    }
+}
+
+fn rate_hz(time_s: &[f64]) -> f64 {
+    match time_s {
+        [first, .., last] if last > first => (time_s.len() - 1) as f64 / (last - first),
+        _ => 0.0,
+    }
+}
+
+impl Recording {
+    /// The table of channels.
+    #[must_use]
+    pub fn table(&self) -> Vec<Line> {
+        let lines = self.groups.iter().flat_map(|group| {
+            group.channels.iter().map(|channel| {
+                let there: Vec<f64> = group
+                    .time_s
+                    .iter()
+                    .zip(&channel.values)
+                    .filter(|(_, value)| !value.is_nan())
+                    .map(|(time_s, _)| *time_s)
+                    .collect();
+                Line {
+                    name: channel.name.clone(),
+                    unit: channel.unit.clone(),
+                    source: channel.source.clone(),
+                    sample_rate_hz: rate_hz(&there),
+                    samples: there.len(),
+                }
+            })
+        });
+        lines.collect()
+    }
+
+    /// The channel of a name, or of a group's name, a point and a name.
+    ///
+    /// # Errors
+    /// There is none, with the names that come near; there are several.
+    pub fn find(&self, name: &str) -> Result<(&Group, &Series), RecordingError> {
+        let named = |wanted: &str| -> Vec<(&Group, &Series)> {
+            let all = self
+                .groups
+                .iter()
+                .flat_map(|g| g.channels.iter().map(move |c| (g, c)));
+            all.filter(|(g, c)| c.name == wanted || format!("{}.{}", g.name, c.name) == wanted)
+                .collect()
+        };
+        match named(name)[..] {
+            [found] => Ok(found),
+            [] => Err(format!("there is no channel {name}{}", self.near(name)).into()),
+            [(first, _), (second, _), ..] => Err(format!(
+                "channel {name} is there in groups {:?} and {:?}: say which, as GROUP.{name}",
+                first.name, second.name
+            )
+            .into()),
+        }
+    }
+
+    fn near(&self, name: &str) -> String {
+        let lower = name.to_lowercase();
+        let stem = lower.split(['_', '.', ' ']).next().unwrap_or(&lower);
+        let names = self
+            .groups
+            .iter()
+            .flat_map(|g| &g.channels)
+            .map(|c| c.name.as_str());
+        let (near, all): (Vec<&str>, Vec<&str>) = names.partition(|n| n.to_lowercase().contains(stem));
+        let (said, shown) = match (near.is_empty(), all.is_empty()) {
+            (false, _) => ("near are", near),
+            (true, false) => ("there are", all),
+            (true, true) => return "; there is none at all".into(),
+        };
+        let dots = if shown.len() > 8 { ", .." } else { "" };
+        format!("; {said} {}{dots}", shown[..shown.len().min(8)].join(", "))
+    }
+
+    /// Says of the product's own channels what a file did not say: unit and source.
+    #[must_use]
+    pub fn described(mut self) -> Self {
+        for channel in self.groups.iter_mut().flat_map(|g| &mut g.channels) {
+            if let Some(own) = CHANNELS.iter().find(|own| own.name == channel.name) {
+                if channel.unit.is_empty() {
+                    channel.unit = own.unit.to_owned();
+                }
+                if channel.source.is_empty() {
+                    channel.source = own.source.to_string();
+                }
+            } else if channel.unit.is_empty() {
+                channel.unit = units::of_name(&channel.name).unwrap_or_default().to_owned();
+            }
+        }
+        self
+    }
+}
+
+impl From<&Trace> for Recording {
+    fn from(trace: &Trace) -> Self {
+        let channels = CHANNELS[1..].iter().map(|channel| Series {
+            name: channel.name.into(),
+            unit: channel.unit.into(),
+            source: channel.source.to_string(),
+            values: trace.samples.iter().map(channel.value).collect(),
+        });
+        Self {
+            groups: vec![Group {
+                name: String::new(),
+                time_s: trace.samples.iter().map(|sample| sample.time_s).collect(),
+                channels: channels.collect(),
+            }],
+        }
+    }
+}

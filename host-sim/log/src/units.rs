@@ -1,0 +1,96 @@
+//! Units as files write them, and the factors between those of one quantity.
+
+/// Quantity, a writing of its unit, and how many SI units it is.
+const UNITS: &[(&str, &str, f64)] = &[
+    ("torque", "nm", 1.0),
+    ("torque", "mnm", 1e-3),
+    ("torque", "cnm", 1e-2),
+    ("torque", "knm", 1e3),
+    ("angle", "rad", 1.0),
+    ("angle", "mrad", 1e-3),
+    ("angle", "deg", std::f64::consts::PI / 180.0),
+    ("length", "m", 1.0),
+    ("length", "cm", 1e-2),
+    ("length", "mm", 1e-3),
+    ("length", "km", 1e3),
+    ("length", "ft", 0.3048),
+    ("time", "s", 1.0),
+    ("time", "ms", 1e-3),
+    ("time", "us", 1e-6),
+    ("time", "ns", 1e-9),
+    ("speed", "m/s", 1.0),
+    ("speed", "km/h", 1.0 / 3.6),
+    ("speed", "mph", 0.44704),
+    ("angular rate", "rad/s", 1.0),
+    ("angular rate", "deg/s", std::f64::consts::PI / 180.0),
+    ("curvature", "1/m", 1.0),
+    ("none", "1", 1.0),
+];
+
+/// The last part of a name that has its unit there, as this project's channels have, and the unit.
+const ENDINGS: &[(&str, &str)] = &[
+    ("_rad_per_s", "rad/s"),
+    ("_deg_per_s", "deg/s"),
+    ("_m_per_s", "m/s"),
+    ("_kmh", "km/h"),
+    ("_1pm", "1/m"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_mnm", "mN.m"),
+    ("_nm", "N.m"),
+    ("_mm", "mm"),
+    ("_ms", "ms"),
+    ("_us", "us"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+fn found(unit: &str) -> Option<(&'static str, f64)> {
+    let plain: String = unit
+        .to_lowercase()
+        .replace('°', "deg")
+        .replace("degrees", "deg")
+        .replace("degree", "deg")
+        .replace(['·', '*', '.', '-', ' ', '⋅'], "")
+        .replace("m^1", "1/m")
+        .replace('µ', "u");
+    let plain = match plain.as_str() {
+        "kph" | "kmh" => "km/h",
+        "newtonmeter" | "newtonmetre" => "nm",
+        "radian" | "radians" => "rad",
+        "sec" | "second" | "seconds" => "s",
+        "metre" | "meter" => "m",
+        other => other,
+    };
+    UNITS
+        .iter()
+        .find(|(_, name, _)| *name == plain)
+        .map(|(quantity, _, si)| (*quantity, *si))
+}
+
+/// What a value in `from` is to be multiplied by to be one in `to`; none if they are not of one quantity, or not known.
+///
+/// ```
+/// use haptic_log::units::factor;
+/// assert_eq!(factor("mm", "m"), Some(1e-3));
+/// assert_eq!(factor("Nm", "N.m"), Some(1.0));
+/// assert_eq!(factor("V", "N.m"), None);
+/// ```
+#[must_use]
+pub fn factor(from: &str, to: &str) -> Option<f64> {
+    if from == to {
+        return Some(1.0);
+    }
+    let ((quantity, from), (wanted, to)) = (found(from)?, found(to)?);
+    (quantity == wanted).then_some(from / to)
+}
+
+/// The unit that a name ends with, if it does.
+#[must_use]
+pub fn of_name(name: &str) -> Option<&'static str> {
+    let lower = name.to_ascii_lowercase();
+    ENDINGS
+        .iter()
+        .find(|(ending, _)| lower.ends_with(ending))
+        .map(|(_, unit)| *unit)
+}

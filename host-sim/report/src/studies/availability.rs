@@ -1,0 +1,300 @@
+//! What is shown of how often guidance leaves for nothing: tables, a figure, and the files with both.
+
+use std::path::Path;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_batch::availability::{Availability, Cell as Row, Rate};
+use haptic_campaign::campaign::CaseResult;
+use haptic_sim::worlds::{WORLDS, WorldKind};
+use serde::Serialize;
+
+/// What the study is about.
+pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
+                           The interval is the exact 95 % interval of a Poisson rate.";
+
+/// What is given up for what: false declarations, and faults noticed in the same world.
+#[derive(Debug, Serialize)]
+pub struct Balance {
+    /// Without a fault.
+    #[serde(flatten)]
+    pub availability: Availability,
+    /// With every fault by name.
+    pub detection: Option<Detection>,
+}
+
+/// Faults in a world.
+#[derive(Debug, Serialize)]
+pub struct Detection {
+    /// Name of the world.
+    pub world: &'static str,
+    /// Every row of the campaign.
+    pub rows: Vec<CaseResult>,
+}
+
+impl Detection {
+    /// Rows that ask the ECU to leave, and those in which it did.
+    fn shown(&self) -> impl Iterator<Item = &CaseResult> {
+        self.rows.iter().filter(|row| row.asks_to_leave || row.left > 0)
+    }
+}
+
+/// How often and how soon the ECU leaves when something is wrong.
+pub fn detection_table(faults: &Detection) -> Table {
+    let row = |row: &CaseResult| {
+        let time = |n: usize| Cell::Number {
+            value: row.left_after_ms.map(|times| f64::from(times[n])),
+            decimals: 0,
+        };
+        let metres = |value: Option<f64>| Cell::Number { value, decimals: 2 };
+        vec![
+            Cell::Text(row.name.into()),
+            Cell::Text(row.class.to_string()),
+            Cell::Text(if row.asks_to_leave { "leave" } else { "may go on" }.into()),
+            Cell::number(row.runs as f64, 0),
+            Cell::number(100.0 * row.left as f64 / row.runs as f64, 0),
+            time(0),
+            time(1),
+            metres(Some(row.deviation_m)),
+            metres(row.excess_m),
+        ]
+    };
+    Table {
+        caption: format!("Faults noticed in the world '{}'", faults.world),
+        columns: [
+            "Fault",
+            "Class",
+            "ECU should",
+            "Runs",
+            "Left (%)",
+            "Median (ms)",
+            "Longest (ms)",
+            "Deviation (m)",
+            "Beyond dropping (m)",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: faults.shown().map(row).collect(),
+    }
+}
+
+fn detection_figure(faults: &Detection) -> Figure {
+    let places = || faults.shown().enumerate().map(|(i, row)| (i as f64 + 1.0, row));
+    let left = places()
+        .map(|(x, row)| (x, 100.0 * row.left as f64 / row.runs as f64))
+        .collect();
+    let after = |n: usize| {
+        let times = places().filter_map(|(x, row)| Some((x, 1e-3 * f64::from(row.left_after_ms?[n]))));
+        times.collect::<Vec<_>>()
+    };
+    Figure {
+        rows: faults.shown().map(|row| row.name.into()).collect(),
+        panels: vec![
+            Panel {
+                title: "Runs in which the ECU left".into(),
+                y: Axis {
+                    limits: Some((0.0, 105.0)),
+                    ..Axis::of("%")
+                },
+                series: vec![Series::with_mark("", 2, Mark::Stems, left)],
+            },
+            Panel {
+                title: "From the onset".into(),
+                y: Axis::of("s"),
+                series: vec![
+                    Series::with_mark("longest", 3, Mark::Stems, after(1)),
+                    Series::dots("median", 1, after(0)),
+                ],
+            },
+        ],
+        ..Figure::default()
+    }
+}
+
+/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
+    let detection = results.detection.as_ref().map(detection_figure);
+    if let Some(detection) = &detection {
+        write_figure(directory, "detection", detection)?;
+    }
+    write_json(&directory.join("results.json"), &stamped(results))?;
+    let (results, faults) = (&results.availability, &results.detection);
+    let figure = figure(results);
+    write_figure(directory, "availability", &figure)?;
+    let caption = "False declarations in an hour with their exact 95 % interval, and the time without guidance: two seconds \
+                   of handover and five until the driver asks again."
+        .into();
+    let blocks = vec![
+        Block::Figure { figure, caption },
+        Block::Table(table(results)),
+        Block::Table(causes(results)),
+        Block::Table(worlds()),
+    ];
+    let mut sections = vec![Section {
+        heading: "False declarations".into(),
+        blocks,
+    }];
+    if let (Some(figure), Some(faults)) = (detection, faults) {
+        let caption = format!(
+            "Share of the runs in which the ECU left, and the time from the onset, in the world '{}'. Bars at the left would \
+             be faults that nobody notices.",
+            faults.world
+        );
+        sections.push(Section {
+            heading: "Faults noticed in the same world".into(),
+            blocks: vec![
+                Block::Figure { figure, caption },
+                Block::Table(detection_table(faults)),
+            ],
+        });
+    }
+    write_report(
+        directory,
+        &Report {
+            title: "Guidance that leaves for nothing".into(),
+            summary: SUMMARY.into(),
+            sections,
+            provenance: Some(Provenance::of(None)),
+        },
+    )
+}
+
+/// The results as JSON holds them.
+pub fn stamped(results: &Balance) -> Stamped<'_, Balance> {
+    Provenance::of(None).stamp(results)
+}
+
+fn interval(rate: &Rate) -> Cell {
+    Cell::Text(format!("{:.2} to {:.2}", rate.interval[0], rate.interval[1]))
+}
+
+/// Every world on every road.
+pub fn table(results: &Availability) -> Table {
+    let row = |row: &Row| {
+        vec![
+            Cell::Text(row.world.into()),
+            Cell::Text(row.road.into()),
+            Cell::number(row.hours, 2),
+            Cell::number(row.declarations.count as f64, 0),
+            Cell::number(row.declarations.per_hour, 2),
+            interval(&row.declarations),
+            Cell::Text(format!("{} of {}", row.cars_with, row.cars)),
+            Cell::number(100.0 * (1.0 - row.available), 2),
+            Cell::number(row.latched as f64, 0),
+            Cell::number(row.diverged as f64, 0),
+            Cell::number(row.sdlp_m, 2),
+            Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: [
+            "World",
+            "Road",
+            "Hours",
+            "False declarations",
+            "Per hour",
+            "95 % interval",
+            "Cars with one",
+            "Time without guidance (%)",
+            "Latched",
+            "Off the road",
+            "SDLP (m)",
+            "",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: results.cells.iter().map(row).collect(),
+    }
+}
+
+/// The same by the faults that the ECU named.
+pub fn causes(results: &Availability) -> Table {
+    let rows = results.cells.iter().flat_map(|row| {
+        row.causes.iter().map(|cause| {
+            vec![
+                Cell::Text(row.world.into()),
+                Cell::Text(row.road.into()),
+                Cell::Text(cause.faults.clone()),
+                Cell::number(cause.rate.count as f64, 0),
+                Cell::number(cause.rate.per_hour, 2),
+                interval(&cause.rate),
+            ]
+        })
+    });
+    Table {
+        caption: "By what the ECU named".into(),
+        columns: [
+            "World",
+            "Road",
+            "Faults",
+            "Declarations",
+            "Per hour",
+            "95 % interval",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: rows.collect(),
+    }
+}
+
+/// What is real in each world.
+pub fn worlds() -> Table {
+    let row = |c: &WorldKind| vec![Cell::Text(c.name.into()), Cell::Text(c.what.into())];
+    Table {
+        caption: "What is real in each world".into(),
+        columns: ["World", "What is real"].map(String::from).to_vec(),
+        rows: WORLDS.iter().map(row).collect(),
+    }
+}
+
+fn figure(results: &Availability) -> Figure {
+    let places = || {
+        results
+            .cells
+            .iter()
+            .enumerate()
+            .map(|(i, row)| (i as f64 + 1.0, row))
+    };
+    let rates = places().map(|(x, row)| (x, row.declarations.per_hour)).collect();
+    // A whisker of a figure that lies on its side: a line of its own for each row.
+    let ends = places().map(|(x, row)| {
+        let [low, high] = row.declarations.interval;
+        Series::line("95 % interval", 0, vec![(x, low), (x, high)])
+    });
+    let mut rate: Vec<Series> = ends.collect();
+    rate.push(Series::dots("declarations", 1, rates));
+    let away = places()
+        .map(|(x, row)| (x, 100.0 * (1.0 - row.available)))
+        .collect();
+    let from_zero = |label: &str, most: f64| Axis {
+        limits: Some((0.0, 1.05 * most.max(0.1))),
+        ..Axis::of(label)
+    };
+    let most = |of: fn(&Row) -> f64| results.cells.iter().map(of).fold(0.0, f64::max);
+    Figure {
+        rows: results
+            .cells
+            .iter()
+            .map(|row| format!("{}, {}", row.world, row.road))
+            .collect(),
+        panels: vec![
+            Panel {
+                title: "False declarations".into(),
+                y: from_zero("1/h", most(|row| row.declarations.interval[1])),
+                series: rate,
+            },
+            Panel {
+                title: "Time without guidance".into(),
+                y: from_zero("%", most(|row| 100.0 * (1.0 - row.available))),
+                series: vec![Series::with_mark("", 2, Mark::Stems, away)],
+            },
+        ],
+        ..Figure::default()
+    }
+}

@@ -1,0 +1,146 @@
+//! What a sweep shows: how the metrics are spread, which fields matter, the worst drives and how to drive them again.
+
+mod figures;
+mod tables;
+mod words;
+
+use std::path::Path;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitions_table, write_json};
+use figures::{caption, distribution, influence, response};
+use haptic_analysis::metrics::Definition;
+use haptic_batch::sweep::{Driven, Point, Summary, Sweep};
+
+pub use tables::{short_tables, tables};
+
+/// Rows that a plan shows.
+const FIRST_ROWS: u64 = 5;
+
+/// Writes the figures (SVG, PNG), the summary (JSON) and a report (HTML). `file` is the sweep's, as its commands name it.
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(sweep: &Sweep, summary: &Summary, file: &str, directory: &Path) -> Result<(), OutputError> {
+    let mut sections = Vec::new();
+    let figures = [
+        (
+            "distribution",
+            "How the drives are spread",
+            Some(distribution(summary)),
+        ),
+        ("influence", "What matters most", influence(summary)),
+        ("response", "Along each field", response(summary)),
+    ];
+    let mut tables = tables(sweep, summary, file).into_iter();
+    for (name, heading, figure) in figures {
+        let mut blocks = Vec::new();
+        if let Some(figure) = figure {
+            write_figure(directory, name, &figure)?;
+            blocks.push(Block::Figure {
+                figure,
+                caption: caption(name, summary),
+            });
+        }
+        let own = if name == "influence" { 2 } else { 1 };
+        let filled = tables.by_ref().take(own).filter(|table| !table.rows.is_empty());
+        blocks.extend(filled.map(Block::Table));
+        if !blocks.is_empty() {
+            sections.push(Section {
+                heading: heading.into(),
+                blocks,
+            });
+        }
+    }
+    let rest = tables
+        .map(Block::Table)
+        .chain([Block::Table(definitions_table())]);
+    sections.push(Section {
+        heading: "The worst drives, and what the metrics mean".into(),
+        blocks: rest.collect(),
+    });
+    write_json(&directory.join("summary.json"), summary)?;
+    write_report(
+        directory,
+        &Report {
+            title: "Sweep".into(),
+            summary: headline(summary),
+            sections,
+            provenance: Some(Provenance::of(Some(sweep.text().into()))),
+        },
+    )
+}
+
+/// How many drives, and how many of them are bad.
+pub fn headline(summary: &Summary) -> String {
+    let stopped = if summary.drives < summary.planned {
+        format!(" of {} planned: stopped early, as [stop] asks", summary.planned)
+    } else {
+        String::new()
+    };
+    let mut text = format!(
+        "{} drives{stopped}, design {}, {} diverged.",
+        summary.drives, summary.design, summary.diverged
+    );
+    if let (Some(limit), Some(beyond)) = (summary.limit, summary.beyond) {
+        let share = 100.0 * beyond as f64 / summary.drives.max(1) as f64;
+        text.push_str(&format!(
+            " {beyond} ({share:.2} %) are beyond {} = {limit} or diverged.",
+            summary.judge
+        ));
+    }
+    text
+}
+
+/// What a sweep plans.
+pub fn plan(sweep: &Sweep) -> String {
+    let columns = ["drive", "seed"]
+        .into_iter()
+        .chain(sweep.columns())
+        .map(String::from)
+        .collect();
+    let rows = (0..sweep.drives().min(FIRST_ROWS)).map(|drive| {
+        let point = sweep.point(drive);
+        let own = [Cell::number(drive as f64, 0), Cell::Text(point.seed.to_string())];
+        own.into_iter().chain(values(&point).map(Cell::Text)).collect()
+    });
+    let table = Table {
+        caption: String::new(),
+        columns,
+        rows: rows.collect(),
+    };
+    format!(
+        "{} drives in {} chunks, design {}\n\n{}",
+        sweep.drives(),
+        sweep.chunks(),
+        sweep.design(),
+        table.to_text()
+    )
+}
+
+fn values(point: &Point) -> impl Iterator<Item = String> {
+    point
+        .values
+        .iter()
+        .map(|value| value.as_str().map_or_else(|| value.to_string(), String::from))
+}
+
+/// One drive: what is varied, and what came of it.
+pub fn drive_table(sweep: &Sweep, point: &Point, driven: &Driven) -> Table {
+    let varied = sweep.columns().map(String::from).zip(values(point));
+    let metric = |(definition, value): (&&Definition, &Option<f64>)| {
+        (
+            definition.name.to_string(),
+            value.map_or("-".into(), |value| value.to_string()),
+        )
+    };
+    let own = [
+        ("drive".to_string(), point.drive.to_string()),
+        ("seed".into(), point.seed.to_string()),
+        ("diverged".into(), driven.diverged.to_string()),
+        ("end_m".into(), driven.end_m.to_string()),
+    ];
+    let metrics = sweep.metrics().iter().zip(&driven.metrics).map(metric);
+    Table::of_pairs(["Field", "Value"], own.into_iter().chain(varied).chain(metrics))
+}

@@ -1,0 +1,184 @@
+//! The tables of a sweep.
+
+use super::words::{decimals, heading, label};
+use crate::document::{Cell, Table};
+use haptic_batch::sweep::{Effect, Summary, Sweep};
+
+/// Distributions, shares of the variance, Sobol indices, levels, the worst drives: in this order, some empty.
+pub fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
+    vec![
+        distributions(summary),
+        shares(summary),
+        indices(summary),
+        levels(summary),
+        worst(sweep, summary, file),
+    ]
+}
+
+/// What a terminal shows: of what matters only the metric that judges, and no levels.
+pub fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
+    let judge = summary.judge;
+    let own = Summary {
+        effects: summary
+            .effects
+            .iter()
+            .cloned()
+            .map(|effect| of_metric(effect, judge))
+            .collect(),
+        sobol: summary
+            .sobol
+            .iter()
+            .filter(|index| index.metric == judge)
+            .cloned()
+            .collect(),
+        distributions: summary
+            .distributions
+            .iter()
+            .filter(|of| of.metric == judge)
+            .cloned()
+            .collect(),
+        ..summary.clone()
+    };
+    vec![
+        distributions(summary),
+        shares(&own),
+        indices(&own),
+        worst(sweep, summary, file),
+    ]
+}
+
+fn of_metric(mut effect: Effect, metric: &str) -> Effect {
+    effect.shares.retain(|(name, _)| *name == metric);
+    effect
+}
+
+fn distributions(summary: &Summary) -> Table {
+    let row = |of: &haptic_batch::sweep::Distribution| {
+        let digits = decimals(of.metric);
+        let number = |value| Cell::Number {
+            value,
+            decimals: digits,
+        };
+        let mut cells = vec![Cell::Text(heading(of.metric)), Cell::number(of.count as f64, 0)];
+        cells.extend([number(of.mean), number(of.sd), number(of.min)]);
+        cells.extend(of.quantiles.iter().map(|(_, value)| number(Some(*value))));
+        cells.resize(11, number(None));
+        cells.push(number(of.max));
+        cells
+    };
+    let columns = [
+        "Metric", "Drives", "Mean", "SD", "Least", "5 %", "25 %", "50 %", "75 %", "95 %", "99 %", "Most",
+    ];
+    Table {
+        caption: "How the metrics are spread over the drives".into(),
+        columns: columns.map(String::from).to_vec(),
+        rows: summary.distributions.iter().map(row).collect(),
+    }
+}
+
+fn shares(summary: &Summary) -> Table {
+    let mut columns = vec!["Field".to_string()];
+    columns.extend(summary.distributions.iter().map(|of| label(of.metric)));
+    let row = |effect: &Effect| {
+        let shares = effect.shares.iter().map(|(_, value)| Cell::Number {
+            value: *value,
+            decimals: 3,
+        });
+        [Cell::Text(effect.field.clone())]
+            .into_iter()
+            .chain(shares)
+            .collect()
+    };
+    Table {
+        caption: "Share of each metric's variance that a field explains by itself".into(),
+        columns,
+        rows: summary.effects.iter().map(row).collect(),
+    }
+}
+
+fn indices(summary: &Summary) -> Table {
+    let number = |value| Cell::number(value, 3);
+    let row = |index: &haptic_batch::sweep::SobolIndex| {
+        let [first, total] = [index.first, index.total];
+        let mut cells = vec![Cell::Text(label(index.metric)), Cell::Text(index.field.clone())];
+        cells.extend([first[0], first[1], total[0], total[1]].map(number));
+        cells
+    };
+    Table {
+        caption: "Sobol indices: share of the variance by a field alone, and with all others".into(),
+        columns: ["Metric", "Field", "First order", "SE", "Total", "SE "]
+            .map(String::from)
+            .to_vec(),
+        rows: summary.sobol.iter().map(row).collect(),
+    }
+}
+
+fn levels(summary: &Summary) -> Table {
+    let mut columns = vec![
+        "Field".into(),
+        "Value".into(),
+        "Drives".into(),
+        format!("Mean {}", label(summary.judge)),
+    ];
+    if summary.limit.is_some() {
+        columns.push("Bad (%)".into());
+    }
+    let digits = decimals(summary.judge);
+    let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
+        let mut cells = vec![
+            Cell::Text(effect.field.clone()),
+            Cell::Text(level.label.clone()),
+            Cell::number(level.drives as f64, 0),
+            Cell::Number {
+                value: level.mean,
+                decimals: digits,
+            },
+        ];
+        cells.extend(level.beyond.map(|share| Cell::number(100.0 * share, 2)));
+        cells
+    };
+    let rows = summary
+        .effects
+        .iter()
+        .flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
+    Table {
+        caption: "By value of each field (of a distribution: by sixteenths)".into(),
+        columns,
+        rows: rows.collect(),
+    }
+}
+
+fn worst(sweep: &Sweep, summary: &Summary, file: &str) -> Table {
+    let mut columns = vec!["Drive".to_string()];
+    columns.extend(sweep.columns().map(String::from));
+    columns.extend([heading(summary.judge), "Ended".into(), "Again".into()]);
+    let row = |drive: &haptic_batch::sweep::Worst| {
+        let mut cells = vec![Cell::number(drive.drive as f64, 0)];
+        cells.extend(drive.values.iter().map(|value| Cell::Text(short(value))));
+        cells.push(Cell::Number {
+            value: drive.value,
+            decimals: decimals(summary.judge),
+        });
+        cells.push(Cell::Text(
+            if drive.diverged { "diverged" } else { "at its end" }.into(),
+        ));
+        cells.push(Cell::Text(format!(
+            "host-sim sweep {file} --replay {}",
+            drive.drive
+        )));
+        cells
+    };
+    Table {
+        caption: format!("The worst drives by {}", label(summary.judge)),
+        columns,
+        rows: summary.worst.iter().map(row).collect(),
+    }
+}
+
+/// Six digits tell drives apart.
+fn short(value: &str) -> String {
+    match value.parse::<f64>() {
+        Ok(number) if value.len() > 8 => format!("{number:.6}"),
+        _ => value.into(),
+    }
+}

@@ -1,0 +1,253 @@
+//! A car that is not the one on paper: a scenario says how far cars may differ, a number draws one of them.
+//!
+//! The controller knows the car on paper (`[vehicle]`); the one drawn is what drives. Every quantity is drawn for every
+//! car, also where its tolerance is zero, so that one tolerance more or less leaves the others as they were. A uniform
+//! quantity lies within its tolerance to both sides, a Gaussian one within three standard deviations.
+
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::disturbances::SensorErrors;
+use super::real::WorldParameters;
+use super::vehicle::VehicleParameters;
+use crate::input::{RangeError, in_range};
+
+/// Where a load lies, as a share of the wheelbase behind the front axle: a back seat and a boot.
+const LOAD_PLACE: f64 = 0.75;
+
+/// The table `[tolerances]` of a scenario: how far cars of one kind differ.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Tolerances {
+    /// Which car of the population; without it the scenario's seed draws one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub car: Option<u64>,
+    /// Cornering stiffness of an axle, share to both sides, each axle by itself.
+    pub tyres: f64,
+    /// Trail, share to both sides.
+    pub trail: f64,
+    /// Most load, kg; from none to this.
+    pub load: f64,
+    /// Least friction of the column, N.m, in place of the world's if the most is above zero.
+    pub friction_least: f64,
+    /// Most friction of the column, N.m.
+    pub friction_most: f64,
+    /// Error of the motor, share to both sides.
+    pub motor_error: f64,
+    /// Most lag of the motor, s; from none to this.
+    pub motor_lag: f64,
+    /// Standard deviation of the driver torque sensor's bias, N.m.
+    pub torque_bias: f64,
+    /// Standard deviation of its gain.
+    pub torque_gain: f64,
+    /// Standard deviation of the wheel angle's offset, deg.
+    pub angle_bias: f64,
+    /// Standard deviation of the speed's gain.
+    pub speed_gain: f64,
+    /// Standard deviation of the camera's yaw, mrad.
+    pub camera_yaw: f64,
+    /// Standard deviation of the yaw rate's bias, mrad/s.
+    pub yaw_rate_bias: f64,
+}
+
+/// A car as it is: what a scenario's tables say, with what its tolerances have drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Car {
+    /// Its vehicle.
+    pub vehicle: VehicleParameters,
+    /// Its column and motor, in the scenario's world.
+    pub world: WorldParameters,
+    /// Its sensors.
+    pub sensor_errors: SensorErrors,
+}
+
+/// Draws of one car, in a fixed order.
+struct Draw(Xoshiro256PlusPlus);
+
+impl Draw {
+    /// From -1 to 1.
+    fn both_sides(&mut self) -> f64 {
+        2.0 * self.0.random::<f64>() - 1.0
+    }
+
+    /// From 0 to 1.
+    fn share(&mut self) -> f64 {
+        self.0.random()
+    }
+
+    /// Of unit standard deviation, within three of it.
+    fn normal(&mut self) -> f64 {
+        loop {
+            let value: f64 = StandardNormal.sample(&mut self.0);
+            if value.abs() <= 3.0 {
+                return value;
+            }
+        }
+    }
+}
+
+impl Tolerances {
+    /// Whether every value is one that a population of cars can have.
+    ///
+    /// # Errors
+    /// The first field out of range, with its value and range.
+    pub fn check(&self) -> Result<(), RangeError> {
+        in_range("tyres", self.tyres, 0.0..=0.5, "")?;
+        in_range("trail", self.trail, 0.0..=0.5, "")?;
+        in_range("load", self.load, 0.0..=2000.0, "kg")?;
+        in_range("friction_least", self.friction_least, 0.0..=5.0, "N.m")?;
+        in_range("friction_most", self.friction_most, 0.0..=5.0, "N.m")?;
+        in_range("motor_error", self.motor_error, 0.0..=0.5, "")?;
+        in_range("motor_lag", self.motor_lag, 0.0..=0.1, "s")?;
+        in_range("torque_bias", self.torque_bias, 0.0..=0.5, "N.m")?;
+        in_range("torque_gain", self.torque_gain, 0.0..=0.15, "")?;
+        in_range("angle_bias", self.angle_bias, 0.0..=5.0, "deg")?;
+        in_range("speed_gain", self.speed_gain, 0.0..=0.15, "")?;
+        in_range("camera_yaw", self.camera_yaw, 0.0..=15.0, "mrad")?;
+        in_range("yaw_rate_bias", self.yaw_rate_bias, 0.0..=30.0, "mrad/s")
+    }
+
+    /// The car that `seed` draws around one on paper.
+    pub fn draw(&self, seed: u64, on_paper: &Car) -> Car {
+        let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
+        let mut car = *on_paper;
+        let vehicle = &mut car.vehicle;
+        vehicle.k_f *= 1.0 + self.tyres * draw.both_sides();
+        vehicle.k_r *= 1.0 + self.tyres * draw.both_sides();
+        vehicle.e_t *= 1.0 + self.trail * draw.both_sides();
+        *vehicle = loaded(vehicle, self.load * draw.share());
+        let friction = self.friction_least + (self.friction_most - self.friction_least) * draw.share();
+        if self.friction_most > 0.0 {
+            car.world.friction = friction;
+        }
+        car.world.motor_error += self.motor_error * draw.both_sides();
+        car.world.motor_lag += self.motor_lag * draw.share();
+        let errors = &mut car.sensor_errors;
+        errors.torque_bias += self.torque_bias * draw.normal();
+        errors.torque_gain *= 1.0 + self.torque_gain * draw.normal();
+        errors.angle_bias += self.angle_bias * draw.normal();
+        errors.speed_gain *= 1.0 + self.speed_gain * draw.normal();
+        errors.camera_yaw += self.camera_yaw * draw.normal();
+        errors.yaw_rate_bias += self.yaw_rate_bias * draw.normal();
+        car
+    }
+}
+
+/// The vehicle with a load behind its middle: heavier, slower to turn, its centre of gravity further back.
+fn loaded(vehicle: &VehicleParameters, load_kg: f64) -> VehicleParameters {
+    if load_kg == 0.0 {
+        return *vehicle;
+    }
+    let wheelbase = vehicle.l_f + vehicle.l_r;
+    let m = vehicle.m + load_kg;
+    // How far the load lies behind the centre of gravity without it.
+    let behind = LOAD_PLACE * wheelbase - vehicle.l_f;
+    let shift = load_kg * behind / m;
+    VehicleParameters {
+        m,
+        // Two point masses' worth of turning about the new centre of gravity.
+        i: vehicle.i + vehicle.m * shift * shift + load_kg * (behind - shift) * (behind - shift),
+        l_f: vehicle.l_f + shift,
+        l_r: vehicle.l_r - shift,
+        ..*vehicle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ON_PAPER: fn() -> Car = || Car {
+        vehicle: VehicleParameters::default(),
+        world: WorldParameters::default(),
+        sensor_errors: SensorErrors::default(),
+    };
+
+    fn population(tolerances: Tolerances) -> Vec<Car> {
+        (0..4000).map(|n| tolerances.draw(n, &ON_PAPER())).collect()
+    }
+
+    #[test]
+    fn without_tolerances_every_car_is_the_one_on_paper() {
+        for car in population(Tolerances::default()) {
+            assert_eq!(car, ON_PAPER());
+        }
+    }
+
+    /// By hand: 300 kg at three quarters of 2.635 m lie 0.97625 m behind the centre of gravity of 1100 kg, and move
+    /// it by 300*0.97625/1400 = 0.20920 m; I = 2940 + 1100*0.0437637 + 300*0.588417 = 3164.7.
+    #[test]
+    fn a_load_moves_the_centre_of_gravity_back() {
+        let car = loaded(&VehicleParameters::default(), 300.0);
+        assert_eq!(car.m, 1400.0);
+        assert!((car.l_f - 1.209_196).abs() < 1e-5, "{}", car.l_f);
+        assert!((car.l_f + car.l_r - 2.635).abs() < 1e-12);
+        assert!((car.i - 3164.67).abs() < 0.1, "{}", car.i);
+    }
+
+    #[test]
+    fn a_population_has_the_spread_that_was_asked_for() {
+        let cars = population(Tolerances {
+            tyres: 0.15,
+            friction_least: 0.2,
+            friction_most: 0.4,
+            angle_bias: 1.0,
+            load: 300.0,
+            ..Tolerances::default()
+        });
+        let of = |value: fn(&Car) -> f64| cars.iter().map(value).collect::<Vec<_>>();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let sd = |values: &[f64]| {
+            let m = mean(values);
+            mean(&values.iter().map(|v| (v - m).powi(2)).collect::<Vec<_>>()).sqrt()
+        };
+        let ends = |values: &[f64]| {
+            values
+                .iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+                    [low.min(*v), high.max(*v)]
+                })
+        };
+        let tyres = of(|car| car.vehicle.k_f / 53_300.0);
+        let [low, high] = ends(&tyres);
+        assert!(
+            (0.85..0.852).contains(&low) && (1.148..=1.15).contains(&high),
+            "{low} {high}"
+        );
+        // A uniform share of 15 % has a standard deviation of 15 %/sqrt(3); 4000 draws know it to 1 %.
+        assert!(
+            (sd(&tyres) - 0.15 / 3.0_f64.sqrt()).abs() < 0.003,
+            "{}",
+            sd(&tyres)
+        );
+        let [low, high] = ends(&of(|car| car.world.friction));
+        assert!(
+            (0.2..0.201).contains(&low) && (0.399..=0.4).contains(&high),
+            "{low} {high}"
+        );
+        let angles = of(|car| car.sensor_errors.angle_bias);
+        // Cut at three standard deviations the rest has 0.9866 of it.
+        assert!(
+            mean(&angles).abs() < 0.05 && (sd(&angles) - 0.9866).abs() < 0.04,
+            "{}",
+            sd(&angles)
+        );
+        assert!(angles.iter().all(|a| a.abs() <= 3.0));
+        assert!(cars.iter().all(|car| car.sensor_errors.torque_bias == 0.0));
+    }
+
+    #[test]
+    fn a_tolerance_more_leaves_the_others_as_they_were() {
+        let one = Tolerances {
+            camera_yaw: 1.5,
+            ..Tolerances::default()
+        };
+        let two = Tolerances { tyres: 0.15, ..one };
+        for seed in 0..20 {
+            let [a, b] = [one, two].map(|t| t.draw(seed, &ON_PAPER()).sensor_errors.camera_yaw);
+            assert_eq!(a, b);
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Worlds by name: from the one on paper to what roads, winds, cars and cameras are, and beyond.
+//!
+//! A world is a kind: each drive in it meets another car, another wind and another road.
+
+use crate::models::disturbances::SensorErrors;
+use crate::models::real::{Tyres, WorldParameters};
+use crate::models::tolerances::Tolerances;
+
+/// How a road lies across.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Fall to the right on a straight.
+    pub crossfall: f64,
+    /// Most superelevation of a curve.
+    pub superelevation: f64,
+}
+
+impl Surface {
+    /// No bank anywhere.
+    pub const FLAT: Self = Self {
+        crossfall: 0.0,
+        superelevation: 0.0,
+    };
+
+    /// Bank of a straight, rad: a fall to the right leaves the left edge higher.
+    pub fn straight_rad(&self) -> f64 {
+        self.crossfall.atan()
+    }
+
+    /// Bank of a curve, rad, whose lateral acceleration (left positive) is that share of the sharpest curve's: as design
+    /// rules have it, from the crossfall up, the outer edge higher.
+    pub fn curve_rad(&self, share: f64) -> f64 {
+        let steep = self
+            .crossfall
+            .max(self.superelevation * share.abs())
+            .min(self.superelevation);
+        -steep.atan().copysign(share)
+    }
+}
+
+/// A world to drive in.
+#[derive(Debug, PartialEq)]
+pub struct WorldKind {
+    /// By which it is asked for.
+    pub name: &'static str,
+    /// What is real in it, in words.
+    pub what: &'static str,
+    /// Whether roads and cars are like that, so that every declaration is one too many.
+    pub judged: bool,
+    parts: &'static [Part],
+}
+
+/// One thing that is real.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    /// Dry friction of the column, 0.2 to 0.4 N.m.
+    Friction,
+    /// Tyres that saturate, a trail that falls.
+    Tyres,
+    /// Each car another.
+    Tolerances,
+    /// Crossfall 2.5 %, superelevation to 6 %.
+    Bank,
+    /// Gusts to 600 N and 300 N.m.
+    Wind,
+    /// A motor with lag, error and ripple, each car another.
+    Motor,
+    /// A boost curve.
+    Assist,
+    /// Noise and jitter of a production camera whose delay nobody tells.
+    Camera,
+    /// A road of mu 0.3, and curves to 3 m/s2.
+    Slippery,
+    /// Superelevation to 10 %.
+    Steep,
+    /// A camera that sees nothing for half a second, 30 times an hour.
+    Blind,
+}
+
+use Part::{Assist, Bank, Blind, Camera, Friction, Motor, Slippery, Steep, Wind};
+
+/// Every world, from paper to beyond.
+pub const WORLDS: [WorldKind; 11] = [
+    world("calibrated", "a calibrated car, flat road, no friction", &[]),
+    world(
+        "friction",
+        "friction 0.2 to 0.4 N.m, saturating tyres",
+        &[Friction, Part::Tyres],
+    ),
+    world(
+        "tolerances",
+        "tyres and trail +-15 %, load to 300 kg, wheel angle 1 deg sd, torque sensor 0.08 N.m sd, camera yaw 1.5 mrad sd",
+        &[Part::Tolerances],
+    ),
+    world(
+        "bank",
+        "crossfall 2.5 %, superelevation to 6 %, friction, gusts to 600 N and 300 N.m",
+        &[Bank, Friction, Wind],
+    ),
+    world(
+        "everything",
+        "friction, tyres, tolerances, bank and wind together",
+        EVERYTHING,
+    ),
+    world(
+        "motor",
+        "everything, and a motor with 2 to 20 ms of lag, 10 % of error, 0.02 N.m of ripple",
+        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Motor],
+    ),
+    world(
+        "assist",
+        "everything, and a power assist of 8 N.m at 3 N.m of driver torque, half of it at 60 km/h",
+        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Assist],
+    ),
+    world(
+        "camera",
+        "everything, and a camera 40 ms late that does not say so, 10 ms of jitter, 0.03 m and 2 mrad of noise",
+        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Camera],
+    ),
+    beyond(
+        "slippery",
+        "everything, mu 0.3 and curves to 3 m/s2",
+        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Slippery],
+    ),
+    beyond(
+        "steep",
+        "everything, superelevation to 10 %",
+        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Steep],
+    ),
+    beyond(
+        "blind",
+        "on paper, but the camera sees nothing for 0.5 s, 30 times an hour",
+        &[Blind],
+    ),
+];
+
+const EVERYTHING: &[Part] = &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind];
+
+const fn world(name: &'static str, what: &'static str, parts: &'static [Part]) -> WorldKind {
+    WorldKind {
+        name,
+        what,
+        judged: true,
+        parts,
+    }
+}
+
+const fn beyond(name: &'static str, what: &'static str, parts: &'static [Part]) -> WorldKind {
+    WorldKind {
+        judged: false,
+        ..world(name, what, parts)
+    }
+}
+
+impl WorldKind {
+    fn has(&self, part: Part) -> bool {
+        self.parts.contains(&part)
+    }
+
+    /// How the road lies across.
+    pub fn surface(&self) -> Surface {
+        if !self.has(Bank) {
+            return Surface::FLAT;
+        }
+        Surface {
+            crossfall: 0.025,
+            superelevation: if self.has(Steep) { 0.10 } else { 0.06 },
+        }
+    }
+
+    /// Most lateral acceleration of a curve, where it is not the road's, m/s2.
+    pub fn lateral_m_per_s2(&self) -> Option<f64> {
+        self.has(Slippery).then_some(3.0)
+    }
+
+    /// Tyres, wind, motor and assist.
+    pub fn parameters(&self) -> WorldParameters {
+        let off = WorldParameters::default();
+        WorldParameters {
+            tyres: if self.has(Part::Tyres) {
+                Tyres::Saturating
+            } else {
+                off.tyres
+            },
+            mu: if self.has(Slippery) { 0.3 } else { off.mu },
+            // Three standard deviations are 600 N, and with the lever 300 N.m.
+            gust_sd: if self.has(Wind) { 200.0 } else { off.gust_sd },
+            wind_lever: 0.5,
+            motor_ripple: if self.has(Motor) { 0.02 } else { off.motor_ripple },
+            motor_lag: if self.has(Motor) { 0.002 } else { off.motor_lag },
+            assist: if self.has(Assist) { 8.0 } else { off.assist },
+            ..off
+        }
+    }
+
+    /// How far cars differ.
+    pub fn tolerances(&self, car: u64) -> Tolerances {
+        let mut tolerances = Tolerances {
+            car: Some(car),
+            ..Tolerances::default()
+        };
+        if self.has(Friction) {
+            (tolerances.friction_least, tolerances.friction_most) = (0.2, 0.4);
+        }
+        if self.has(Motor) {
+            (tolerances.motor_lag, tolerances.motor_error) = (0.018, 0.1);
+        }
+        if !self.has(Part::Tolerances) {
+            return tolerances;
+        }
+        Tolerances {
+            tyres: 0.15,
+            trail: 0.15,
+            load: 300.0,
+            torque_bias: 0.08,
+            angle_bias: 1.0,
+            camera_yaw: 1.5,
+            ..tolerances
+        }
+    }
+
+    /// What the camera adds.
+    pub fn sensor_errors(&self) -> SensorErrors {
+        if self.has(Blind) {
+            return SensorErrors {
+                dropouts: 30.0,
+                dropout: 0.5,
+                ..SensorErrors::default()
+            };
+        }
+        if !self.has(Camera) {
+            return SensorErrors::default();
+        }
+        SensorErrors {
+            camera_latency: 0.04,
+            camera_jitter: 0.01,
+            lane_noise: 0.03,
+            heading_noise: 2.0,
+            ..SensorErrors::default()
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! `host-sim availability`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use haptic_batch::availability::{Leg, Plan, ROADS, study};
+use haptic_campaign::table::{self, FaultCase, Place};
+use haptic_campaign::{World, campaign};
+use haptic_report::document::Table;
+use haptic_report::studies::availability::{self as files, Balance, Detection};
+use haptic_sim::worlds::WORLDS;
+
+use super::checkpoint::Checkpoint;
+use super::output::Output;
+use super::{BadInput, Outcome, print, print_json, progress};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Hours in each world on each road, in drives of five minutes
+    #[arg(long, value_name = "H", default_value_t = 0.25)]
+    hours: f64,
+    /// Worlds, by name, separated by commas; default: all (--list shows them)
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    worlds: Vec<String>,
+    /// Roads, by name, separated by commas: motorway, country; default: both
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    roads: Vec<String>,
+    /// Root of all random numbers: which cars, roads, drivers and winds
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000))]
+    seed: u64,
+    /// Keep every drive in FILE as soon as it is done; a run with the same FILE goes on from there
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Fail (exit code 1) if with 95 % confidence the rate of a judged world may be above R an hour
+    #[arg(long, value_name = "R")]
+    most_per_hour: Option<f64>,
+    /// Runs of each fault of the campaign in the world 'everything' (or the last one asked for); 0: none
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    fault_seeds: u64,
+    /// Directory for figures, the results and a report; default: no files
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the results as one JSON object instead of tables
+    #[arg(long)]
+    json: bool,
+    /// Say what is real in each world, and drive nothing
+    #[arg(long, conflicts_with_all = ["out", "json", "checkpoint"])]
+    list: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    if arguments.list {
+        print(&files::worlds().to_text())?;
+        return Ok(Outcome::Good);
+    }
+    let plan = plan(arguments)?;
+    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let (checkpoint, on_record) = match &arguments.checkpoint {
+        None => (None, Vec::new()),
+        Some(path) => {
+            let (checkpoint, legs) = Checkpoint::open::<Leg>(path, &heading(plan.seed)?)?;
+            (Some(checkpoint), legs)
+        }
+    };
+    let bar = progress::bar(plan.legs().len() as u64, "drives of five minutes");
+    bar.inc(
+        plan.legs()
+            .iter()
+            .filter(|number| on_record.iter().any(|leg| leg.is(number)))
+            .count() as u64,
+    );
+    let results = study(&plan, &on_record, |leg| {
+        bar.inc(1);
+        checkpoint
+            .as_ref()
+            .map_or(Ok(()), |checkpoint| checkpoint.add(leg))
+    })?;
+    bar.finish_and_clear();
+    let results = Balance {
+        detection: detection(&plan, arguments.fault_seeds),
+        availability: results,
+    };
+    if let Some(output) = output {
+        output.finish(|place| files::write(&results, place))?;
+    }
+    if arguments.json {
+        print_json(&files::stamped(&results))?;
+    } else {
+        print(&readable(&results))?;
+    }
+    let results = results.availability;
+    let too_many = |most: f64| {
+        results
+            .cells
+            .iter()
+            .any(|cell| cell.judged && cell.declarations.upper_95 > most)
+    };
+    Ok(if arguments.most_per_hour.is_some_and(too_many) {
+        Outcome::Failed
+    } else {
+        Outcome::Good
+    })
+}
+
+fn plan(arguments: &Arguments) -> Result<Plan, BadInput> {
+    if !(arguments.hours > 0.0 && arguments.hours <= 100_000.0) {
+        let message = format!("--hours: {} is outside 0 to 100000 h", arguments.hours);
+        return Err(BadInput(message));
+    }
+    let unknown = |option: &str, name: &str, all: String| {
+        BadInput(format!("{option}: there is no {name}; there are {all}"))
+    };
+    let worlds = chosen(&arguments.worlds, &WORLDS, |c| c.name)
+        .map_err(|(name, all)| unknown("--worlds", &name, all))?;
+    let roads =
+        chosen(&arguments.roads, &ROADS, |r| r.name).map_err(|(name, all)| unknown("--roads", &name, all))?;
+    Ok(Plan {
+        worlds,
+        roads,
+        hours: arguments.hours,
+        seed: arguments.seed,
+    })
+}
+
+/// Those of the names, all if there is none; or the first that is not there, and what there is.
+fn chosen<T>(
+    names: &[String],
+    all: &'static [T],
+    name_of: fn(&T) -> &'static str,
+) -> Result<Vec<&'static T>, (String, String)> {
+    if let Some(name) = names
+        .iter()
+        .find(|name| !all.iter().any(|one| name_of(one) == name.as_str()))
+    {
+        let known: Vec<&str> = all.iter().map(name_of).collect();
+        return Err((name.clone(), known.join(", ")));
+    }
+    let wanted = |one: &&'static T| names.is_empty() || names.iter().any(|name| name == name_of(one));
+    Ok(all.iter().filter(wanted).collect())
+}
+
+/// What the drives of a file belong to: another program drives others.
+fn heading(seed: u64) -> Result<String, BadInput> {
+    let provenance = haptic_report::document::Provenance::of(None);
+    Ok(serde_json::to_string(&serde_json::json!({
+        "study": "availability",
+        "seed": seed,
+        "provenance": provenance,
+    }))?)
+}
+
+/// Every fault in the world that is to be as good as real.
+fn detection(plan: &Plan, seeds: u64) -> Option<Detection> {
+    let named = plan.worlds.iter().find(|world| world.name == "everything");
+    let world = named.or(plan.worlds.last()).filter(|_| seeds > 0)?;
+    let rows: Vec<&'static FaultCase> = table::rows().filter(|row| row.place != Place::Target).collect();
+    let bar = progress::bar(rows.len() as u64 * seeds, "faults");
+    let campaign = campaign::run(&World::real(world), &rows, 1..seeds + 1, || bar.inc(1));
+    bar.finish_and_clear();
+    Some(Detection {
+        world: world.name,
+        rows: campaign.rows,
+    })
+}
+
+fn readable(results: &Balance) -> String {
+    let mut text = format!(
+        "{}\n\n{}",
+        files::SUMMARY,
+        files::table(&results.availability).to_text()
+    );
+    let mut add = |table: Table| {
+        if !table.rows.is_empty() {
+            text.push_str(&format!("\n{}", table.to_text()));
+        }
+    };
+    add(files::causes(&results.availability));
+    if let Some(faults) = &results.detection {
+        add(files::detection_table(faults));
+    }
+    text
+}

@@ -1,0 +1,75 @@
+//! A file to which a long study adds each part as it is done, and from which an interrupted one goes on.
+//!
+//! The first line says what the parts belong to; every other line is one part, as JSON. A line that a cut left unfinished
+//! is driven again.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::BadInput;
+
+/// A file of parts.
+pub(super) struct Checkpoint {
+    path: PathBuf,
+    file: Mutex<File>,
+}
+
+impl Checkpoint {
+    /// Opens the file, or makes it; gives the parts that it holds. `heading` says what they belong to.
+    ///
+    /// # Errors
+    /// Another study's file, or one that cannot be read or written.
+    pub(super) fn open<T: DeserializeOwned>(path: &Path, heading: &str) -> Result<(Self, Vec<T>), BadInput> {
+        let fail = |e: &dyn std::fmt::Display| BadInput(format!("{}: {e}", path.display()));
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(fail(&e)),
+        };
+        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+        let mut lines = whole.lines();
+        if let Some(found) = lines.next().filter(|found| *found != heading) {
+            let what = format!(
+                "belongs to another study; name another file, or delete it\n  it has {found}\n  this is {heading}"
+            );
+            return Err(fail(&what));
+        }
+        let parts = lines
+            .enumerate()
+            .map(|(i, line)| serde_json::from_str(line).map_err(|e| fail(&format!("line {}: {e}", i + 2))))
+            .collect::<Result<_, _>>()?;
+        let mut file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(path)
+            .map_err(|e| fail(&e))?;
+        file.set_len(whole.len() as u64).map_err(|e| fail(&e))?;
+        std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0)).map_err(|e| fail(&e))?;
+        if whole.is_empty() {
+            writeln!(file, "{heading}").map_err(|e| fail(&e))?;
+        }
+        let checkpoint = Self {
+            path: path.to_path_buf(),
+            file: Mutex::new(file),
+        };
+        Ok((checkpoint, parts))
+    }
+
+    /// Adds a part.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub(super) fn add(&self, part: &impl Serialize) -> Result<(), String> {
+        let fail = |e: &dyn std::fmt::Display| format!("{}: {e}", self.path.display());
+        let mut line = serde_json::to_string(part).map_err(|e| fail(&e))?;
+        line.push('\n');
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.write_all(line.as_bytes()).map_err(|e| fail(&e))
+    }
+}

@@ -1,0 +1,135 @@
+//! `host-sim convert IN [OUT]`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use haptic_analysis::identify::HAPTIC_DBC;
+use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::recording::{Recording, RecordingError};
+use haptic_report::document::{Cell, Table};
+use serde::Serialize;
+
+use super::{BadInput, Outcome, print, print_json};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Recording to read; its extension says the format: .csv, .parquet, .mat, .mf4, .log (candump), .asc, .blf
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// File to write, in the format of its extension: one of those, or .mcap. Without it the channels are listed
+    #[arg(value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
+    #[arg(long, value_name = "FILE")]
+    dbc: Option<PathBuf>,
+    /// The channel that is the time, if it is not time_s
+    #[arg(long, value_name = "CHANNEL[*SCALE]")]
+    time: Option<String>,
+    /// Put all channels on an even grid of so many rows a second: whole numbers as held, others on the line between
+    /// neighbours. Without it every instant of every channel is a row
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Print the channels as JSON instead of a table
+    #[arg(long, conflicts_with = "output")]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Channel {
+    name: String,
+    unit: String,
+    source: String,
+    sample_rate_hz: f64,
+    samples: usize,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let time = arguments.time.as_deref().map(time_column).transpose()?;
+    if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
+        return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
+    }
+    let target = arguments.output.as_deref().map(Format::of).transpose()?;
+    let contents = formats::read(&arguments.input, time.as_ref())?;
+    if let (Contents::Frames(frames), Some(output), Some(format)) = (&contents, &arguments.output, target)
+        && format.holds_frames()
+    {
+        if arguments.rate.is_some() {
+            return Err("--rate is for channels, not for frames".into());
+        }
+        formats::write_frames(output, frames)?;
+        eprintln!("{}: {} frames", output.display(), frames.len());
+        return Ok(Outcome::Good);
+    }
+    let named = |e: RecordingError| BadInput(format!("{}: {e}", arguments.input.display()));
+    let mut recording = match contents {
+        Contents::Channels(recording) => recording,
+        Contents::Frames(frames) => {
+            let dbc = match &arguments.dbc {
+                Some(path) => {
+                    std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?
+                }
+                None => HAPTIC_DBC.to_owned(),
+            };
+            formats::dbc::channels(&frames, &dbc).map_err(named)?
+        }
+    };
+    if let Some(rate_hz) = arguments.rate {
+        recording = Recording {
+            groups: vec![recording.resampled(rate_hz).map_err(named)?],
+        };
+    }
+    let table = recording.table();
+    let Some(output) = &arguments.output else {
+        if arguments.json {
+            let channels = table.into_iter().map(|line| Channel {
+                name: line.name,
+                unit: line.unit,
+                source: line.source,
+                sample_rate_hz: line.sample_rate_hz,
+                samples: line.samples,
+            });
+            print_json(&channels.collect::<Vec<_>>())?;
+        } else {
+            print(&listed(&recording).to_text())?;
+        }
+        return Ok(Outcome::Good);
+    };
+    formats::write(output, recording)?;
+    eprintln!("{}: {} channels", output.display(), table.len());
+    Ok(Outcome::Good)
+}
+
+fn listed(recording: &Recording) -> Table {
+    let row = |line: haptic_log::recording::Line| {
+        vec![
+            Cell::Text(line.name),
+            Cell::Text(line.unit),
+            Cell::Text(line.source),
+            Cell::number(line.sample_rate_hz, 3),
+            Cell::Text(line.samples.to_string()),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: ["Channel", "Unit", "Source", "Rate (Hz)", "Values"]
+            .map(String::from)
+            .to_vec(),
+        rows: recording.table().into_iter().map(row).collect(),
+    }
+}
+
+fn time_column(text: &str) -> Result<TimeColumn, BadInput> {
+    let Some((name, scale)) = text.rsplit_once('*') else {
+        return Ok(TimeColumn {
+            name: text.trim().into(),
+            scale: None,
+        });
+    };
+    match scale.trim().parse::<f64>() {
+        Ok(scale) if scale.is_finite() && scale > 0.0 => Ok(TimeColumn {
+            name: name.trim().into(),
+            scale: Some(scale),
+        }),
+        _ => Err(format!("--time {text}: the scale {scale:?} is no number above 0").into()),
+    }
+}

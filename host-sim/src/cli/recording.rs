@@ -1,0 +1,65 @@
+//! A recorded drive as an argument: the file, and what its channels and frames are.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use haptic_analysis::identify::{DriveLog, Mapping, Recording, SingleTrack, open_mapped};
+use haptic_batch::files::load_scenario;
+
+use super::BadInput;
+
+#[derive(Debug, Args)]
+pub(super) struct RecordingArguments {
+    /// Recorded drive: a table (.csv, .parquet, .mat, .mf4) with time_s, e_y_m, e_theta_rad (the driver's points),
+    /// wheel_angle_rad, guidance_torque_nm, driver_torque_nm, or the bus (candump -L, .asc, .blf)
+    #[arg(value_name = "LOG")]
+    pub(super) log: PathBuf,
+    /// What the frames of a recording of the bus mean, if not the built-in core/haptic.dbc
+    #[arg(long, value_name = "FILE")]
+    dbc: Option<PathBuf>,
+    /// The vehicle of a recording of the bus, if not that of table 9: a scenario file whose [vehicle] says what it is. The
+    /// bus does not carry the driver's far point; it is computed with this vehicle
+    #[arg(long, value_name = "FILE.toml")]
+    vehicle: Option<PathBuf>,
+    /// A channel of another name or unit, such as wheel_angle_rad=SteeringAngle*0.0174533 or driver_torque_nm=TorsionBar;
+    /// without a scale its unit is converted if the file says it; may be repeated
+    #[arg(long, value_name = "NAME=CHANNEL[*SCALE]")]
+    map: Vec<String>,
+}
+
+impl RecordingArguments {
+    /// The log, and what a reader of the results has to know of it.
+    pub(super) fn open(&self, manual: bool) -> Result<(DriveLog, Vec<String>), BadInput> {
+        self.open_other(&self.log, manual)
+    }
+
+    /// The same of another file, understood in the same way.
+    pub(super) fn open_other(&self, path: &Path, manual: bool) -> Result<(DriveLog, Vec<String>), BadInput> {
+        let maps = self
+            .map
+            .iter()
+            .map(|map| map.parse())
+            .collect::<Result<Vec<Mapping>, _>>()?;
+        let recording = Recording {
+            dbc: self.dbc.as_deref(),
+            vehicle: self.vehicle.as_deref().map(vehicle).transpose()?,
+            manual,
+        };
+        Ok(open_mapped(path, &maps, &recording)?)
+    }
+}
+
+/// The vehicle of a scenario file, as far as it decides how the vehicle turns.
+fn vehicle(path: &Path) -> Result<SingleTrack, BadInput> {
+    let scenario = load_scenario(path)?;
+    let v = scenario.vehicle();
+    Ok(SingleTrack {
+        m: v.m,
+        i: v.i,
+        l_f: v.l_f,
+        l_r: v.l_r,
+        k_f: v.k_f,
+        k_r: v.k_r,
+        k_t: v.k_t,
+    })
+}

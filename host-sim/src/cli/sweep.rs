@@ -1,0 +1,203 @@
+//! `host-sim sweep FILE.toml`.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use haptic_batch::VERSION;
+use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Summary, Sweep, drive_all};
+use haptic_report::document::write_file;
+use haptic_report::studies::run as run_files;
+use haptic_report::studies::sweep as files;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::output::Output;
+use super::{BadInput, Outcome, print, print_json};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Sweep file (TOML): a scenario, what is varied in it and how, the metrics (docs/sweeps.md)
+    #[arg(value_name = "FILE.toml")]
+    file: PathBuf,
+    /// Directory of the sweep: finished chunks, the table (drives.csv, drives.parquet), summary, figures, report. A sweep
+    /// that was interrupted goes on where it was
+    #[arg(long, value_name = "DIR", default_value = "out/sweep")]
+    out: PathBuf,
+    /// Drive only part I of N, on this machine or another one; the table is made when the last part is done in (or
+    /// copied into) the same directory
+    #[arg(long, value_name = "I/N", default_value = "1/1")]
+    shard: Shard,
+    /// Threads; default: one a core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Instead: drive one row of the table again, and compare it with the table if there is one (exit code 1 if it
+    /// differs); its scenario is in the printed text
+    #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "plan"])]
+    replay: Option<u64>,
+    /// With --replay: also the scenario, the time series, figures and report of that drive into this directory
+    #[arg(long, value_name = "DIR", requires = "replay")]
+    replay_out: Option<PathBuf>,
+    /// Only check the file, and print how many drives it plans, with its first rows
+    #[arg(long)]
+    plan: bool,
+    /// Print the summary as one JSON object instead of tables
+    #[arg(long, conflicts_with_all = ["replay", "plan"])]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let sweep = Sweep::load(&arguments.file)?;
+    if arguments.plan {
+        print(&files::plan(&sweep))?;
+        return Ok(Outcome::Good);
+    }
+    if let Some(drive) = arguments.replay {
+        return replay(arguments, &sweep, drive);
+    }
+    let store = Store::open(&sweep, VERSION, &arguments.out)?;
+    let threads = arguments.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        |threads| threads as usize,
+    );
+    let bar = Bar::new();
+    drive_all(&store, &sweep, arguments.shard, threads, |progress| {
+        bar.show(progress)
+    })?;
+    bar.finish();
+    let summary = match store.finish() {
+        Ok(summary) => summary,
+        Err(error @ StoreError::Missing(..)) if arguments.shard != Shard::WHOLE => {
+            eprintln!("This shard is done. {error}.");
+            return Ok(Outcome::Good);
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let file = arguments.file.display().to_string();
+    match Output::begin(&arguments.out) {
+        Ok(output) => output.finish(|place| files::write(&sweep, &summary, &file, place))?,
+        // Every shard that finds all chunks makes the same files.
+        Err(_) if arguments.shard != Shard::WHOLE => {}
+        Err(error) => return Err(error),
+    }
+    if arguments.json {
+        print_json(&summary)?;
+    } else {
+        print(&readable(&sweep, &summary, &file))?;
+    }
+    eprintln!("Table: {}", arguments.out.join("drives.csv").display());
+    eprintln!("Report: {}", arguments.out.join("report.html").display());
+    Ok(Outcome::Good)
+}
+
+fn readable(sweep: &Sweep, summary: &Summary, file: &str) -> String {
+    let mut text = format!("{}\n", files::headline(summary));
+    for table in files::short_tables(sweep, summary, file) {
+        if !table.rows.is_empty() {
+            text.push_str(&format!("\n{}", table.to_text()));
+        }
+    }
+    text
+}
+
+/// Drives one row again.
+fn replay(arguments: &Arguments, sweep: &Sweep, drive: u64) -> Result<Outcome, BadInput> {
+    let last = sweep.drives().saturating_sub(1);
+    if drive > last {
+        return Err(format!("--replay = {drive} is outside 0 to {last}").into());
+    }
+    let point = sweep.point(drive);
+    let scenario = sweep.scenario(&point)?;
+    let driven = sweep.drive(&point)?;
+    print(&format!(
+        "{}\n{}",
+        scenario.to_toml(),
+        files::drive_table(sweep, &point, &driven).to_text()
+    ))?;
+    if let Some(directory) = &arguments.replay_out {
+        write_drive(&scenario, directory)?;
+    }
+    let stored = arguments.out.join("sweep.toml").exists();
+    let store = if stored {
+        Store::open(sweep, VERSION, &arguments.out).ok()
+    } else {
+        None
+    };
+    let Some(there) = store.and_then(|store| store.get_drive(drive)) else {
+        eprintln!("There is no row to compare with in {}.", arguments.out.display());
+        return Ok(Outcome::Good);
+    };
+    if there == driven {
+        eprintln!("The same bits as in the table of {}.", arguments.out.display());
+        return Ok(Outcome::Good);
+    }
+    eprintln!(
+        "NOT the same as in the table of {}: {there:?}",
+        arguments.out.display()
+    );
+    Ok(Outcome::Failed)
+}
+
+fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), BadInput> {
+    let output = Output::begin(directory)?;
+    let single = haptic_batch::run::run(scenario.clone(), false)?;
+    output.finish(|place| {
+        write_file(&place.join("scenario.toml"), |f| {
+            f.write_all(scenario.to_toml().as_bytes())
+        })?;
+        run_files::write(&single, haptic_report::studies::SeriesFormat::Csv, place)
+    })?;
+    eprintln!("Report: {}", directory.join("report.html").display());
+    Ok(())
+}
+
+/// Progress with rate and time left: a bar on a terminal, a line now and then in a log.
+struct Bar {
+    bar: ProgressBar,
+    since: Instant,
+    lines: std::sync::Mutex<Instant>,
+}
+
+/// Between two lines of a log.
+const BETWEEN_LINES: Duration = Duration::from_secs(30);
+
+impl Bar {
+    fn new() -> Self {
+        let template = "{bar:40} {pos}/{len} drives, {msg}";
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let now = Instant::now();
+        Self {
+            bar: ProgressBar::new(0).with_style(style),
+            since: now,
+            lines: std::sync::Mutex::new(now),
+        }
+    }
+
+    fn show(&self, progress: Progress) {
+        let spent = self.since.elapsed();
+        let rate = (progress.done - progress.before) as f64 / spent.as_secs_f64().max(1e-3);
+        let left = match progress.all - progress.done {
+            0 => "0 s left".into(),
+            _ if rate <= 0.0 => "time left not known yet".into(),
+            drives => format!("{:.0} s left", drives as f64 / rate),
+        };
+        let message = format!("{rate:.1} drives/s, {left}");
+        if !self.bar.is_hidden() {
+            self.bar.set_length(progress.all);
+            self.bar.set_position(progress.done);
+            self.bar.set_message(message);
+            return;
+        }
+        let mut last = self
+            .lines
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        if last.elapsed() >= BETWEEN_LINES || progress.done == progress.all {
+            *last = Instant::now();
+            eprintln!("{}/{} drives, {message}", progress.done, progress.all);
+        }
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

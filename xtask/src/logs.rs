@@ -1,0 +1,54 @@
+//! Recordings in other tools' formats, held against those tools in a virtual environment.
+
+use anyhow::Result;
+
+use crate::tool::{cargo, command, root, run};
+use crate::wheel::environment;
+
+const SCENARIO: &str = "examples/relying-driver.toml";
+const DRIVE: &str = "tests/data/driver-logs/guided-passive.csv";
+const PACKAGES: [&str; 7] = [
+    "asammdf",
+    "cantools",
+    "mcap",
+    "pandas",
+    "pyarrow",
+    "python-can",
+    "scipy",
+];
+/// Of a whole run: enough for every message, and seconds instead of minutes in Python.
+const ROWS: usize = 4000;
+const FRAMES: usize = 40_000;
+
+/// Writes with one side and reads with the other, both ways.
+pub(crate) fn check() -> Result<()> {
+    let place = root().join("target/logs");
+    std::fs::create_dir_all(&place)?;
+    run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
+    let host_sim = root().join("target/release/host-sim");
+    let whole = place.join("run");
+    run(command(&host_sim.to_string_lossy())
+        .args(["run", SCENARIO, "--bus-log", "--out"])
+        .arg(&whole)
+        .stdout(std::process::Stdio::null()))?;
+    let head = |name: &str, lines: usize| -> Result<_> {
+        let text = std::fs::read_to_string(whole.join(name))?;
+        let end = text
+            .match_indices('\n')
+            .nth(lines)
+            .map_or(text.len(), |(at, _)| at + 1);
+        let short = place.join(name);
+        std::fs::write(&short, &text[..end])?;
+        Ok(short)
+    };
+    let (csv, bus) = (head("run.csv", ROWS)?, head("bus.log", FRAMES)?);
+    let python = environment(&root().join("target/python/peers"))?;
+    let python = python.to_string_lossy();
+    run(command(&python)
+        .args(["-m", "pip", "install", "-q"])
+        .args(PACKAGES))?;
+    run(command(&python)
+        .arg("host-sim/log/peers/check.py")
+        .args([&host_sim, &place, &csv, &bus])
+        .arg(DRIVE))
+}
