@@ -21,7 +21,7 @@
 //! What is assumed: K_nms, and t_nms. An arm with another t_nms, 0.06 to 0.15 s, makes an error in proportion to K_hg; the
 //! deviation that is reported is that of the noise plus the largest such error. So it is wide for drivers who resist: 0.39 of K_hg at
 //! 2.5 Hz. (An identification from a whole record tells t_nms too.) A driver who relies on the guidance fully, K_hg 0,
-//! is told from hands off by T_d itself: where it stays within 0.03 N.m for a block there are no hands, and no reading.
+//! is told from hands off by T_d itself: where it stays within 0.012 N.m for half a block there are no hands, and no reading.
 //!
 //! Advisory, and outside the torque path: it computes in f32, with additions, multiplications and divisions
 //! only, none of which is fused, so that host and target agree to the last bit. The work at the end of a
@@ -62,8 +62,9 @@ pub struct Estimator {
 /// What t_nms drivers' arms have, s: the deviation that is reported holds the error that any of them makes.
 pub const T_NMS_RANGE_S: [f64; 2] = [0.06, 0.15];
 
-/// T_d that stays within this band for a whole block is of nobody's hands: 0.03 N.m in units of 2^-24 N.m.
-const QUIET: i32 = 503_316;
+/// T_d that stays within this band for half a block is of nobody's hands: 0.012 N.m, the sensor's last digit up and down,
+/// in units of 2^-24 N.m.
+const QUIET: i32 = 201_327;
 
 /// One sample of the column with the torque that was applied until then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,8 +95,14 @@ pub struct EstimatorState {
     /// Place in the first block's window, in 2^-32 of its length; the second is half a window apart.
     window: u32,
     blocks: [Block; 2],
-    /// Lowest and highest T_d of this half of a block, and of the one before.
-    bands: [[i32; 2]; 2],
+    /// The last T_d.
+    torque: i32,
+    /// Lowest and highest T_d of this half of a block.
+    band: [i32; 2],
+    /// Nobody's hands in the half before.
+    quiet: bool,
+    /// The block that ended and was not read yet.
+    ended: Option<Block>,
     work: Work,
     /// The last step left the work alone.
     spared: bool,
@@ -108,7 +115,7 @@ const NO_BAND: [i32; 2] = [i32::MAX, i32::MIN];
 
 /// Sums of one block, with its window.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Block {
+struct Block {
     /// Whether it was there from the beginning of its window.
     whole: bool,
     weight: f32,
@@ -118,7 +125,7 @@ pub(crate) struct Block {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Complex {
+struct Complex {
     re: f32,
     im: f32,
 }
@@ -149,7 +156,10 @@ impl Estimator {
                 },
                 Block::default(),
             ],
-            bands: [NO_BAND; 2],
+            torque: 0,
+            band: NO_BAND,
+            quiet: false,
+            ended: None,
             work: Work::Nothing,
             spared: false,
             average: Average::new(self.amplitude_nm),
@@ -161,10 +171,17 @@ impl Estimator {
     pub fn step(&self, state: &mut EstimatorState, sample: Option<&Sample>) {
         // A sample is work enough for a step, but must not keep the rest waiting if there is one in every step.
         state.spared = sample.is_some() && !state.spared;
+        if !state.spared {
+            let [low, high] = state.band;
+            state.band = [low.min(state.torque), high.max(state.torque)];
+        }
         state.work = match state.work {
             work if state.spared => work,
-            Work::Nothing => Work::Nothing,
-            Work::Read(block) => self.reading(&block).map_or(Work::Nothing, Work::Average),
+            Work::Nothing => {
+                let reading = state.ended.as_ref().and_then(|block| self.reading(block));
+                state.ended = None;
+                reading.map_or(Work::Nothing, Work::Average)
+            }
             Work::Average(reading) => {
                 state.average.take(reading);
                 Work::Compare {
@@ -182,17 +199,17 @@ impl Estimator {
         let Some(ended) = sample.and_then(|sample| self.add(state, sample)) else {
             return;
         };
-        let [[low, high], [low_before, high_before]] = state.bands;
-        let band = high.max(high_before).saturating_sub(low.min(low_before));
-        state.bands = [NO_BAND, [low, high]];
-        if band < QUIET {
+        let [low, high] = state.band;
+        let (quiet, before) = (high.saturating_sub(low) < QUIET, state.quiet);
+        (state.band, state.quiet) = (NO_BAND, quiet);
+        if quiet || before {
             // A driver who relies on the guidance fully moves the wheel all the same; nobody's hands do not. What was
             // read before is no evidence of who takes it next.
             state.average = Average::new(self.amplitude_nm);
-            state.reading = None;
+            (state.reading, state.ended) = (None, None);
             state.work = Work::Nothing;
         } else if ended.whole {
-            state.work = Work::Read(ended);
+            state.ended = Some(ended);
         }
     }
 
@@ -231,9 +248,7 @@ impl Estimator {
             block.wheel.add(weight, wheel);
             block.applied.add(weight, applied);
         }
-        let torque = sample.driver_torque.bits();
-        let [[low, high], _] = &mut state.bands;
-        (*low, *high) = ((*low).min(torque), (*high).max(torque));
+        state.torque = sample.driver_torque.bits();
         ended
     }
 

@@ -10,15 +10,13 @@
 
 use heapless::Deque;
 
-use super::{Block, Reading};
+use super::Reading;
 use crate::quantity::Ratio;
 
 /// What is left to do for the last block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Work {
     Nothing,
-    /// Make a reading of the block that ended.
-    Read(Block),
     /// Take a reading into the average.
     Average(f32),
     /// Look for a change before the last `length` readings, whose sum is `sum`; the best so far.

@@ -34,6 +34,8 @@ const SMALL_DELAY_S: f64 = 0.0045;
 const SMALL_DRIVER_DELAY_S: f64 = 0.015;
 /// Largest autocorrelation of residuals that leaves the noise model standing: more is another noise.
 const WHITE_ENOUGH: f64 = 0.1;
+/// The same where signals were read off between rows, so that neighbours share their noise.
+const WHITE_ENOUGH_RESAMPLED: f64 = 0.25;
 /// Largest cross-correlation with an input, in standard deviations, that leaves the driver model standing.
 const INDEPENDENT_ENOUGH: f64 = 7.0;
 
@@ -150,12 +152,18 @@ pub(crate) fn of_residuals(
     fit_percent: f64,
     white: &Whiteness,
     inputs: &[InputCorrelation],
+    resampled: bool,
 ) -> Vec<Refutation> {
     let mut out = Vec::new();
     if fit_percent > ALL_BUT_PERFECT {
         return out;
     }
-    if white.p_value < 1e-6 && white.largest_autocorrelation.abs() > WHITE_ENOUGH {
+    let enough = if resampled {
+        WHITE_ENOUGH_RESAMPLED
+    } else {
+        WHITE_ENOUGH
+    };
+    if white.p_value < 1e-6 && white.largest_autocorrelation.abs() > enough {
         out.push(Refutation {
             assumption: "the disturbance is a low-passed remnant and white sensor noise",
             evidence: format!(

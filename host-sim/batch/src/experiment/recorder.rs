@@ -40,6 +40,7 @@ impl Recorder {
             wheel_angle_rad: Vec::new(),
             guidance_torque_nm: Vec::new(),
             driver_torque_nm: Vec::new(),
+            resampled: false,
             findings: Vec::new(),
         };
         Self {

@@ -94,45 +94,48 @@ fn delay_profile(found: &Identification) -> Figure {
     over("t_p (s)", vec![panel])
 }
 
-/// Every parameter with its interval and, inside it, the narrower one for t_nms as assumed.
+/// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed.
 fn intervals(found: &Identification) -> Figure {
     let list: Vec<_> = found
         .parameters
         .list()
         .into_iter()
-        .filter(|(_, _, p)| !p.fixed && p.interval_95.is_some())
+        .filter_map(|(name, _, p)| {
+            let at = p.optimum.filter(|&at| !p.fixed && at.abs() > 1e-9)?;
+            Some((name, at, p.interval_95?))
+        })
         .collect();
-    let panels = list.into_iter().map(|(name, unit, p)| {
-        let mut series = Vec::new();
-        if let Some(wide) = p.interval_95 {
-            series.push(Series::interval("95 % interval", 5, &[0.6, 1.4], &[wide; 2]));
-        }
-        let narrow = found
+    let (mut wide, mut narrow) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+    for (i, (name, at, interval)) in list.iter().enumerate() {
+        let place = (i + 1) as f64;
+        wide.0.push((place - 0.12, 1.0));
+        wide.1.push(interval.map(|x| x / at));
+        let of = found
             .at_t_nms
             .as_ref()
-            .and_then(|at| at.intervals_95.iter().find(|i| i.0 == name));
-        let at = p.optimum.unwrap_or(f64::NAN);
-        match narrow {
-            Some((_, ends)) => {
-                let mark = Mark::Whiskers(vec![*ends]);
-                series.push(Series::with_mark(
-                    "if t_nms is as assumed",
-                    1,
-                    mark,
-                    vec![(1.0, at)],
-                ));
-            }
-            None => series.push(Series::dots("optimum", 1, vec![(1.0, at)])),
+            .and_then(|a| a.intervals_95.iter().find(|n| n.0 == *name));
+        if let Some((_, ends)) = of {
+            narrow.0.push((place + 0.12, 1.0));
+            narrow.1.push(ends.map(|x| x / at));
         }
-        Panel {
-            title: name.to_owned(),
-            y: Axis::of(&format!("({unit})")),
-            series,
-        }
-    });
+    }
+    let mut series = vec![Series::with_mark(
+        "95 % interval",
+        0,
+        Mark::Whiskers(wide.1),
+        wide.0,
+    )];
+    if !narrow.0.is_empty() {
+        series.push(Series::with_mark(
+            "if t_nms is as assumed",
+            1,
+            Mark::Whiskers(narrow.1),
+            narrow.0,
+        ));
+    }
     Figure {
-        rows: vec![String::new()],
-        panels: panels.collect(),
+        rows: list.iter().map(|l| l.0.to_owned()).collect(),
+        panels: vec![panel("", "Share of the estimate", series)],
         ..Figure::default()
     }
 }
@@ -211,6 +214,7 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     )
 }
 
+/// A figure with its caption.
 fn figure(figure: Figure, caption: &str) -> Block {
     Block::Figure {
         figure,
@@ -218,14 +222,14 @@ fn figure(figure: Figure, caption: &str) -> Block {
     }
 }
 
-/// What was found, in words, tables and pictures.
-fn of_parameters(found: &Identification, intervals: Figure, delay_profile: Figure) -> Vec<Block> {
+/// What is known of the driver, and what it rests on.
+fn verdict_blocks(found: &Identification, delay_profile: Figure, intervals: Figure) -> Vec<Block> {
     let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
     verdict.extend(verdicts(found).into_iter().map(Block::Text));
     verdict.push(Block::Table(parameters(found)));
     verdict.push(figure(
         intervals,
-        "The 95 % intervals as bands; the whiskers are what they would be if t_nms were known.",
+        "The 95 % intervals, and what they would be if t_nms were what is assumed.",
     ));
     verdict.push(figure(
         delay_profile,
@@ -255,7 +259,7 @@ fn report(drive: &IdentifiedDrive, figures: [Figure; 6]) -> Report {
         delay_profile,
         intervals,
     ] = figures;
-    let verdict = of_parameters(found, intervals, delay_profile);
+    let verdict = verdict_blocks(found, delay_profile, intervals);
     let mut sections: Vec<Section> = in_the_log(found)
         .map(|table| Section {
             heading: "In the log".into(),

@@ -122,6 +122,11 @@ impl Grid {
         })
     }
 
+    /// Whether signals are read off between rows.
+    pub(super) fn resamples(&self) -> bool {
+        matches!(self.place, Place::Between(_))
+    }
+
     /// A column on the grid; no number where there is nothing to take it from.
     pub(super) fn put(&self, time: &[f64], column: Vec<f64>, c: usize) -> Vec<f64> {
         match &self.place {

@@ -70,6 +70,8 @@ pub struct DriveLog {
     pub guidance_torque_nm: Vec<f64>,
     /// Driver torque T_d as measured, N.m.
     pub driver_torque_nm: Vec<f64>,
+    /// Whether the signals were read off between rows: neighbouring rows then share their noise.
+    pub resampled: bool,
     /// What was found when the log was read: what, found, done.
     pub findings: Vec<[String; 3]>,
 }
@@ -149,6 +151,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
+            resampled: false,
             findings,
         })
     }
@@ -263,6 +266,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
+            resampled: grid.resamples(),
             findings: grid.finding.into_iter().collect(),
         })
     }

@@ -94,6 +94,7 @@ impl Problem<'_> {
             found.fit_percent,
             &found.whiteness,
             &found.input_correlation,
+            self.log.resampled,
         ));
         refuted.extend(self.beside_nothing(optimum));
         let p = &optimum.point;

@@ -58,7 +58,7 @@ impl Problem<'_> {
         let d = step(&point, &self.bounds, &q, 0.0);
         let loss = q.loss + q.gradient.dot(&d) + 0.5 * d.dot(&(&q.hessian * &d));
         let free: Vec<usize> = (0..self.size())
-            .filter(|&i| !(REGRESSORS..COUNT).contains(&i))
+            .filter(|i| !(REGRESSORS..COUNT).contains(i))
             .filter(|&i| self.is_free(i) && !self.bounds[i].touches(p[i]) && q.hessian[(i, i)] > 0.0)
             .collect();
         let k = free.len();
