@@ -75,7 +75,7 @@ def test_the_table_is_read_by_pandas(spec, tmp_path):
     table = pandas.read_parquet(result.parquet)
     text = pandas.read_csv(result.csv)
     assert list(table.columns) == list(text.columns)
-    assert (table["drive"] == range(200)).all()
+    assert (table["drive"] == list(range(200))).all()
     for name in ["driver.t_p", "peak_lateral_error_m", "end_m", "min_time_to_lane_crossing_s"]:
         pandas.testing.assert_series_equal(table[name], text[name], check_exact=False, rtol=1e-15)
     assert table["diverged"].dtype == bool
