@@ -283,6 +283,8 @@ pub extern "C" fn identify(manual: u32) -> u32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn replay() -> u32 {
     let mut lab = lab();
-    let result = std::str::from_utf8(&lab.input).map_err(|e| e.to_string()).and_then(replay::replay);
+    let result = std::str::from_utf8(&lab.input)
+        .map_err(|e| e.to_string())
+        .and_then(replay::replay);
     lab.answer(result)
 }

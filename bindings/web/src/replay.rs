@@ -21,11 +21,15 @@ pub(crate) fn replay(bus: &str) -> Result<String, String> {
         while let Some(line) = lines.next_if(|line| time(line) == Ok(t_us)) {
             let frame = frame(line)?;
             if INPUTS.contains(&frame.id()) {
-                ecu.receive(&frame, now).map_err(|why| format!("{line}: {why:?}"))?;
+                ecu.receive(&frame, now)
+                    .map_err(|why| format!("{line}: {why:?}"))?;
             }
         }
         let step = ecu.step(now);
-        for frame in std::iter::once(step.guidance).chain(step.others).chain(ecu.background_step()) {
+        for frame in std::iter::once(step.guidance)
+            .chain(step.others)
+            .chain(ecu.background_step())
+        {
             // Writing to a string does not fail.
             let _ = write!(sent, "{t_us} {:03X} ", frame.id());
             for byte in frame.data() {
