@@ -76,7 +76,7 @@ class Vehicle:
             # The car weaves by 0.2 m within its lane. Its error moves by speed times yaw error: the ECU checks that.
             omega = 2 * math.pi / 10
             error, rate = 0.2 * math.sin(omega * t), 0.2 * omega * math.cos(omega * t)
-            return {"LateralError": error, "YawError": rate / SPEED, "Age": 0, "Valid": 1}
+            return {"LateralError": error, "YawError": rate / SPEED, "Age": 0, "AgeMore": 0, "Valid": 1}
         if name == "Column":
             # The driver holds the wheel straight against the guidance, and the motor delivers what it is told.
             return {"DriverTorque": -self.torque, "WheelAngle": 0, "MotorTorque": self.torque}

@@ -82,7 +82,7 @@ impl World {
             frames.push(
                 Vehicle {
                     speeds,
-                    yaw_rate: Some(TurningRate::ZERO),
+                    yaw_rate: Some(TurningRate::from_rad_per_s(Self::TURNING_1PS * wheel_rad)),
                 }
                 .encode((k / 10) as u8),
             );

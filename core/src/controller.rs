@@ -240,7 +240,7 @@ impl ControllerState {
         Self::with(Mode::Active, now)
     }
 
-    fn with(mode: Mode, now: Instant) -> Self {
+    pub(crate) fn with(mode: Mode, now: Instant) -> Self {
         Self {
             memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),

@@ -104,10 +104,9 @@ impl Ecu {
         let mut faults = boot.latched.common(FaultSet::CRITICAL);
         faults.insert_if(setup.is_none(), Fault::Parameters);
         faults.insert_if(boot.recent_resets >= RESETS_TO_LOCK, Fault::ResetLoop);
-        let state = ControllerState::new(now);
         Self::with(
             setup.unwrap_or(&Setup::PAPER),
-            state,
+            Mode::Boot,
             ReceiverState::NEW,
             boot,
             faults,
@@ -119,10 +118,9 @@ impl Ecu {
     /// it. Not for a vehicle.
     #[must_use]
     pub fn engaged(setup: &Setup, now: Instant) -> Self {
-        let state = ControllerState::engaged(now);
         Self::with(
             setup,
-            state,
+            Mode::Active,
             ReceiverState::TRUSTED,
             Boot::default(),
             FaultSet::NONE,
@@ -130,9 +128,10 @@ impl Ecu {
         )
     }
 
+    /// The state is made in its place: a copy of it would be half of the stack.
     fn with(
         setup: &Setup,
-        state: ControllerState,
+        mode: Mode,
         e2e: ReceiverState,
         boot: Boot,
         faults: FaultSet,
@@ -140,7 +139,7 @@ impl Ecu {
     ) -> Self {
         Self {
             controller: Controller::new(setup.config),
-            state,
+            state: ControllerState::with(mode, now),
             monitor: Redundant::new(setup.monitor),
             memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),

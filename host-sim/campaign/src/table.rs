@@ -141,6 +141,17 @@ pub struct FaultCase {
     pub(super) plant: Option<fn(&mut WorldParameters)>,
 }
 
+impl FaultCase {
+    /// The same in a curve, where what is wrong with an input has to show.
+    #[must_use]
+    pub fn in_a_curve(&self) -> Self {
+        Self {
+            place_on_road: Some(PlaceOnRoad::In),
+            ..*self
+        }
+    }
+}
+
 /// Where on its road a run is when the fault begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PlaceOnRoad {
