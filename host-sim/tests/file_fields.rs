@@ -193,7 +193,7 @@ fn every_range_of_a_scenario_is_the_codes() {
             );
         }
     }
-    assert_eq!(numbers, 85, "fields with a range of numbers");
+    assert_eq!(numbers, 87, "fields with a range of numbers");
 }
 
 #[test]
