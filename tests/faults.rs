@@ -66,13 +66,14 @@ fn contradictions_are_seen() {
         let campaign = campaign::run(&World::new(), &[row], 1..11, || ());
         campaign.rows[0].seen
     };
-    for name in [
-        "lateral-error-frozen",
-        "lateral-error-flipped",
-        "yaw-error-flipped",
-        "all-frozen",
+    // A value that freezes is wrong only where the vehicle then moves to the side: in a steady curve half of them do.
+    for (name, least) in [
+        ("lateral-error-frozen", 4),
+        ("lateral-error-flipped", 8),
+        ("yaw-error-flipped", 8),
+        ("all-frozen", 4),
     ] {
-        assert!(seen(name) >= 8, "{name}: {} of 10", seen(name));
+        assert!(seen(name) >= least, "{name}: {} of 10", seen(name));
     }
     // Half of the onsets lie on a straight, where there is no torque to halve.
     assert!(
