@@ -119,13 +119,16 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
         }
         i += 1;
     }
+    assert!(matches!(all[AUTHORITY].name.as_bytes(), b"authority"));
+    assert!(matches!(all[ENGAGED].name.as_bytes(), b"engaged_at_start"));
+    assert!(matches!(all[TORQUE].name.as_bytes(), b"torque_nm"));
     // Nobody holds the guidance back unless told to.
     all[AUTHORITY].start = 1.0;
     all[AUTHORITY].range = Some([0.0, 1.0]);
     all
 };
-const AUTHORITY: usize = 6;
-const ENGAGED: usize = 9;
+const AUTHORITY: usize = 8;
+const ENGAGED: usize = 11;
 const TORQUE: usize = 12;
 
 /// The unit under way.
