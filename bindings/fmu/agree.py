@@ -21,11 +21,12 @@ INPUTS = {
     "Column_WheelAngle": "wheel_angle_rad",
     "Column_MotorTorque": "motor_torque_nm",
     "Vehicle_Speed1": "speed_m_per_s",
+    "Vehicle_YawRate": "yaw_rate_rad_per_s",
     "Demand_Authority": "authority",
 }
 # The DBC file has the wheel angle in degrees.
 FACTORS = {"Column_WheelAngle": math.pi / 180}
-FLAGS = {"Demand_Engage": "engage", "Demand_Probe": "probe"}
+FLAGS = {"Demand_Engage": "engage", "Demand_Probe": "probe", "Vehicle_YawRateValid": "yaw_rate_valid"}
 
 
 def main(directory):
