@@ -125,7 +125,7 @@ impl PlausibilityState {
         self.speed
     }
 
-    /// Takes two speeds; `false` when they have been too far apart for [`SPEEDS_PATIENCE`] messages in a row.
+    /// Takes two speeds; `false` when they have been too far apart in three messages in a row.
     #[must_use]
     pub fn speeds_agree(&mut self, [a, b]: [Speed; 2]) -> (bool, bool) {
         let agree = speeds_agree(a, b);
