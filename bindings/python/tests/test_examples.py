@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,8 @@ def test_the_readme(tmp_path, monkeypatch):
     blocks = re.findall(r"```python\n(.*?)```", text, re.S)
     assert blocks
     monkeypatch.chdir(ROOT)
+    # A sweep of another commit is not gone on with, and an earlier test run may have left one.
+    shutil.rmtree(ROOT / "target" / "readme-sweep", ignore_errors=True)
     names = {}
     for block in blocks:
         exec(compile(block, "README.md", "exec"), names)
