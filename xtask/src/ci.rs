@@ -1,6 +1,8 @@
 //! Everything that CI checks. The tests come last, so that a log ends with their results; what failed before
 //! them is named before they start. The quick tier is for daily work: what needs no QEMU, no valgrind and no C compiler.
 
+use std::time::Instant;
+
 use anyhow::{Result, bail};
 
 use crate::image::{BOARD, M4F};
@@ -51,10 +53,12 @@ fn check_all<'a>(checks: &[(&'a str, &dyn Fn() -> Result<()>)]) -> Vec<&'a str> 
     let mut failed = Vec::new();
     for (name, check) in checks {
         println!("== {name}");
+        let begin = Instant::now();
         if let Err(error) = check() {
             eprintln!("error: {name}: {error:#}");
             failed.push(*name);
         }
+        println!("== {name}: {} s", begin.elapsed().as_secs());
     }
     failed
 }
@@ -80,7 +84,7 @@ pub(crate) fn run_all() -> Result<()> {
         ("python3", "python3-venv"),
     ])?;
     let target_features = format!("{BOARD},gate,broken,bench");
-    let failed = check_all(&[
+    let mut failed = check_all(&[
         ("format", &format),
         ("clippy", &clippy),
         ("clippy of the images", &|| {
@@ -114,17 +118,19 @@ pub(crate) fn run_all() -> Result<()> {
     if !failed.is_empty() {
         eprintln!("== failed: {}; the tests follow", failed.join(", "));
     }
-    println!("== fuzz");
-    // About ten seconds for each of its targets.
-    let fuzz = run(cargo()
-        .args(["test", "-p", "haptic-core", "--test", "fuzz"])
-        .env("HAPTIC_FUZZ_BYTES", "60000000"));
-    println!("== tests");
-    // Apart, because the log decoder switches on features of serde_json that host-sim does not ship with.
-    let of_xtask = run(cargo().args(["test", "-p", "xtask"]));
-    // With the doctests of every library.
-    run(cargo().args(["test", "--workspace", "--exclude", "xtask", "--no-fail-fast"]))?;
-    of_xtask?;
-    fuzz?;
+    failed.extend(check_all(&[
+        // About ten seconds for each of its targets.
+        ("fuzz", &|| {
+            run(cargo()
+                .args(["test", "-p", "haptic-core", "--test", "fuzz"])
+                .env("HAPTIC_FUZZ_BYTES", "60000000"))
+        }),
+        // Apart, because the log decoder switches on features of serde_json that host-sim does not ship with.
+        ("tests of xtask", &|| run(cargo().args(["test", "-p", "xtask"]))),
+        // With the doctests of every library.
+        ("tests", &|| {
+            run(cargo().args(["test", "--workspace", "--exclude", "xtask", "--no-fail-fast"]))
+        }),
+    ]));
     finish(&failed)
 }
