@@ -225,6 +225,22 @@ fn the_torque_applied_is_the_one_in_the_guidance_frame() {
     assert_eq!(column_frames, (run.steps as usize).div_ceil(2));
 }
 
+/// A driver without a tremor, a probe to be followed, bends taken with a steady hand: nothing of it is a fault.
+#[test]
+fn the_example_drives_stay_engaged_and_unwarned() {
+    for name in ["live-estimate", "relying-driver"] {
+        let path = format!("{}/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let scenario = haptic_batch::files::load_scenario(Path::new(&path)).unwrap();
+        let mut host = ReceiverState::TRUSTED;
+        observe(&scenario, |outcome: &Outcome| {
+            let guidance = Guidance::decode(&mut host, &outcome.frames_out[0]).unwrap();
+            let what = format!("{name} at {} s: {:?}", outcome.time_s(), guidance.faults);
+            assert_eq!(guidance.mode, Mode::Active, "{what}");
+            assert!(!guidance.warning, "{what}");
+        });
+    }
+}
+
 #[test]
 fn after_a_torque_failure_nothing_guides_and_the_driver_takes_a_second_to_notice() {
     let nominal = scenario(Condition::High, 0.1, Sensors::Exact);

@@ -1,10 +1,11 @@
 //! Whether a hand is on the wheel, by what the column does.
 //!
-//! A hand that holds a wheel which the guidance turns answers with torque. Where the guidance acts and the driver
-//! torque stays within 0.08 N.m of where it was, there is none: after 15 s of that the driver is warned, after 30 s the
-//! guidance ends with a fade (class A), as UN R79 has it for hands-off warnings. What counts is the torque's change,
-//! not its value, so that the sensor's offset does not matter; and only the time in which the guidance acts, so that a
-//! straight without a disturbance, where nobody has to do anything, is no proof.
+//! A hand that holds a wheel which the guidance turns answers with torque. Where the guidance acts, the driver torque
+//! stays within 0.08 N.m of where it was, and it is no more than a sensor's offset, there is none: after 15 s of that the
+//! driver is warned, after 30 s the guidance ends with a fade (class A), as UN R79 has it for hands-off warnings. What
+//! counts is the torque's change, or a torque that no offset is; and only the time in which the guidance acts, so that
+//! a straight without a disturbance, where nobody has to do anything, is no proof. The probe is not counted: a hand that
+//! follows it fully answers with less than the sensor resolves.
 //!
 //! Not here: what the warning leads to ([`crate::controller`]).
 
@@ -13,6 +14,8 @@ use crate::redundant::words;
 
 /// A change of the driver torque that only a hand makes: beyond the sensor's noise and the inertia of the wheel's rim.
 const FELT: Torque = Torque::from_nm(0.08);
+/// A driver torque that only a hand makes, whatever it was before: above the largest offset of a sensor.
+const HELD: Torque = Torque::from_nm(0.35);
 /// A guidance torque that a hand would answer.
 const ACTS: Torque = Torque::from_nm(0.05);
 /// No hand for so long: the driver is warned.
@@ -39,14 +42,14 @@ impl HandsState {
 
     /// Takes a driver torque that came since the last step.
     pub fn feel(&mut self, driver: Torque) {
-        if driver.plus(self.felt.opposite()).abs() > FELT {
+        if driver.abs() > HELD || driver.plus(self.felt.opposite()).abs() > FELT {
             (self.felt, self.without) = (driver, Micros::from_us(0));
         }
     }
 
-    /// Another `elapsed` in which the guidance applied a torque.
-    pub fn guided(&mut self, applied: Torque, elapsed: Micros) {
-        if applied.abs() >= ACTS {
+    /// Another `elapsed` in which the guidance applied a torque, the probe not counted.
+    pub fn guided(&mut self, guidance: Torque, elapsed: Micros) {
+        if guidance.abs() >= ACTS {
             self.without = Micros::from_us(self.without.us().saturating_add(elapsed.us()));
         }
     }

@@ -163,6 +163,19 @@ fn a_hand_or_a_guidance_that_does_nothing_is_never_warned() {
             assert!(!rig.tick().command.warning);
         }
     }
+    // A steady hand in a steady bend: no sensor is off by half a newton metre.
+    let mut rig = Rig::active_in_curve(0.5);
+    rig.driver = Some(-0.5);
+    for _ in 0..40_000 {
+        assert!(!rig.tick().command.warning);
+    }
+    // A straight on which nothing is asked for, and one that is probed: a hand that follows the probe answers with nothing.
+    let mut rig = Rig::active_in_curve(0.0);
+    rig.driver = Some(0.0);
+    rig.probe = true;
+    for _ in 0..40_000 {
+        assert!(!rig.tick().command.warning);
+    }
     // A straight on which nothing is asked for.
     let mut rig = Rig::active_in_curve(0.0);
     rig.driver = Some(0.0);

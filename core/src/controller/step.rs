@@ -55,7 +55,8 @@ impl<I: Injection> Step<'_, I> {
 
         let before = Mode::from_code(v.mode).unwrap_or(Mode::Fault);
         if before == Mode::Active {
-            v.hands.guided(self.applied, self.elapsed);
+            v.hands
+                .guided(without(self.applied, Some(v.probe_applied)), self.elapsed);
         }
         faults.insert_if(
             matches!(before, Mode::Active | Mode::Fade) && v.hands.without() >= WARN,
