@@ -30,6 +30,8 @@ const VALUES_WITHIN: Duration = Duration::from_secs(10);
 const SPEEDS: u8 = 6;
 /// Before each frame of a set: those that a sender has to show anew, and one more.
 const SPEEDS_BETWEEN: u8 = 4;
+/// So often is a set sent whose speeds were too old when it came.
+const ATTEMPTS: u32 = 10;
 const SPEED_PERIOD: Duration = Duration::from_millis(10);
 
 /// The ECU at the other end of an adapter.
@@ -72,17 +74,38 @@ impl Product {
             let message = "a parameter is at the end of its range, and beyond it as the bus's 32-bit number";
             return Err(PilError::Failed(message.into()));
         }
-        let (before, mode) = self.status_and_mode()?;
+        let (mut before, mode) = self.status_and_mode()?;
         if mode != Mode::Standby {
             return Err(PilError::Failed(format!(
                 "the ECU is in {mode:?}; it takes parameters in Standby only, or where it is locked for want of them"
             )));
         }
+        let mut attempts = 0;
+        loop {
+            attempts += 1;
+            self.send_set(&unlock(before.sequence, vehicle), &frames)?;
+            match self.fate(&before)? {
+                Ok(now) => return Ok(now),
+                // Our own speeds were too old when the set came: this computer was busy with something else.
+                Err((now, _))
+                    if now.outcome == WriteOutcome::NotStanding
+                        && !self.hears_speed
+                        && attempts < ATTEMPTS =>
+                {
+                    before = now;
+                }
+                Err((_, why)) => return Err(PilError::Failed(why)),
+            }
+        }
+    }
+
+    /// A set on its way, with speeds of zero where nobody else sends any.
+    fn send_set(&mut self, unlock: &Frame, frames: &[Frame]) -> Result<(), PilError> {
         let mut standstill = None;
         if !self.hears_speed {
             standstill = Some(self.send_standstill()?);
         }
-        for frame in [unlock(before.sequence, vehicle)].iter().chain(&frames) {
+        for frame in [unlock].into_iter().chain(frames) {
             // A slow line must not let the speed grow old on the way: three clean frames and the ECU trusts it again.
             let mut together = Vec::new();
             if let Some(counter) = &mut standstill {
@@ -91,15 +114,26 @@ impl Product {
             together.push(*frame);
             self.port.send(&together)?;
         }
+        Ok(())
+    }
+
+    /// What became of a set: the status that has it in use, or the last one and why not.
+    fn fate(
+        &mut self,
+        before: &ParameterStatus,
+    ) -> Result<Result<ParameterStatus, (ParameterStatus, String)>, PilError> {
+        let mut now = *before;
         for since in 0..STATUSES {
-            if let Some(verdict) = verdict(&before, &self.status()?, since) {
-                return verdict.map_err(|why| PilError::Failed(why.into()));
+            now = self.status()?;
+            if let Some(verdict) = verdict(before, &now, since) {
+                return Ok(verdict.map_err(|why| (now, why.into())));
             }
         }
-        Err(PilError::Failed(format!(
+        let why = format!(
             "after {STATUSES} s the ECU still has set {} in use: its flash takes no other, or frames were lost",
             before.sequence
-        )))
+        );
+        Ok(Err((now, why)))
     }
 
     /// Speeds of zero, for an ECU on a bench: nobody else sends any. Returns the counter of the next.
