@@ -27,7 +27,7 @@ const MUTATED: [(&str, &[&str]); 14] = [
     ("faults.rs", &["faults", "ecu", "dbc", "edges"]),
 ];
 
-/// Line and region coverage of `core/` by its own tests; less than all of it is an error.
+/// Line, region and branch coverage of `core/` by its own tests; less than all of it is an error.
 pub(crate) fn coverage() -> Result<()> {
     let place = tool::root().join("target/coverage");
     let profiles = place.join("profiles");
@@ -70,14 +70,14 @@ pub(crate) fn coverage() -> Result<()> {
     run(&mut report("report")?)?;
     let summary: Value = serde_json::from_str(&tool::output(report("export")?.arg("-summary-only"))?)?;
     let totals = &summary["data"][0]["totals"];
-    for kind in ["lines", "regions"] {
+    for kind in ["lines", "regions", "branches"] {
         let [count, covered] = ["count", "covered"].map(|figure| totals[kind][figure].as_u64());
         ensure!(
             count.is_some() && count == covered,
             "{kind}: {covered:?} of {count:?} are covered; where not: llvm-cov show"
         );
     }
-    println!("every line and region of core/ is covered");
+    println!("every line, region and branch of core/ is covered");
     Ok(())
 }
 

@@ -13,6 +13,7 @@ mod convert;
 mod course;
 mod design;
 mod drivers;
+mod ecu;
 mod evaluate;
 mod experiment;
 mod faults;
@@ -85,6 +86,8 @@ enum Command {
     Handover(handover::Arguments),
     /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
     Pil(pil::Arguments),
+    /// The ECU in QEMU on a bus that keeps the time of the wall, for any SLCAN client
+    Ecu(ecu::Arguments),
     /// What parameters an ECU on a real bus uses; new ones for it to store
     Parameters(parameters::Arguments),
     /// What goes over the bus of a real ECU as it comes: mode, torques, faults, K_hg; and a recording of it
@@ -138,6 +141,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Handover(arguments)) => handover::run(&arguments),
         Some(Command::Pil(arguments)) => pil::run(&arguments),
+        Some(Command::Ecu(arguments)) => ecu::run(&arguments),
         Some(Command::Parameters(arguments)) => parameters::run(&arguments),
         Some(Command::Live(arguments)) => live::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),

@@ -12,7 +12,8 @@
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - `adapter`: the way to a board.
 //! - `link`: frames as bytes.
 //! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
-//!   and may reach into its memory. - [`parameters`]: a product's, over the same adapters. - [`live`]: what goes over a bus.
+//!   and may reach into its memory. - [`bench`]: a bus that keeps the time of the wall. - [`parameters`]: a product's, over
+//!   the same adapters. - [`live`]: what goes over a bus.
 //!
 //! ```
 //! use haptic_target::{Channel, PilError};
@@ -29,6 +30,7 @@
 //! Not here: the plant and the scenario.
 
 mod adapter;
+pub mod bench;
 pub mod comparator;
 mod gdb;
 pub mod image;

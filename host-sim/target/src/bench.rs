@@ -1,0 +1,180 @@
+//! The ECU in QEMU as a node on a bus that anybody can join: SLCAN over TCP, a millisecond for each of the wall's.
+//!
+//! QEMU's own serial port passes a byte at a time and cannot carry the bus of a car in real time. So the lock-step image
+//! runs behind a pipe, and this side is the bus: it takes what its clients sent in a millisecond, has the ECU step, and
+//! hands its answer to every client, as a bus does. Clients hear each other too. A host that is too busy to keep time is
+//! told, and the ECU's clock waits meanwhile.
+//!
+//! Not here: a product's parameters, its flash and its watchdog, which the lock-step image has not (`cargo xtask qemu`).
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::slcan::{self, Line, Parser};
+use haptic_core::quantity;
+
+use super::PilError;
+use super::stepped::Stepped;
+
+const TICK: Duration = Duration::from_millis(1);
+/// A host that is behind by less catches up; a signal's age limit is 30 ms.
+const CATCHES_UP: Duration = Duration::from_millis(10);
+/// A client that does not read loses frames beyond so many bytes, three seconds of the bus.
+const UNREAD: usize = 1 << 16;
+
+/// The bus: the ECU, and whoever joined.
+pub struct Bench {
+    ecu: Stepped,
+    listener: TcpListener,
+    clients: Vec<Client>,
+    time_us: u32,
+}
+
+/// Somebody on the bus.
+struct Client {
+    stream: TcpStream,
+    parser: Parser,
+    /// Frames pass while the client has the channel open.
+    open: bool,
+    unsent: Vec<u8>,
+}
+
+impl Bench {
+    /// Builds the image, starts it and listens: `127.0.0.1:3333`, port 0 for any.
+    ///
+    /// # Errors
+    /// What is missing, or why nobody can listen there.
+    pub fn start(address: &str) -> Result<Self, PilError> {
+        let cannot = |e: std::io::Error| PilError::Failed(format!("cannot listen on {address}: {e}"));
+        let listener = TcpListener::bind(address).map_err(cannot)?;
+        listener.set_nonblocking(true).map_err(cannot)?;
+        Ok(Self {
+            ecu: Stepped::start(false)?,
+            listener,
+            clients: Vec::new(),
+            time_us: 0,
+        })
+    }
+
+    /// Where clients join.
+    ///
+    /// # Errors
+    /// The socket's.
+    pub fn address(&self) -> Result<SocketAddr, PilError> {
+        self.listener
+            .local_addr()
+            .map_err(|e| PilError::Failed(format!("the port of the bus: {e}")))
+    }
+
+    /// One millisecond of the bus.
+    ///
+    /// # Errors
+    /// The target is gone.
+    pub fn tick(&mut self) -> Result<(), PilError> {
+        while let Ok((stream, _)) = self.listener.accept() {
+            self.clients.extend(Client::new(stream));
+        }
+        let mut heard = Vec::new();
+        for (index, client) in self.clients.iter_mut().enumerate() {
+            heard.extend(client.receive().into_iter().map(|frame| (index, frame)));
+        }
+        let frames: Vec<Frame> = heard.iter().map(|(_, frame)| *frame).collect();
+        self.ecu.tick(quantity::Instant::from_us(self.time_us), &frames)?;
+        self.time_us = self.time_us.wrapping_add(1000);
+        let answer = self.ecu.answer()?;
+        for (index, client) in self.clients.iter_mut().enumerate() {
+            let others = heard.iter().filter(|(from, _)| *from != index);
+            others.for_each(|(_, frame)| client.send(frame));
+            answer.iter().for_each(|frame| client.send(frame));
+        }
+        self.clients.retain_mut(Client::flush);
+        Ok(())
+    }
+
+    /// Keeps the time of the wall until `ended`; `late` is told by how much this host was behind whenever the ECU's clock
+    /// had to wait for it.
+    ///
+    /// # Errors
+    /// The target is gone.
+    pub fn run(&mut self, ended: impl Fn() -> bool, mut late: impl FnMut(Duration)) -> Result<(), PilError> {
+        let mut due = Instant::now();
+        while !ended() {
+            self.tick()?;
+            due += TICK;
+            let now = Instant::now();
+            let behind = now.saturating_duration_since(due);
+            if behind > CATCHES_UP {
+                late(behind);
+                due = now;
+            }
+            std::thread::sleep(due.saturating_duration_since(now));
+        }
+        Ok(())
+    }
+
+    /// Ends the machine.
+    ///
+    /// # Errors
+    /// It does not end well.
+    pub fn end(self) -> Result<(), PilError> {
+        self.ecu.end()
+    }
+}
+
+impl Client {
+    /// None for a client that is gone already.
+    fn new(stream: TcpStream) -> Option<Self> {
+        stream.set_nonblocking(true).ok()?;
+        // A frame that waits for the last one's acknowledgement is 40 ms old.
+        stream.set_nodelay(true).ok()?;
+        Some(Self {
+            stream,
+            parser: Parser::default(),
+            open: false,
+            unsent: Vec::new(),
+        })
+    }
+
+    /// The frames that came, and the protocol's answers to them.
+    fn receive(&mut self) -> Vec<Frame> {
+        let mut bytes = [0; 4096];
+        let mut frames = Vec::new();
+        // A client that is gone says so when something is sent to it.
+        let Ok(count) = self.stream.read(&mut bytes) else {
+            return frames;
+        };
+        for line in bytes[..count].iter().filter_map(|byte| self.parser.push(*byte)) {
+            let mut answer = line.answer();
+            match line {
+                Line::Open => self.open = true,
+                Line::Close => self.open = false,
+                Line::Frame(frame) if self.open => frames.push(frame),
+                Line::Frame(_) => answer = slcan::ERROR,
+                _ => {}
+            }
+            self.unsent.extend_from_slice(answer);
+        }
+        frames
+    }
+
+    fn send(&mut self, frame: &Frame) {
+        if self.open && self.unsent.len() < UNREAD {
+            self.unsent.extend_from_slice(&slcan::format(frame));
+        }
+    }
+
+    /// Hands over what waits; false where nobody is there any more.
+    fn flush(&mut self) -> bool {
+        while !self.unsent.is_empty() {
+            match self.stream.write(&self.unsent) {
+                Ok(count @ 1..) => drop(self.unsent.drain(..count)),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return true,
+                Ok(0) | Err(_) => return false,
+            }
+        }
+        // Nothing was sent to a client with a closed channel: is it there?
+        self.open || !matches!(self.stream.peek(&mut [0]), Ok(0))
+    }
+}
