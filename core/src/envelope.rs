@@ -12,7 +12,7 @@
 //! | reduction | abs(T) falls by at most 8 N.m/s, a rounding toward zero included |
 //! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
-use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second_times, product};
+use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second, product};
 use crate::redundant::words;
 
 /// Which limit held the torque back.
@@ -153,7 +153,7 @@ impl Envelope {
     /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
-        let step = |rate: TorqueRate| Torque::from_wide(per_second_times(i64::from(rate.bits()), elapsed));
+        let step = |rate: TorqueRate| Torque::from_bits(per_second(rate.bits(), elapsed));
         let growth = step(self.wind_up);
         let fall = step(self.reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
         // Judged in the frame where the applied torque is positive.

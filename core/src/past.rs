@@ -7,7 +7,7 @@
 //! [`crate::law`], so that a flip moves the torque by less than the monitor's band; what the checks take can declare
 //! or hide a fault for one second.
 
-use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second_times, saturate};
+use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second, saturate};
 
 /// A power of two, so that the place is a mask.
 const RING: usize = 32;
@@ -37,8 +37,8 @@ impl Heading {
 
     /// The heading at an instant not before this one.
     fn psi_at(&self, at: Instant) -> i32 {
-        let turned = per_second_times(i64::from(self.rate.bits()), at.since(self.at));
-        self.psi.wrapping_add(saturate(turned))
+        self.psi
+            .wrapping_add(per_second(self.rate.bits(), at.since(self.at)))
     }
 }
 

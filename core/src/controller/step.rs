@@ -12,8 +12,7 @@ use crate::modes::{Event, Events, Mode};
 use crate::past::Past;
 use crate::probe::ProbeState;
 use crate::quantity::{
-    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second_times, product,
-    saturate,
+    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, saturate,
 };
 use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
@@ -173,9 +172,8 @@ impl<I: Injection> Step<'_, I> {
         } else if let Input::New(_) = self.inputs.lane {
             (v.turned, v.rate_then) = past.turned(self.now, sample.at);
         } else {
-            let turning = i64::from(v.plausibility.turning().bits());
-            let turned = i64::from(v.turned.bits()).saturating_add(per_second_times(turning, self.elapsed));
-            v.turned = Radians::from_wide(turned);
+            let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
+            v.turned = Radians::from_bits(v.turned.bits().saturating_add(turned));
         }
     }
 
@@ -185,8 +183,8 @@ impl<I: Injection> Step<'_, I> {
         if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
             return Since::NOTHING;
         }
-        let went_on = per_second_times(i64::from(v.rate_then.bits()), age);
-        let turned = i64::from(v.turned.bits()).saturating_sub(went_on);
+        let went_on = per_second(v.rate_then.bits(), age);
+        let turned = i64::from(v.turned.bits()).saturating_sub(i64::from(went_on));
         let faster = i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.rate_then.bits()));
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.bits(), speed.bits());
