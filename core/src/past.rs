@@ -116,8 +116,19 @@ impl Past {
         let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
         let wanted = at.before(before);
         let age = now.since(wanted);
-        let mut backs = 0..self.known_lines;
-        let back = backs.find(|back| now.since(place(*back).0) >= age)?;
+        // The first that is as old, by halving: the further back, the older.
+        let (mut back, mut end) = (0, self.known_lines);
+        while back < end {
+            let middle = back.wrapping_add(end) / 2;
+            if now.since(place(middle).0) >= age {
+                end = middle;
+            } else {
+                back = middle.saturating_add(1);
+            }
+        }
+        if back >= self.known_lines {
+            return None;
+        }
         let (from, direction) = place(back);
         // Straight from there to the one after.
         let (to, next) = place(back.saturating_sub(1));
