@@ -123,6 +123,18 @@ pub struct Inputs {
     pub faults: FaultSet,
 }
 
+impl Inputs {
+    /// Nothing heard.
+    pub(crate) const LOST: Self = Self {
+        lane: Input::Lost,
+        column: Input::Lost,
+        motion: Input::Lost,
+        request: Input::Lost,
+        line_moved: false,
+        faults: FaultSet::NONE,
+    };
+}
+
 /// What the controller decides every millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Command {
