@@ -88,6 +88,13 @@ words! {
 pub struct Situation {
     /// The torque really applied until now.
     pub applied: Torque,
+/// Growth per [`WINDOW`].
+const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
+/// Opposing driver torque at which the bound begins to shrink.
+const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
+/// How fast it shrinks, N.m per N.m.
+const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
+
     /// Since when: the time that the rate limits may use.
     pub elapsed: Micros,
     /// The driver's torque on the wheel.
@@ -140,7 +147,7 @@ impl Envelope {
             self.absolute,
             LimitReason::Absolute,
         );
-        let window = state.anchor.abs().plus(self.window);
+        let window = state.anchor.abs().plus(WINDOW_GROWTH);
         hold(&mut command, window.opposite(), window, LimitReason::Window);
         self.hold_rates(&mut command, at);
         // Last, and exempt from the reduction limit: whatever else holds, the driver's hand wins at once.
@@ -177,9 +184,13 @@ impl Envelope {
     /// `clamp(L + 3*(T_d + 0.8), 0, L)` above, `-clamp(L + 3*(0.8 - T_d), 0, L)` below (defaults).
     fn override_bounds(&self, driver: Torque) -> (Torque, Torque) {
         let bound = |toward: Torque| {
-            let margin = toward.plus(self.override_from);
-            let shrunk = i64::from(self.absolute.bits())
-                .saturating_add(product(self.override_slope.bits(), margin.bits()));
+            let margin = toward.plus(OVERRIDE_FROM);
+            // The usual case first: on this side the driver does not oppose.
+            if margin >= Torque::ZERO {
+                return self.absolute;
+            }
+            let shrunk =
+                i64::from(self.absolute.bits()).saturating_add(product(OVERRIDE_SLOPE.bits(), margin.bits()));
             // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway. Not
             // `clamp`, which panics where its bounds are out of order.
             Torque::from_wide(shrunk.min(i64::from(self.absolute.bits())).max(0))

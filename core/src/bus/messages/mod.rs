@@ -160,8 +160,26 @@ const fn unsigned(word: u64, start: u32, bits: u32) -> i64 {
 }
 
 const fn signed(word: u64, start: u32, bits: u32) -> i64 {
-    let up = 64_u32.wrapping_sub(bits);
-    (unsigned(word, start, bits).wrapping_shl(up)).wrapping_shr(up)
+    narrow(word, start, bits) as i64
+}
+
+/// A signed field of at most 32 bits, in as many: half the work for a 32-bit core.
+#[expect(clippy::as_conversions, reason = "the upper half of a word")]
+const fn narrow(word: u64, start: u32, bits: u32) -> i32 {
+    let up = 64_u32.wrapping_sub(start).wrapping_sub(bits);
+    let top = (word.wrapping_shl(up) >> 32) as i32;
+    top.wrapping_shr(32_u32.wrapping_sub(bits))
+}
+
+/// Whether a field is within +-`max`.
+fn is_within(raw: i32, max: i64) -> bool {
+    i64::from(raw.unsigned_abs()) <= max
+}
+
+/// A field as a count of 2^-24, exact; it has room, for its range has.
+const fn to_bits(raw: i32, lsb: u32) -> i32 {
+    raw.wrapping_shl(24_u32.wrapping_sub(lsb))
+#[expect(clippy::as_conversions, reason = "widens")]
 }
 
 const fn mask(bits: u32) -> u64 {
