@@ -66,12 +66,6 @@ words! {
         pub(crate) wind_up: TorqueRate,
         /// Fall per second.
         pub(crate) reduction: TorqueRate,
-        /// Growth per [`WINDOW`].
-        pub(crate) window: Torque,
-        /// Opposing driver torque at which the bound begins to shrink.
-        pub(crate) override_from: Torque,
-        /// How fast it shrinks, N.m per N.m.
-        pub(crate) override_slope: Ratio,
     }
 }
 
@@ -88,18 +82,18 @@ words! {
 pub struct Situation {
     /// The torque really applied until now.
     pub applied: Torque,
+    /// Since when: the time that the rate limits may use.
+    pub elapsed: Micros,
+    /// The driver's torque on the wheel.
+    pub driver: Torque,
+}
+
 /// Growth per [`WINDOW`].
 const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
 /// Opposing driver torque at which the bound begins to shrink.
 const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
 /// How fast it shrinks, N.m per N.m.
 const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
-
-    /// Since when: the time that the rate limits may use.
-    pub elapsed: Micros,
-    /// The driver's torque on the wheel.
-    pub driver: Torque,
-}
 
 /// Length of the window. Growth is counted from an anchor that moves up every 250 ms.
 pub const WINDOW: Micros = Micros::from_ms(250);

@@ -220,12 +220,14 @@ impl Plausibility {
     /// Takes the speed in use and the measured yaw rate; returns nothing, for neither has a counterpart here. How fast
     /// the vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle model.
     pub fn motion(&self, state: &mut PlausibilityState, speed: Speed, yaw_rate: Option<TurningRate>) {
+        let is_known = speed == state.speed && state.has_yaw_rate == 0;
         state.has_yaw_rate = u32::from(yaw_rate.is_some());
         state.yaw_rate = yaw_rate.unwrap_or(TurningRate::ZERO);
-        if speed == state.speed {
+        state.speed = speed;
+        // Nobody asks for the gain while the rate is measured.
+        if is_known || yaw_rate.is_some() {
             return;
         }
-        state.speed = speed;
         let v = speed.bits();
         let slip = wide_product(product(v, v), self.stability_factor.bits()) >> FRAC_BITS;
         // 82 at most: at 90 m/s with the largest factor.

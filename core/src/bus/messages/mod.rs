@@ -136,11 +136,14 @@ pub trait Message: Copy {
     /// As [`Message::decode`].
     #[inline(always)]
     fn decode_within(state: &mut ReceiverState, frame: &Frame, max_delta: u8) -> Result<Self, Reject> {
-        let data = frame.full_data().ok_or(Reject::Length)?;
-        let signals = Self::unpack(u64::from_le_bytes(data));
+        if !frame.is_full() {
+            return Err(Reject::Length);
+        }
+        let data = frame.bytes();
+        let signals = Self::unpack(u64::from_le_bytes(*data));
         // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
         if signals.is_some() || state.is_trusted() {
-            state.accept(&Self::PROTECTION, &data, max_delta)?;
+            state.accept(&Self::PROTECTION, data, max_delta)?;
         }
         signals.ok_or(Reject::Range)
     }
@@ -159,6 +162,7 @@ const fn unsigned(word: u64, start: u32, bits: u32) -> i64 {
     (word.wrapping_shr(start) & mask(bits)) as i64
 }
 
+#[expect(clippy::as_conversions, reason = "widens")]
 const fn signed(word: u64, start: u32, bits: u32) -> i64 {
     narrow(word, start, bits) as i64
 }
@@ -179,7 +183,6 @@ fn is_within(raw: i32, max: i64) -> bool {
 /// A field as a count of 2^-24, exact; it has room, for its range has.
 const fn to_bits(raw: i32, lsb: u32) -> i32 {
     raw.wrapping_shl(24_u32.wrapping_sub(lsb))
-#[expect(clippy::as_conversions, reason = "widens")]
 }
 
 const fn mask(bits: u32) -> u64 {
