@@ -136,10 +136,12 @@ impl Monitor {
         let old = if changes_sign { 0 } else { state.torque_mnm };
         let grown = torque.saturating_abs().saturating_sub(old.saturating_abs());
         let within = |per_ms: i32| {
-            per_ms
-                .saturating_mul(elapsed_us.clamp(1000, 2000))
-                .saturating_div(1000)
-                .saturating_add(TOLERANCE_MNM)
+            let so_long = if elapsed_us <= 1000 {
+                per_ms
+            } else {
+                per_ms.saturating_mul(elapsed_us.min(2000)).saturating_div(1000)
+            };
+            so_long.saturating_add(TOLERANCE_MNM)
         };
         let allowed = if mode == ACTIVE {
             within(self.growth_mnm_per_ms)
