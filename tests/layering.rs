@@ -17,7 +17,7 @@ const CORE: Arrows = &[
     ("actuator", &["quantity"]),
     ("background", &["bus", "estimator", "quantity"]),
     // The codes of limits, modes and faults, and the names of the parameters that it carries.
-    ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity", "redundant"]),
+    ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity"]),
     ("config", &["envelope", "estimator", "law", "monitor", "params", "plausibility", "probe", "quantity", "redundant", "schedule"]),
     ("controller", &["config", "envelope", "faults", "hands", "injection", "law", "modes", "past", "plausibility", "probe", "quantity", "ramp", "redundant"]),
     ("download", &["bus", "config", "faults", "modes", "params", "stored"]),
