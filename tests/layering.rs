@@ -17,7 +17,7 @@ const CORE: Arrows = &[
     ("actuator", &["quantity"]),
     ("background", &["bus", "estimator", "quantity"]),
     // The codes of limits, modes and faults, and the names of the parameters that it carries.
-    ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity", "redundant"]),
+    ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity"]),
     ("config", &["envelope", "estimator", "law", "monitor", "params", "plausibility", "probe", "quantity", "redundant", "schedule"]),
     ("controller", &["config", "envelope", "faults", "hands", "injection", "law", "modes", "past", "plausibility", "probe", "quantity", "ramp", "redundant"]),
     ("download", &["bus", "config", "faults", "modes", "params", "stored"]),
@@ -314,6 +314,7 @@ const LONGER: &[(&str, &str)] = &[
     ("bindings/fmu/src/fmi3.rs", "one C interface, function by function"),
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
+    ("core/src/controller.rs", "what the controller reads, decides and remembers, beside each other"),
     ("core/src/controller/step.rs", "one step of the controller, read from top to bottom"),
     ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
     ("core/src/plausibility.rs", "the checks, with the sums that they keep"),

@@ -75,6 +75,11 @@ impl Actuator {
         self.low = low.min(lagging(self.low, low));
         if self.fresh > 0 {
             self.fresh = self.fresh.saturating_sub(1);
+            // The usual case first: within the band, whatever the errors may be.
+            if self.low <= self.delivered && self.delivered <= self.high {
+                (self.astray, self.weak) = (0, 0);
+                return Motor::Obeys;
+            }
             let error = |t: Torque| Torque::from_bits(t.abs().bits() >> ERROR_SHIFT).plus(MARGIN);
             let above = |t: Torque| self.delivered > t.plus(error(t));
             let below = |t: Torque| self.delivered < t.plus(error(t).opposite());

@@ -19,7 +19,7 @@ use crate::params::{ParamError, Params, in_range};
 use crate::plausibility::Plausibility;
 use crate::probe::Probe;
 use crate::quantity::{
-    AngularImpulse, CurvaturePerAngle, Metres, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    AngularImpulse, CurvaturePerAngle, Metres, Micros, Seconds, Speed, StabilityFactor, Torque,
     TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::redundant::words;
@@ -102,9 +102,6 @@ impl Config {
                 absolute: Torque::from_nm(p.torque_limit_nm),
                 wind_up: TorqueRate::from_nm_per_s(p.wind_up_nm_per_s),
                 reduction: TorqueRate::from_nm_per_s(p.reduction_nm_per_s),
-                window: Torque::from_nm(1.2),
-                override_from: Torque::from_nm(0.8),
-                override_slope: Ratio::from_si(3.0),
             },
             plausibility: Plausibility {
                 curvature_gain: CurvaturePerAngle::from_per_m(v.curvature_gain_per_m),

@@ -17,7 +17,7 @@ use crate::plausibility::PlausibilityState;
 use crate::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use crate::ramp::{History, Ramp};
-use crate::redundant::{Redundant, words};
+use crate::redundant::{Redundant, Words, words};
 use step::{Step, without};
 
 /// Inputs must be valid for this long in Standby before a request can engage.
@@ -123,6 +123,18 @@ pub struct Inputs {
     pub faults: FaultSet,
 }
 
+impl Inputs {
+    /// Nothing heard.
+    pub(crate) const LOST: Self = Self {
+        lane: Input::Lost,
+        column: Input::Lost,
+        motion: Input::Lost,
+        request: Input::Lost,
+        line_moved: false,
+        faults: FaultSet::NONE,
+    };
+}
+
 /// What the controller decides every millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Command {
@@ -143,10 +155,7 @@ pub struct Command {
 words! {
     /// Everything that a flipped bit must not change unseen.
     pub(crate) struct Memory {
-        /// A [`Mode`] code.
-        mode: u32,
-        /// 1 while the last request was high.
-        requested: u32,
+        small: Small,
         /// How long the inputs have been valid in Standby.
         ready: Micros,
         /// Time since each input was last new: how far back its loss reaches.
@@ -157,9 +166,6 @@ words! {
         rate_then: TurningRate,
         turned: Radians,
         last_step: Instant,
-        /// Late and early steps in a row.
-        late: u32,
-        early: u32,
         /// Class C faults stay until the next power-up.
         latched: u32,
         law: LawState,
@@ -170,6 +176,41 @@ words! {
         probe: ProbeState,
         /// The part of the torque applied that is the probe.
         probe_applied: Torque,
+    }
+}
+
+/// What is small shares a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C, align(4))]
+struct Small {
+    /// A [`Mode`] code.
+    mode: u8,
+    /// 1 while the last request was high.
+    requested: u8,
+    /// Late and early steps in a row.
+    late: u8,
+    early: u8,
+}
+
+impl Small {
+    const fn word(self) -> u32 {
+        u32::from_ne_bytes([self.mode, self.requested, self.late, self.early])
+    }
+}
+
+impl Words for Small {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        let [mode, requested, late, early] = change(self.word()).to_ne_bytes();
+        Self {
+            mode,
+            requested,
+            late,
+            early,
+        }
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        self.word().is_inverse_of(&other.word())
     }
 }
 
@@ -187,9 +228,13 @@ impl Memory {
     const fn new(mode: Mode, now: Instant) -> Self {
         const NONE: Micros = Micros::from_us(0);
         Self {
-            mode: mode as u32,
-            // A request that is high from the start is no rising edge.
-            requested: 1,
+            small: Small {
+                mode: mode as u8,
+                // A request that is high from the start is no rising edge.
+                requested: 1,
+                late: 0,
+                early: 0,
+            },
             ready: NONE,
             age: Ages {
                 lane: NONE,
@@ -201,8 +246,6 @@ impl Memory {
             rate_then: TurningRate::ZERO,
             turned: Radians::ZERO,
             last_step: now,
-            late: 0,
-            early: 0,
             latched: 0,
             law: LawState::NEW,
             envelope: EnvelopeState::new(now),

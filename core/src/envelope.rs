@@ -12,7 +12,7 @@
 //! | reduction | abs(T) falls by at most 8 N.m/s, a rounding toward zero included |
 //! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
-use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second_times, product};
+use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second, product};
 use crate::redundant::words;
 
 /// Which limit held the torque back.
@@ -66,12 +66,6 @@ words! {
         pub(crate) wind_up: TorqueRate,
         /// Fall per second.
         pub(crate) reduction: TorqueRate,
-        /// Growth per [`WINDOW`].
-        pub(crate) window: Torque,
-        /// Opposing driver torque at which the bound begins to shrink.
-        pub(crate) override_from: Torque,
-        /// How fast it shrinks, N.m per N.m.
-        pub(crate) override_slope: Ratio,
     }
 }
 
@@ -93,6 +87,13 @@ pub struct Situation {
     /// The driver's torque on the wheel.
     pub driver: Torque,
 }
+
+/// Growth per [`WINDOW`].
+const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
+/// Opposing driver torque at which the bound begins to shrink.
+const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
+/// How fast it shrinks, N.m per N.m.
+const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
 
 /// Length of the window. Growth is counted from an anchor that moves up every 250 ms.
 pub const WINDOW: Micros = Micros::from_ms(250);
@@ -140,7 +141,7 @@ impl Envelope {
             self.absolute,
             LimitReason::Absolute,
         );
-        let window = state.anchor.abs().plus(self.window);
+        let window = state.anchor.abs().plus(WINDOW_GROWTH);
         hold(&mut command, window.opposite(), window, LimitReason::Window);
         self.hold_rates(&mut command, at);
         // Last, and exempt from the reduction limit: whatever else holds, the driver's hand wins at once.
@@ -153,7 +154,7 @@ impl Envelope {
     /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
-        let step = |rate: TorqueRate| Torque::from_wide(per_second_times(i64::from(rate.bits()), elapsed));
+        let step = |rate: TorqueRate| Torque::from_bits(per_second(rate.bits(), elapsed));
         let growth = step(self.wind_up);
         let fall = step(self.reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
         // Judged in the frame where the applied torque is positive.
@@ -177,9 +178,13 @@ impl Envelope {
     /// `clamp(L + 3*(T_d + 0.8), 0, L)` above, `-clamp(L + 3*(0.8 - T_d), 0, L)` below (defaults).
     fn override_bounds(&self, driver: Torque) -> (Torque, Torque) {
         let bound = |toward: Torque| {
-            let margin = toward.plus(self.override_from);
-            let shrunk = i64::from(self.absolute.bits())
-                .saturating_add(product(self.override_slope.bits(), margin.bits()));
+            let margin = toward.plus(OVERRIDE_FROM);
+            // The usual case first: on this side the driver does not oppose.
+            if margin >= Torque::ZERO {
+                return self.absolute;
+            }
+            let shrunk =
+                i64::from(self.absolute.bits()).saturating_add(product(OVERRIDE_SLOPE.bits(), margin.bits()));
             // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway. Not
             // `clamp`, which panics where its bounds are out of order.
             Torque::from_wide(shrunk.min(i64::from(self.absolute.bits())).max(0))

@@ -17,7 +17,8 @@
 
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
-    TorquePerTurningRate, TurningRate, per_second_times, product, saturate, shift_round,
+    TorquePerTurningRate, TurningRate, per_second, per_second_times, product, quotient, saturate,
+    shift_round,
 };
 use crate::redundant::words;
 
@@ -161,7 +162,7 @@ const RATE_BITS: u32 = 20;
 
 /// Largest rate the filter may hold, 1000 m/s or rad/s. No road or vehicle comes near it; the clamp keeps
 /// every product of the step inside an `i64` whatever the samples are.
-const MAX_RATE: u64 = 1000 << RATE_BITS;
+const MAX_RATE: u32 = 1000 << RATE_BITS;
 
 impl Law {
     /// The torque that the law asks for now, from the latest sample received; `since` is what the vehicle did since that
@@ -196,31 +197,31 @@ impl Law {
         let change = i64::from(to)
             .saturating_sub(i64::from(from))
             .saturating_mul(1_000_000 << 4);
-        let sum = tau.saturating_mul(i64::from(rate)).saturating_add(change);
-        let span = tau.saturating_add(i64::from(dt.us()) << 8).unsigned_abs();
-        // Rounded to nearest. The divisor is never zero (tau is at least 2.6 ms, params.rs); `checked_div` says so
-        // without a panic path.
-        let size = sum.unsigned_abs().saturating_add(span >> 1);
-        let size = saturate(size.checked_div(span).unwrap_or(0).min(MAX_RATE).cast_signed());
+        // 32 bits times 31.
+        let sum = tau.wrapping_mul(i64::from(rate)).saturating_add(change);
+        // At most 100 ms and 320 ms, in 2^-8 us.
+        let span = self.tau.saturating_add(dt.us().saturating_mul(1 << 8));
+        // Rounded to nearest.
+        let size = sum.unsigned_abs().saturating_add(u64::from(span >> 1));
+        let size = quotient(size, span).min(MAX_RATE).cast_signed();
         if sum < 0 { size.saturating_neg() } else { size }
     }
 
     /// Exact wide products, one rounding. Gains have 24 fractional bits, errors are cut to 20 like the
     /// rates, so that every product has 44: an error's 2^-21 of rounding costs at most 0.02 mN.m at the
-    /// largest gain of 32.
+    /// largest gain of 32. With that gain a product has at most 2^60, and the sum of four 2^62.
     fn torque(&self, state: &LawState, age: Micros) -> Torque {
-        // Errors continued at their rates, in 2^-20: at most 128 + 1000*0.03, well inside an i64.
+        // Errors continued at their rates, in 2^-20: at most 128 and half of what a rate may be.
         let now = |error: i32, rate: i32| {
-            shift_round(i64::from(error), 4).saturating_add(per_second_times(i64::from(rate), age))
+            let rounded = (error >> 3).saturating_add(1) >> 1;
+            rounded.saturating_add(per_second(rate, age))
         };
-        let term = |gain: i32, value: i64| i64::from(gain).saturating_mul(value);
-        let sum = term(self.e_y.bits(), now(state.last.e_y.bits(), state.e_y_rate))
-            .saturating_add(term(self.e_y_rate.bits(), i64::from(state.e_y_rate)))
-            .saturating_add(term(
-                self.e_theta.bits(),
-                now(state.last.e_theta.bits(), state.e_theta_rate),
-            ))
-            .saturating_add(term(self.e_theta_rate.bits(), i64::from(state.e_theta_rate)));
-        Torque::from_bits(saturate(shift_round(sum, RATE_BITS)))
+        let term = |gain: i32, value: i32| i64::from(gain).wrapping_mul(i64::from(value));
+        let (e_y, e_theta) = (state.last.e_y.bits(), state.last.e_theta.bits());
+        let sum = term(self.e_y.bits(), now(e_y, state.e_y_rate))
+            .wrapping_add(term(self.e_y_rate.bits(), state.e_y_rate))
+            .wrapping_add(term(self.e_theta.bits(), now(e_theta, state.e_theta_rate)))
+            .wrapping_add(term(self.e_theta_rate.bits(), state.e_theta_rate));
+        Torque::from_wide(shift_round(sum, RATE_BITS))
     }
 }

@@ -136,10 +136,12 @@ impl Monitor {
         let old = if changes_sign { 0 } else { state.torque_mnm };
         let grown = torque.saturating_abs().saturating_sub(old.saturating_abs());
         let within = |per_ms: i32| {
-            per_ms
-                .saturating_mul(elapsed_us.clamp(1000, 2000))
-                .saturating_div(1000)
-                .saturating_add(TOLERANCE_MNM)
+            let so_long = if elapsed_us <= 1000 {
+                per_ms
+            } else {
+                per_ms.saturating_mul(elapsed_us.min(2000)).saturating_div(1000)
+            };
+            so_long.saturating_add(TOLERANCE_MNM)
         };
         let allowed = if mode == ACTIVE {
             within(self.growth_mnm_per_ms)
@@ -213,13 +215,17 @@ impl Monitor {
             .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
         // What an old sample has become since, at most: the errors went on at their rates.
         let late_ms = lane.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
-        let carried = per_m
-            .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
-            .saturating_div(1000)
-            .saturating_add(
-                per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
-            );
-        let position = position.saturating_add(carried);
+        let position = if late_ms == 0 {
+            position
+        } else {
+            let carried = per_m
+                .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
+                .saturating_div(1000)
+                .saturating_add(
+                    per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
+                );
+            position.saturating_add(carried)
+        };
         let both = position.saturating_add(rate);
         let probe = if state.probe_left_us > 0 {
             self.probe_mnm

@@ -7,7 +7,7 @@
 //! [`crate::law`], so that a flip moves the torque by less than the monitor's band; what the checks take can declare
 //! or hide a fault for one second.
 
-use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second_times, saturate};
+use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second, saturate};
 
 /// A power of two, so that the place is a mask.
 const RING: usize = 32;
@@ -37,8 +37,8 @@ impl Heading {
 
     /// The heading at an instant not before this one.
     fn psi_at(&self, at: Instant) -> i32 {
-        let turned = per_second_times(i64::from(self.rate.bits()), at.since(self.at));
-        self.psi.wrapping_add(saturate(turned))
+        self.psi
+            .wrapping_add(per_second(self.rate.bits(), at.since(self.at)))
     }
 }
 
@@ -116,8 +116,19 @@ impl Past {
         let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
         let wanted = at.before(before);
         let age = now.since(wanted);
-        let mut backs = 0..self.known_lines;
-        let back = backs.find(|back| now.since(place(*back).0) >= age)?;
+        // The first that is as old, by halving: the further back, the older.
+        let (mut back, mut end) = (0, self.known_lines);
+        while back < end {
+            let middle = back.wrapping_add(end) / 2;
+            if now.since(place(middle).0) >= age {
+                end = middle;
+            } else {
+                back = middle.saturating_add(1);
+            }
+        }
+        if back >= self.known_lines {
+            return None;
+        }
         let (from, direction) = place(back);
         // Straight from there to the one after.
         let (to, next) = place(back.saturating_sub(1));

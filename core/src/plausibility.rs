@@ -32,7 +32,7 @@ use crate::past::Past;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
-    per_second_times, product,
+    per_second_times, product, signed_quotient, wide_product,
 };
 use crate::redundant::words;
 
@@ -220,17 +220,20 @@ impl Plausibility {
     /// Takes the speed in use and the measured yaw rate; returns nothing, for neither has a counterpart here. How fast
     /// the vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle model.
     pub fn motion(&self, state: &mut PlausibilityState, speed: Speed, yaw_rate: Option<TurningRate>) {
+        let is_known = speed == state.speed && state.has_yaw_rate == 0;
         state.has_yaw_rate = u32::from(yaw_rate.is_some());
         state.yaw_rate = yaw_rate.unwrap_or(TurningRate::ZERO);
-        if speed == state.speed {
+        state.speed = speed;
+        // Nobody asks for the gain while the rate is measured.
+        if is_known || yaw_rate.is_some() {
             return;
         }
-        state.speed = speed;
         let v = speed.bits();
-        let slip = (i64::from(self.stability_factor.bits()).saturating_mul(product(v, v))) >> FRAC_BITS;
-        let divisor = slip.saturating_add(1 << FRAC_BITS);
-        let gain = (i64::from(self.curvature_gain.bits()).saturating_mul(i64::from(v))).checked_div(divisor);
-        state.turning_gain = TurningRatePerAngle::from_wide(gain.unwrap_or(0));
+        let slip = wide_product(product(v, v), self.stability_factor.bits()) >> FRAC_BITS;
+        // 82 at most: at 90 m/s with the largest factor.
+        let divisor = u32::try_from(slip.saturating_add(1 << FRAC_BITS)).unwrap_or(0);
+        let gain = i64::from(self.curvature_gain.bits()).saturating_mul(i64::from(v));
+        state.turning_gain = TurningRatePerAngle::from_bits(signed_quotient(gain, divisor));
     }
 
     /// Takes driver torque, wheel angle and the guidance torque applied; `false` when they cannot belong
@@ -249,14 +252,14 @@ impl Plausibility {
         if state.has_column != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
             let lateral = product(state.speed.bits(), state.turning().bits());
-            let aligning = i64::from(self.aligning_gain.bits()).saturating_mul(lateral) >> FRAC_BITS;
+            let aligning = wide_product(lateral, self.aligning_gain.bits()) >> FRAC_BITS;
             let lacking = i64::from(applied.bits()).saturating_sub(aligning);
             // What driver and assist may give together.
             let driver = i64::from(driver.bits());
             let assisted = driver.saturating_mul(ASSIST);
             let least = lacking.saturating_add(driver.min(assisted));
             let most = lacking.saturating_add(driver.max(assisted));
-            let damped = i64::from(self.column_damping.bits()).saturating_mul(moved) >> FRAC_BITS;
+            let damped = wide_product(moved, self.column_damping.bits()) >> FRAC_BITS;
             // All times dt, for the wheel's movement is that of dt.
             let impulse = |torque: i64| per_second_times(torque, dt);
             let (least, most) = (
@@ -302,7 +305,7 @@ impl Plausibility {
             } else {
                 let heading = product(state.speed.bits(), state.lane.e_theta.bits());
                 let far = product(self.far_time.bits(), state.speed.bits());
-                let turned = (far.saturating_mul(i64::from(state.turning().bits()))) >> FRAC_BITS;
+                let turned = wide_product(far, state.turning().bits()) >> FRAC_BITS;
                 Some(heading.saturating_sub(turned))
             };
             // Where the line is not known for long enough, nothing is predicted.
@@ -331,7 +334,7 @@ impl Plausibility {
         let turning = past.heading(now, at).rate;
         let along = product(state.speed.bits(), near.bits());
         let reach = product(self.near_time.bits(), state.speed.bits());
-        let across = reach.saturating_mul(i64::from(turning.bits())) >> FRAC_BITS;
+        let across = wide_product(reach, turning.bits()) >> FRAC_BITS;
         Some(along.saturating_sub(across))
     }
 

@@ -12,7 +12,7 @@
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
 //! word on the sum), and what the answer tells ([`crate::estimator`]).
 
-use crate::quantity::{Micros, Torque, shift_round};
+use crate::quantity::{Micros, Torque, saturate, shift_round};
 use crate::redundant::words;
 use crate::sine::sine;
 
@@ -63,7 +63,7 @@ impl Probe {
             i64::from(state.gain >> 1).saturating_mul(i64::from(sine(state.phase))),
             31,
         );
-        let torque = share.saturating_mul(i64::from(self.amplitude.bits()));
+        let torque = i64::from(saturate(share)).saturating_mul(i64::from(self.amplitude.bits()));
         Some(Torque::from_wide(shift_round(torque, 30)))
     }
 }

@@ -15,9 +15,14 @@
     reason = "the one file where SI values become bits: `as` saturates from floats, and widens integers"
 )]
 
+mod arithmetic;
+
 use core::fmt;
 
 use crate::redundant::Words;
+pub(crate) use arithmetic::{
+    per_second, per_second_times, product, quotient, saturate, shift_round, signed_quotient, wide_product,
+};
 
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $from:ident, $get:ident, $unit:literal) => {
@@ -281,35 +286,6 @@ impl Words for Instant {
     fn is_inverse_of(&self, other: &Self) -> bool {
         self.0.is_inverse_of(&other.0)
     }
-}
-
-/// `a * b` of two I8F24 values as I8F24 bits, rounded to nearest.
-pub(crate) const fn product(a: i32, b: i32) -> i64 {
-    shift_round((a as i64).saturating_mul(b as i64), FRAC_BITS)
-}
-
-/// `bits * span / 1 s`, for a span of at most 0.5 s: 2^32 / 10^6 as a multiplier, 8e-6 of relative error.
-pub(crate) const fn per_second_times(bits: i64, span: Micros) -> i64 {
-    let us = if span.us() > 500_000 { 500_000 } else { span.us() };
-    shift_round(bits.saturating_mul((us as i64).saturating_mul(4295)), 32)
-}
-
-/// Nearest `i32`, saturating.
-pub(crate) const fn saturate(wide: i64) -> i32 {
-    if wide > i32::MAX as i64 {
-        i32::MAX
-    } else if wide < i32::MIN as i64 {
-        i32::MIN
-    } else {
-        wide as i32
-    }
-}
-
-/// `value / 2^shift`, rounded to nearest (ties away from minus infinity). `shift` is 1 to 62.
-pub(crate) const fn shift_round(value: i64, shift: u32) -> i64 {
-    value
-        .saturating_add(1_i64.wrapping_shl(shift.wrapping_sub(1)))
-        .wrapping_shr(shift)
 }
 
 const fn round_to_bits(si: f64) -> i32 {

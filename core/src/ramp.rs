@@ -4,7 +4,7 @@
 //! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/safety.md has the
 //! table). Neither ramp ever grows.
 
-use crate::quantity::{Instant, Micros, Torque, TorqueRate};
+use crate::quantity::{Instant, Micros, Torque, TorqueRate, signed_quotient};
 use crate::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
@@ -53,9 +53,10 @@ impl Ramp {
     pub fn step(&mut self, elapsed: Micros) -> Torque {
         self.done = Micros::from_us(self.done.us().saturating_add(elapsed.us()));
         let left = i64::from(self.length.us().saturating_sub(self.done.us()));
-        let torque = i64::from(self.from.bits()).saturating_mul(left);
+        // 32 bits times 31.
+        let torque = i64::from(self.from.bits()).wrapping_mul(left);
         // The length is never zero by construction; a division that truncates never grows the torque.
-        Torque::from_wide(torque.checked_div(i64::from(self.length.us())).unwrap_or(0))
+        Torque::from_bits(signed_quotient(torque, self.length.us()))
     }
 
     /// Whether zero is reached.

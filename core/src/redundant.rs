@@ -4,6 +4,7 @@
 //! whatever a flip makes of it can be read, compared and refused. Not here: what a refusal leads to.
 
 use core::hint::black_box;
+use core::ops::Not;
 
 /// A value made of 32-bit words, each of which may hold any bits.
 pub trait Words: Copy + PartialEq {
@@ -108,6 +109,19 @@ impl<T: Words> Redundant<T> {
         let result = change(&mut self.value);
         self.inverted = self.value.complement();
         Some(result)
+    }
+
+    /// Changes the value in place, which [`Redundant::get`] has found whole in this step.
+    pub(crate) fn amend<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> R {
+        let result = change(&mut self.value);
+        self.inverted = self.value.complement();
+        result
+    }
+
+    /// Changes a part in both copies and leaves the rest as it is, what a flip made of it too.
+    pub(crate) fn put<P: Copy + Not<Output = P>>(&mut self, part: impl Fn(&mut T) -> &mut P, new: P) {
+        *part(&mut self.value) = new;
+        *part(&mut self.inverted) = !new;
     }
 
     /// Changes the words of both copies apart, as faults do.

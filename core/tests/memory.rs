@@ -93,6 +93,23 @@ fn a_flip_before_a_frame_arrives_is_found_too() {
     assert_eq!(rig.tick().command.mode, Mode::Fault);
 }
 
+/// A frame changes a part of its receiver only: a flip is neither sealed in nor written over, whichever frame comes first.
+#[test]
+fn every_flip_before_any_frame_is_found_too() {
+    for sender in 0..4 {
+        let rig = Rig::active_in_curve(1.0);
+        for bit in 0..rig.ecu.redundant_bits(Region::Ecu) {
+            let mut rig = rig.clone();
+            rig.ecu.flip_bit(Region::Ecu, bit);
+            let frame = rig.frame(sender);
+            assert_eq!(rig.send(&frame), Ok(()), "{sender} {bit}");
+            let command = rig.tick().command;
+            assert_eq!(command.mode, Mode::Fault, "{sender} {bit}");
+            assert!(command.faults.contains(Fault::Memory), "{sender} {bit}");
+        }
+    }
+}
+
 #[test]
 fn the_guard_holds_a_value_and_its_inverse() {
     for word in [0_u32, 1, 0xDEAD_BEEF, u32::MAX] {

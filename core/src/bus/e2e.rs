@@ -12,15 +12,13 @@
 
 use crc::{CRC_8_AUTOSAR, Crc};
 
-use crate::redundant::words;
-
 /// Data IDs, one for each counter value.
 const DATA_IDS: [u8; 16] = [
     0xD9, 0xAD, 0xC1, 0x0B, 0x75, 0xF8, 0xE0, 0x7C, 0x7A, 0xE6, 0xAE, 0x92, 0x9B, 0x3E, 0xEA, 0x5E,
 ];
 
 /// Clean frames in a row before a resumed sender is trusted.
-pub const CLEAN_FRAMES_TO_TRUST: u32 = 3;
+pub const CLEAN_FRAMES_TO_TRUST: u8 = 3;
 
 static CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
 
@@ -132,18 +130,17 @@ impl Reject {
     }
 }
 
-words! {
-    /// One receiver's memory of a sender.
-    pub struct ReceiverState {
-        /// Counter of the last frame, [`NONE`] before the first.
-        last: u32,
-        /// Clean frames in a row, as far as they matter.
-        clean: u32,
-    }
+/// One receiver's memory of a sender. In bytes, so that whoever keeps it twice has half a word to check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReceiverState {
+    /// Counter of the last frame, [`NONE`] before the first.
+    pub(crate) last: u8,
+    /// Clean frames in a row, as far as they matter.
+    pub(crate) clean: u8,
 }
 
 /// No counter has been heard.
-const NONE: u32 = 16;
+const NONE: u8 = 16;
 
 impl ReceiverState {
     /// A sender not yet heard.
@@ -169,7 +166,7 @@ impl ReceiverState {
         if !protection.is_intact(data) {
             return Err(Reject::Crc);
         }
-        let counter = u32::from(data[1] & 0x0F);
+        let counter = data[1] & 0x0F;
         let delta = (self.last != NONE).then(|| counter.wrapping_sub(self.last) & 0x0F);
         if !self.is_trusted() {
             self.clean = if delta == Some(1) {
@@ -187,7 +184,7 @@ impl ReceiverState {
         match delta {
             Some(0) => Err(Reject::Repeated),
             // A frame out of order must not move the counter: the next one in order is still good.
-            Some(delta) if delta > u32::from(max_delta) => Err(Reject::Jump),
+            Some(delta) if delta > max_delta => Err(Reject::Jump),
             _ => {
                 self.last = counter;
                 Ok(())

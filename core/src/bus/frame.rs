@@ -58,6 +58,11 @@ impl Frame {
         &self.data
     }
 
+    /// Whether all eight bytes are payload.
+    pub(crate) const fn is_full(&self) -> bool {
+        self.len == 8
+    }
+
     /// All eight bytes, if the frame is full.
     #[must_use]
     pub fn full_data(&self) -> Option<[u8; 8]> {

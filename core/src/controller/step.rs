@@ -12,8 +12,7 @@ use crate::modes::{Event, Events, Mode};
 use crate::past::Past;
 use crate::probe::ProbeState;
 use crate::quantity::{
-    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second_times, product,
-    saturate,
+    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, saturate,
 };
 use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
@@ -26,11 +25,11 @@ const LATE: Micros = Micros::from_us(2_500);
 /// A step that comes this late is a fault by itself: the world has moved on by half a camera period.
 const LOST_TIME: Micros = Micros::from_ms(10);
 /// So many late steps in a row are tolerated.
-const LATE_STEPS: u32 = 1;
+const LATE_STEPS: u8 = 1;
 /// A step that comes sooner than this was not asked for.
 const EARLY: Micros = Micros::from_us(500);
 /// So many early steps in a row are tolerated: they earn no rate limit, but a runaway timer is a fault.
-const EARLY_STEPS: u32 = 3;
+const EARLY_STEPS: u8 = 3;
 
 /// A lane sample that is no older than this when it comes needs no other making up for than its rates.
 const PROMPT: Micros = Micros::from_ms(10);
@@ -53,7 +52,7 @@ impl<I: Injection> Step<'_, I> {
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
         v.latched |= faults.common(FaultSet::CRITICAL).bits();
 
-        let before = Mode::from_code(v.mode).unwrap_or(Mode::Fault);
+        let before = Mode::from_code(v.small.mode.into()).unwrap_or(Mode::Fault);
         if before == Mode::Active {
             v.hands
                 .guided(without(self.applied, Some(v.probe_applied)), self.elapsed);
@@ -174,9 +173,8 @@ impl<I: Injection> Step<'_, I> {
         } else if let Input::New(_) = self.inputs.lane {
             (v.turned, v.rate_then) = past.turned(self.now, sample.at);
         } else {
-            let turning = i64::from(v.plausibility.turning().bits());
-            let turned = i64::from(v.turned.bits()).saturating_add(per_second_times(turning, self.elapsed));
-            v.turned = Radians::from_wide(turned);
+            let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
+            v.turned = Radians::from_bits(v.turned.bits().saturating_add(turned));
         }
     }
 
@@ -186,8 +184,8 @@ impl<I: Injection> Step<'_, I> {
         if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
             return Since::NOTHING;
         }
-        let went_on = per_second_times(i64::from(v.rate_then.bits()), age);
-        let turned = i64::from(v.turned.bits()).saturating_sub(went_on);
+        let went_on = per_second(v.rate_then.bits(), age);
+        let turned = i64::from(v.turned.bits()).saturating_sub(i64::from(went_on));
         let faster = i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.rate_then.bits()));
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.bits(), speed.bits());
@@ -216,18 +214,18 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
-    fn keep_time(&self, v: &mut Memory) -> (u32, u32) {
-        v.late = match self.elapsed {
+    fn keep_time(&self, v: &mut Memory) -> (u8, u8) {
+        v.small.late = match self.elapsed {
             e if e > LOST_TIME => LATE_STEPS.saturating_add(1),
-            e if e > LATE => v.late.saturating_add(1),
+            e if e > LATE => v.small.late.saturating_add(1),
             _ => 0,
         };
-        v.early = if self.elapsed < EARLY {
-            v.early.saturating_add(1)
+        v.small.early = if self.elapsed < EARLY {
+            v.small.early.saturating_add(1)
         } else {
             0
         };
-        (v.late, v.early)
+        (v.small.late, v.small.early)
     }
 
     /// The most urgent event that changes the mode decides.
@@ -235,9 +233,9 @@ impl<I: Injection> Step<'_, I> {
         let inputs_ok = !faults.intersects(FaultSet::INPUT);
         let request = self.inputs.request.value().map(|r| r.engage);
         let fast_enough = self.is_fast_enough();
-        let rising = request == Some(true) && v.requested == 0;
+        let rising = request == Some(true) && v.small.requested == 0;
         if let Some(high) = request {
-            v.requested = u32::from(high);
+            v.small.requested = u8::from(high);
         }
         v.ready = if mode == Mode::Standby && inputs_ok && fast_enough == Some(true) {
             Micros::from_us(v.ready.us().saturating_add(self.elapsed.us())).min(READY)
@@ -259,7 +257,7 @@ impl<I: Injection> Step<'_, I> {
 
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
-        v.mode = mode as u32;
+        v.small.mode = mode as u8;
         v.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.

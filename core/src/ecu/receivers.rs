@@ -15,7 +15,7 @@ use crate::faults::{Fault, FaultSet};
 use crate::law::LaneSample;
 use crate::plausibility::{is_another_line, lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
-use crate::redundant::{Redundant, Words, words};
+use crate::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
 const COLUMN_PERIOD_US: u32 = 2000;
@@ -24,15 +24,15 @@ const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 /// Slower is standing.
 const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
 
-/// The latest value of one input, with what judges the next.
+/// The latest value of one input, with what judges the next. What is small shares a word: a step checks every one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub(super) struct Slot<T> {
     e2e: ReceiverState,
     /// [`LOST`], [`HELD`] or [`NEW`], as an [`Input`].
-    state: u32,
+    state: u8,
     /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason.
-    doubt: u32,
+    doubt: u8,
     /// When it was heard.
     at: Instant,
     /// How far apart its sender's messages come.
@@ -50,26 +50,34 @@ const REQUEST_PERIOD: Micros = Micros::from_ms(25);
 const OLDEST_SAMPLE: Micros = Micros::from_ms(150);
 
 /// Its sender did not vouch for it.
-const INVALID: u32 = 1;
+const INVALID: u8 = 1;
 /// It was too far from the last one used.
-const STEP: u32 = 2;
+const STEP: u8 = 2;
 
 /// So many steps after a frame under an identifier of this ECU, that is still a fault: a second.
 const FOREIGN_STEPS: u32 = 1000;
 
 /// Nothing heard, or not for too long.
-const LOST: u32 = 0;
+const LOST: u8 = 0;
 /// A value that a step has seen.
-const HELD: u32 = 1;
+const HELD: u8 = 1;
 /// A value that no step has seen.
-const NEW: u32 = 2;
+const NEW: u8 = 2;
+
+impl<T> Slot<T> {
+    /// What is small, as a word.
+    fn head(&self) -> u32 {
+        u32::from_ne_bytes([self.e2e.last, self.e2e.clean, self.state, self.doubt])
+    }
+}
 
 impl<T: Words> Words for Slot<T> {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        let [last, clean, state, doubt] = change(self.head()).to_ne_bytes();
         Self {
-            e2e: self.e2e.map_words(change),
-            state: change(self.state),
-            doubt: change(self.doubt),
+            e2e: ReceiverState { last, clean },
+            state,
+            doubt,
             at: self.at.map_words(change),
             period: self.period.map_words(change),
             value: self.value.map_words(change),
@@ -77,9 +85,7 @@ impl<T: Words> Words for Slot<T> {
     }
 
     fn is_inverse_of(&self, other: &Self) -> bool {
-        self.e2e.is_inverse_of(&other.e2e)
-            & self.state.is_inverse_of(&other.state)
-            & self.doubt.is_inverse_of(&other.doubt)
+        self.head().is_inverse_of(&other.head())
             & self.at.is_inverse_of(&other.at)
             & self.period.is_inverse_of(&other.period)
             & self.value.is_inverse_of(&other.value)
@@ -120,125 +126,156 @@ impl<T: Words> Slot<T> {
 
     /// For how long the value may be used.
     fn timeout(&self) -> Micros {
-        Micros::from_us(self.period.us().saturating_mul(3)).max(TIMEOUT)
+        // No period is longer than the slowest sender's.
+        Micros::from_us(self.period.us().wrapping_mul(3)).max(TIMEOUT)
     }
 
     fn last(&self) -> Option<T> {
         (self.state != LOST).then_some(self.value)
     }
-
-    /// What a step sees. A stale value is dropped, so that no instant outlives a wrap of the clock, and its
-    /// sender has to be trusted anew.
-    fn take(&mut self, now: Instant) -> Input<T> {
-        if self.state != LOST && now.since(self.at) > self.timeout() {
-            self.state = LOST;
-            self.e2e = ReceiverState::NEW;
-        }
-        let seen = self.state;
-        self.state = seen.min(HELD);
-        match seen {
-            LOST => Input::Lost,
-            HELD => Input::Held(self.value),
-            _ => Input::New(self.value),
-        }
-    }
 }
 
-words! {
-    /// A lane sample that was too far from the last one used, and whether there is one.
-    struct Refused {
-        sample: LaneSample,
-        is_there: u32,
-        /// 1 when the sample in use is of another line than the one before.
-        moved: u32,
-    }
+/// What a step sees, and the doubt about the last frame. A stale value is dropped, so that no instant outlives a wrap of
+/// the clock, and its sender has to be trusted anew. Only what changes is written: in most steps nothing. `whole` becomes
+/// false if the slot is damaged.
+fn take<T: Words>(guarded: &mut Redundant<Slot<T>>, now: Instant, whole: &mut bool) -> (Input<T>, u8) {
+    let Some(slot) = guarded.get() else {
+        *whole = false;
+        return (Input::Lost, 0);
+    };
+    let (state, doubt, value) = (slot.state, slot.doubt, slot.value);
+    let seen = if state == LOST {
+        Input::Lost
+    } else if now.since(slot.at) > slot.timeout() {
+        guarded.amend(|slot| (slot.state, slot.e2e) = (LOST, ReceiverState::NEW));
+        Input::Lost
+    } else if state == HELD {
+        Input::Held(value)
+    } else {
+        guarded.put(|slot| &mut slot.state, HELD);
+        Input::New(value)
+    };
+    (seen, doubt)
 }
 
-/// The lane's receiver: what it hears, and what it refused last.
+/// A lane sample that was too far from the last one used, and whether there is one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
-pub(super) struct LaneSlot {
-    slot: Slot<LaneSample>,
-    refused: Refused,
+pub(super) struct Refused {
+    is_there: u16,
+    /// 1 when the sample in use is of another line than the one before.
+    moved: u16,
+    sample: LaneSample,
 }
 
-impl Words for LaneSlot {
+impl Words for Refused {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        let [is_there, moved] = halves(change(word([self.is_there, self.moved])));
         Self {
-            slot: self.slot.map_words(change),
-            refused: self.refused.map_words(change),
+            is_there,
+            moved,
+            sample: self.sample.map_words(change),
         }
     }
 
     fn is_inverse_of(&self, other: &Self) -> bool {
-        self.slot.is_inverse_of(&other.slot) & self.refused.is_inverse_of(&other.refused)
+        let [mine, others] = [self, other].map(|refused| word([refused.is_there, refused.moved]));
+        mine.is_inverse_of(&others) & self.sample.is_inverse_of(&other.sample)
     }
 }
 
-impl LaneSlot {
-    /// Takes a preview. Two in a row that agree with each other, and with a line chosen anew, begin that line.
-    fn take(&mut self, lane: &LanePreview, now: Instant) -> Result<(), Reject> {
-        let Self { slot, refused } = self;
-        slot.doubt = u32::from(!lane.valid);
-        if !lane.valid {
-            return Ok(());
-        }
-        let sample = LaneSample {
-            e_y: lane.e_y,
-            e_theta: lane.e_theta,
-            at: now.before(lane.age),
-        };
-        let Some(last) = slot.last() else {
-            refused.is_there = 0;
-            return Self::use_if_young(slot, sample, lane.age, now);
-        };
+/// Two halves as a word.
+fn word([low, high]: [u16; 2]) -> u32 {
+    u32::from(low) | u32::from(high) << 16
+}
+
+#[expect(clippy::as_conversions, reason = "the halves of a word")]
+fn halves(word: u32) -> [u16; 2] {
+    [word as u16, (word >> 16) as u16]
+}
+
+/// Takes a preview; `None` if what was refused last is damaged. Two in a row that agree with each other, and with a line
+/// chosen anew, begin that line.
+fn take_preview(
+    slot: &mut Slot<LaneSample>,
+    refused: &mut Redundant<Refused>,
+    lane: &LanePreview,
+    now: Instant,
+) -> Option<Result<(), Reject>> {
+    let before = *refused.get()?;
+    slot.doubt = u8::from(!lane.valid);
+    if !lane.valid {
+        return Some(Ok(()));
+    }
+    let sample = LaneSample {
+        e_y: lane.e_y,
+        e_theta: lane.e_theta,
+        at: now.before(lane.age),
+    };
+    if let Some(last) = slot.last() {
         // A span of almost a whole wrap of the clock is a step back in time: what differences samples would take it
         // for a gap and start anew.
         if sample.at.since(last.at) > HALF_WRAP {
-            return Err(Reject::Older);
+            return Some(Err(Reject::Older));
         }
-        if lane_step_is_possible(&last, &sample) {
-            refused.is_there = 0;
-            return Self::use_if_young(slot, sample, lane.age, now);
+        if !lane_step_is_possible(&last, &sample) {
+            let agrees = before.is_there != 0 && lane_step_is_possible(&before.sample, &sample);
+            if !(agrees && is_another_line(&last, &sample)) {
+                refused.amend(|refused| (refused.sample, refused.is_there) = (sample, 1));
+                slot.doubt = STEP;
+                return Some(Err(Reject::Step));
+            }
+            refused.put(|refused| &mut refused.moved, 1);
         }
-        let agrees = refused.is_there != 0 && lane_step_is_possible(&refused.sample, &sample);
-        if agrees && is_another_line(&last, &sample) {
-            (refused.is_there, refused.moved) = (0, 1);
-            return Self::use_if_young(slot, sample, lane.age, now);
-        }
-        (refused.sample, refused.is_there) = (sample, 1);
-        slot.doubt = STEP;
-        Err(Reject::Step)
     }
-
-    fn use_if_young(
-        slot: &mut Slot<LaneSample>,
-        sample: LaneSample,
-        age: Micros,
-        now: Instant,
-    ) -> Result<(), Reject> {
-        if age > OLDEST_SAMPLE {
-            return Err(Reject::Older);
-        }
-        slot.put(sample, now, LANE_PERIOD);
-        Ok(())
+    if before.is_there != 0 {
+        refused.put(|refused| &mut refused.is_there, 0);
     }
+    if lane.age > OLDEST_SAMPLE {
+        return Some(Err(Reject::Older));
+    }
+    slot.put(sample, now, LANE_PERIOD);
+    Some(Ok(()))
 }
 
 /// Bytes of frames accepted since the last step, for the monitor's own decoding.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
     pub(super) column: Option<[u8; 8]>,
     pub(super) demand: Option<[u8; 8]>,
 }
 
-words! {
-    /// A [`Request`], its flags as words.
-    pub(super) struct RequestWords {
-        engage: u32,
-        authority: Ratio,
-        probe: u32,
+impl Accepted {
+    pub(super) const NONE: Self = Self {
+        lane: None,
+        column: None,
+        demand: None,
+    };
+}
+
+/// A [`Request`], its flags in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
+pub(super) struct RequestWords {
+    engage: u16,
+    probe: u16,
+    authority: Ratio,
+}
+
+impl Words for RequestWords {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        let [engage, probe] = halves(change(word([self.engage, self.probe])));
+        Self {
+            engage,
+            probe,
+            authority: self.authority.map_words(change),
+        }
+    }
+
+    fn is_inverse_of(&self, other: &Self) -> bool {
+        let [mine, others] = [self, other].map(|request| word([request.engage, request.probe]));
+        mine.is_inverse_of(&others) & self.authority.is_inverse_of(&other.authority)
     }
 }
 
@@ -255,7 +292,8 @@ impl From<RequestWords> for Request {
 /// The receivers of all inputs.
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
-    pub(super) lane: Redundant<LaneSlot>,
+    pub(super) lane: Redundant<Slot<LaneSample>>,
+    pub(super) refused: Redundant<Refused>,
     pub(super) column: Redundant<Slot<Column>>,
     pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
@@ -284,19 +322,17 @@ impl Receivers {
             probe: 0,
         };
         Self {
-            lane: Redundant::new(LaneSlot {
-                slot: Slot::new(e2e, lane, now),
-                refused: Refused {
-                    sample: lane,
-                    is_there: 0,
-                    moved: 0,
-                },
+            lane: Slot::redundant(e2e, lane, now),
+            refused: Redundant::new(Refused {
+                is_there: 0,
+                moved: 0,
+                sample: lane,
             }),
             column: Slot::redundant(e2e, column, now),
             motion: Slot::redundant(e2e, Motion::default(), now),
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
-            accepted: Accepted::default(),
+            accepted: Accepted::NONE,
             foreign: 0,
         }
     }
@@ -304,14 +340,17 @@ impl Receivers {
     /// Takes a frame. `None` if the receiver that it is for is damaged.
     pub(super) fn receive(&mut self, frame: &Frame, now: Instant) -> Option<Result<(), Reject>> {
         let Self {
-            actuator, accepted, ..
+            refused,
+            actuator,
+            accepted,
+            ..
         } = self;
         match frame.id() {
-            LanePreview::ID => self.lane.change(|lane| {
-                let preview = LanePreview::decode(&mut lane.slot.e2e, frame)?;
-                lane.take(&preview, now)?;
+            LanePreview::ID => self.lane.change(|slot| {
+                let preview = LanePreview::decode(&mut slot.e2e, frame)?;
+                take_preview(slot, refused, &preview, now).unwrap_or(Ok(()))?;
                 if preview.valid {
-                    accepted.lane = frame.full_data();
+                    accepted.lane = Some(*frame.bytes());
                 }
                 Ok(())
             }),
@@ -324,7 +363,7 @@ impl Receivers {
                 };
                 slot.put(column, now, COLUMN_PERIOD);
                 actuator.deliver(c.motor_torque);
-                accepted.column = frame.full_data();
+                accepted.column = Some(*frame.bytes());
                 Ok(())
             }),
             Vehicle::ID => self.motion.change(|slot| {
@@ -346,12 +385,12 @@ impl Receivers {
             Demand::ID => self.request.change(|slot| {
                 let demand = Demand::decode(&mut slot.e2e, frame)?;
                 let request = RequestWords {
-                    engage: u32::from(demand.engage),
+                    engage: u16::from(demand.engage),
+                    probe: u16::from(demand.probe),
                     authority: demand.authority,
-                    probe: u32::from(demand.probe),
                 };
                 slot.put(request, now, REQUEST_PERIOD);
-                accepted.demand = frame.full_data();
+                accepted.demand = Some(*frame.bytes());
                 Ok(())
             }),
             // On a bus nobody hears itself.
@@ -371,19 +410,21 @@ impl Receivers {
 
     /// The last lane preview passes for one that came now.
     pub(super) fn renew_lane(&mut self, now: Instant) {
-        let _ = self.lane.change(|lane| {
-            lane.slot.at = now;
-            lane.slot.value.at = now;
-        });
+        let _ = self.lane.change(|slot| (slot.at, slot.value.at) = (now, now));
     }
 
-    /// What a step sees, or `None` if a receiver is damaged.
-    pub(super) fn take(&mut self, now: Instant) -> Option<Inputs> {
-        let (lane, lane_doubt, moved) = self.lane.change(|lane| {
-            let moved = core::mem::replace(&mut lane.refused.moved, 0);
-            (lane.slot.take(now), lane.slot.doubt, moved)
-        })?;
-        let (motion, speeds_doubt) = self.motion.change(|slot| (slot.take(now), slot.doubt))?;
+    /// What a step sees; `whole` becomes false if a receiver is damaged.
+    pub(super) fn take(&mut self, now: Instant, whole: &mut bool) -> Inputs {
+        let (lane, lane_doubt) = take(&mut self.lane, now, whole);
+        let (column, _) = take(&mut self.column, now, whole);
+        let (motion, speeds_doubt) = take(&mut self.motion, now, whole);
+        let (request, _) = take(&mut self.request, now, whole);
+        let refused = self.refused.get();
+        *whole &= refused.is_some();
+        let line_moved = refused.is_some_and(|refused| refused.moved != 0);
+        if line_moved {
+            self.refused.put(|refused| &mut refused.moved, 0);
+        }
         let mut faults = FaultSet::NONE;
         // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
         if lane == Input::Lost {
@@ -395,14 +436,14 @@ impl Receivers {
             self.foreign = self.foreign.saturating_sub(1);
             faults.insert(Fault::OwnIdentifier);
         }
-        Some(Inputs {
+        Inputs {
             lane,
-            column: self.column.change(|slot| slot.take(now))?,
+            column,
             motion,
-            line_moved: moved != 0,
-            request: self.request.change(|slot| slot.take(now).map(Request::from))?,
+            line_moved,
+            request: request.map(Request::from),
             faults,
-        })
+        }
     }
 }
 

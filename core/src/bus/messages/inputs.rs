@@ -1,6 +1,6 @@
 //! What the ECU hears.
 
-use super::{Info, Message, from_lsb, info, put, signed, to_lsb, unsigned};
+use super::{Info, Message, from_lsb, info, is_within, narrow, put, to_bits, to_lsb, unsigned};
 use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, shift_round};
 
 /// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
@@ -46,12 +46,12 @@ impl Message for LanePreview {
 
     #[expect(clippy::as_conversions, reason = "masked to eleven bits")]
     fn unpack(word: u64) -> Option<Self> {
-        let e_y = signed(word, 12, 17);
-        let e_theta = signed(word, 29, 17);
-        let in_range = e_y.abs() <= Self::E_Y_MAX && e_theta.abs() <= Self::E_THETA_MAX;
+        let e_y = narrow(word, 12, 17);
+        let e_theta = narrow(word, 29, 17);
+        let in_range = is_within(e_y, Self::E_Y_MAX) && is_within(e_theta, Self::E_THETA_MAX);
         in_range.then(|| Self {
-            e_y: Metres::from_wide(from_lsb(e_y, Self::E_Y_LSB)),
-            e_theta: Radians::from_wide(from_lsb(e_theta, Self::E_THETA_LSB)),
+            e_y: Metres::from_bits(to_bits(e_y, Self::E_Y_LSB)),
+            e_theta: Radians::from_bits(to_bits(e_theta, Self::E_THETA_LSB)),
             age: Micros::from_us(
                 ((unsigned(word, 46, 9) | unsigned(word, 56, 2) << 9) as u32).wrapping_mul(Self::AGE_LSB_US),
             ),
@@ -107,16 +107,19 @@ impl Message for Column {
     }
 
     fn unpack(word: u64) -> Option<Self> {
-        let driver = signed(word, 12, 18);
-        let angle = signed(word, 30, 18);
-        let motor = signed(word, 48, 16);
-        let in_range = driver.abs() <= Self::DRIVER_MAX
-            && angle.abs() <= Self::ANGLE_MAX
-            && motor.abs() <= Self::MOTOR_MAX;
+        let driver = narrow(word, 12, 18);
+        let angle = narrow(word, 30, 18);
+        let motor = narrow(word, 48, 16);
+        let in_range = is_within(driver, Self::DRIVER_MAX)
+            && is_within(angle, Self::ANGLE_MAX)
+            && is_within(motor, Self::MOTOR_MAX);
         in_range.then(|| Self {
-            driver_torque: Torque::from_wide(from_lsb(driver, Self::TORQUE_LSB)),
-            wheel_angle: Radians::from_wide(shift_round(angle.saturating_mul(Self::ANGLE_UNIT), 16)),
-            motor_torque: Torque::from_wide(from_lsb(motor, Self::TORQUE_LSB)),
+            driver_torque: Torque::from_bits(to_bits(driver, Self::TORQUE_LSB)),
+            wheel_angle: Radians::from_wide(shift_round(
+                i64::from(angle).saturating_mul(Self::ANGLE_UNIT),
+                16,
+            )),
+            motor_torque: Torque::from_bits(to_bits(motor, Self::TORQUE_LSB)),
         })
     }
 }
@@ -153,14 +156,14 @@ impl Message for Vehicle {
     }
 
     fn unpack(word: u64) -> Option<Self> {
-        let raw = [signed(word, 12, 16), signed(word, 28, 16)];
+        let raw = [narrow(word, 12, 16), narrow(word, 28, 16)];
         // Guidance backwards makes no sense: a negative speed is a sender's fault.
-        let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(v));
+        let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(&i64::from(*v)));
         let is_valid = unsigned(word, 58, 1) != 0;
-        let yaw_rate = if is_valid { signed(word, 44, 14) } else { 0 };
-        (in_range && yaw_rate.abs() <= Self::YAW_RATE_MAX).then(|| Self {
-            speeds: raw.map(|v| Speed::from_wide(from_lsb(v, Self::LSB))),
-            yaw_rate: is_valid.then(|| TurningRate::from_wide(from_lsb(yaw_rate, Self::YAW_RATE_LSB))),
+        let yaw_rate = if is_valid { narrow(word, 44, 14) } else { 0 };
+        (in_range && is_within(yaw_rate, Self::YAW_RATE_MAX)).then(|| Self {
+            speeds: raw.map(|v| Speed::from_bits(to_bits(v, Self::LSB))),
+            yaw_rate: is_valid.then(|| TurningRate::from_bits(to_bits(yaw_rate, Self::YAW_RATE_LSB))),
         })
     }
 }

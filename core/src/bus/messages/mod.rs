@@ -136,11 +136,14 @@ pub trait Message: Copy {
     /// As [`Message::decode`].
     #[inline(always)]
     fn decode_within(state: &mut ReceiverState, frame: &Frame, max_delta: u8) -> Result<Self, Reject> {
-        let data = frame.full_data().ok_or(Reject::Length)?;
-        let signals = Self::unpack(u64::from_le_bytes(data));
+        if !frame.is_full() {
+            return Err(Reject::Length);
+        }
+        let data = frame.bytes();
+        let signals = Self::unpack(u64::from_le_bytes(*data));
         // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
         if signals.is_some() || state.is_trusted() {
-            state.accept(&Self::PROTECTION, &data, max_delta)?;
+            state.accept(&Self::PROTECTION, data, max_delta)?;
         }
         signals.ok_or(Reject::Range)
     }
@@ -159,9 +162,27 @@ const fn unsigned(word: u64, start: u32, bits: u32) -> i64 {
     (word.wrapping_shr(start) & mask(bits)) as i64
 }
 
+#[expect(clippy::as_conversions, reason = "widens")]
 const fn signed(word: u64, start: u32, bits: u32) -> i64 {
-    let up = 64_u32.wrapping_sub(bits);
-    (unsigned(word, start, bits).wrapping_shl(up)).wrapping_shr(up)
+    narrow(word, start, bits) as i64
+}
+
+/// A signed field of at most 32 bits, in as many: half the work for a 32-bit core.
+#[expect(clippy::as_conversions, reason = "the upper half of a word")]
+const fn narrow(word: u64, start: u32, bits: u32) -> i32 {
+    let up = 64_u32.wrapping_sub(start).wrapping_sub(bits);
+    let top = (word.wrapping_shl(up) >> 32) as i32;
+    top.wrapping_shr(32_u32.wrapping_sub(bits))
+}
+
+/// Whether a field is within +-`max`.
+fn is_within(raw: i32, max: i64) -> bool {
+    i64::from(raw.unsigned_abs()) <= max
+}
+
+/// A field as a count of 2^-24, exact; it has room, for its range has.
+const fn to_bits(raw: i32, lsb: u32) -> i32 {
+    raw.wrapping_shl(24_u32.wrapping_sub(lsb))
 }
 
 const fn mask(bits: u32) -> u64 {
