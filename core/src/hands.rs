@@ -3,8 +3,8 @@
 //! A hand that holds a wheel which the guidance turns answers with torque. Where the guidance acts and the driver
 //! torque stays within 0.08 N.m of where it was, there is none: after 15 s of that the driver is warned, after 30 s the
 //! guidance ends with a fade (class A), as UN R79 has it for hands-off warnings. What counts is the torque's change,
-//! not its value, so that the sensor's offset does not matter; and only the time in which the guidance acts, so that a
-//! straight without a disturbance, where nobody has to do anything, is no proof.
+//! and a value beyond 0.35 N.m, so that the sensor's offset does not matter; and only the time in which the guidance
+//! acts, so that a straight without a disturbance, where nobody has to do anything, is no proof.
 //!
 //! Not here: what the warning leads to ([`crate::controller`]).
 
@@ -13,6 +13,8 @@ use crate::redundant::words;
 
 /// A change of the driver torque that only a hand makes: beyond the sensor's noise and the inertia of the wheel's rim.
 const FELT: Torque = Torque::from_nm(0.08);
+/// A torque that only a hand holds: beyond what the zero of a torque sensor may be off.
+const HELD: Torque = Torque::from_nm(0.35);
 /// A guidance torque that a hand would answer.
 const ACTS: Torque = Torque::from_nm(0.05);
 /// No hand for so long: the driver is warned.
@@ -39,7 +41,7 @@ impl HandsState {
 
     /// Takes a driver torque that came since the last step.
     pub fn feel(&mut self, driver: Torque) {
-        if driver.plus(self.felt.opposite()).abs() > FELT {
+        if driver.plus(self.felt.opposite()).abs() > FELT || driver.abs() > HELD {
             (self.felt, self.without) = (driver, Micros::from_us(0));
         }
     }
