@@ -328,8 +328,9 @@ impl Plausibility {
         let margin = i64::from(self.lane_margin.bits());
         // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. Where the yaw
         // rate is measured, a large one is: no vehicle goes there.
-        let (is_missing, is_unreal) = (missing > margin, missing.abs() > UNREAL);
-        !(is_missing && predicted.abs() > margin >> 1) && !(is_unreal && state.has_yaw_rate != 0)
+        let is_missing = missing > margin && predicted.abs() > margin >> 1;
+        let is_unreal = missing.abs() > UNREAL && state.has_yaw_rate != 0;
+        !is_missing && !is_unreal
     }
 
     /// How fast the near-point error must move at an instant, 2^-24 m/s, by the measured yaw rate.
