@@ -12,7 +12,8 @@
 //! The change predicted and the change seen are both summed with a memory of 1 s; the preview is declared implausible
 //! when the prediction exceeds what was seen, in the prediction's direction, by the margin. So a frozen, flipped or too
 //! small error is found when it must have moved; an error that moves *more* than predicted (gust, noise, a camera's
-//! scale) is a valid extreme and meets the envelope only. A yaw error that is frozen or flipped predicts a movement that
+//! scale) is a valid extreme and meets the envelope only, up to [`UNREAL`]: with a measured yaw rate, what goes further than
+//! that beyond the prediction is a line that slides away. A yaw error that is frozen or flipped predicts a movement that
 //! does not come, and is found the same way.
 //!
 //! **Column.** Torque in equals torque out: `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Of the power assist `T_a` only
@@ -133,7 +134,8 @@ impl PlausibilityState {
         (agree, self.apart < SPEEDS_PATIENCE)
     }
 
-    /// The movement predicted, and what of it was not seen, positive in its direction. 2^-24 m.
+    /// The movement predicted, and what of it was not seen, positive in its direction; negative where more was seen than was
+    /// predicted. 2^-24 m.
     fn missing(&self) -> (i64, i64) {
         let predicted = i64::from(self.lane_predicted.bits());
         let missing = predicted.saturating_sub(i64::from(self.lane_seen.bits()));
@@ -206,6 +208,9 @@ pub fn speeds_agree(a: Speed, b: Speed) -> bool {
     a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
+/// So far within a second no vehicle goes beyond what its yaw rate says, 2^-24 m.
+#[expect(clippy::as_conversions, reason = "widened at compile time")]
+const UNREAL: i64 = Metres::from_m(0.8).bits() as i64;
 /// Power assist: all that acts on the column is at most so many times the driver's torque.
 pub const ASSIST: i64 = 5;
 /// Friction of the column, and what else holds it without a sign.
@@ -324,8 +329,11 @@ impl Plausibility {
         (state.has_lane, state.lane) = (1, sample);
         let (predicted, missing) = state.missing();
         let margin = i64::from(self.lane_margin.bits());
-        // Half the margin has to be predicted: a movement that nothing predicts is no proof of a fault.
-        missing <= margin || predicted.abs() <= margin >> 1
+        // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. Where the yaw
+        // rate is measured, a large one is: no vehicle goes there.
+        let is_missing = missing > margin && predicted.abs() > margin >> 1;
+        let is_unreal = missing.abs() > UNREAL && state.has_yaw_rate != 0;
+        !is_missing && !is_unreal
     }
 
     /// How fast the near-point error must move at an instant, 2^-24 m/s, by the measured yaw rate.

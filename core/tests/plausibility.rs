@@ -326,6 +326,40 @@ fn more_movement_than_predicted_is_no_proof_of_a_fault() {
     }
 }
 
+/// On a straight, with a yaw rate of zero: a line that slides aside by `by_m` within `ms`. When it was declared, s after
+/// the slide began.
+fn sliding(by_m: f64, ms: f64, yaw_rate: Option<TurningRate>) -> Option<f64> {
+    let checks = Config::PAPER.plausibility;
+    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    checks.motion(&mut state, Speed::from_m_per_s(30.0), yaw_rate);
+    (0..400).find_map(|k| {
+        // The line is known for half a second after 1 s.
+        let t = f64::from(k) * 8e-3 - 1.0;
+        let sample = LaneSample {
+            at: Instant::from_us(u32::MAX - 1_500_000).after(Micros::from_ms(8 * k)),
+            ..lane((t * 1e3 / ms).clamp(0.0, 1.0) * by_m, 0.0)
+        };
+        (!checks.lane(&mut state, &mut past, sample.at, sample)).then_some(t)
+    })
+}
+
+/// 25 m/s to the side is 0.8 m after 32 ms, seen in samples of 8 ms; what a vehicle may do in a second is none.
+#[test]
+fn a_line_that_slides_away_is_declared_where_the_yaw_rate_is_measured() {
+    let still = Some(TurningRate::ZERO);
+    for side in [1.0, -1.0] {
+        let declared = sliding(side * 3.5, 140.0, still);
+        assert!(
+            declared.is_some_and(|t| (0.032..=0.048).contains(&t)),
+            "{declared:?}"
+        );
+        assert_eq!(sliding(side * 3.5, 140.0, None), None);
+        // Just below and above the margin; the memory forgets 1 % in 8 ms.
+        assert_eq!(sliding(side * 0.79, 40.0, still), None);
+        assert!(sliding(side * 0.85, 40.0, still).is_some());
+    }
+}
+
 #[test]
 fn what_freezes_on_a_straight_is_declared_when_the_curve_comes() {
     for kmh in SPEEDS_KMH {

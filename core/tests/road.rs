@@ -68,6 +68,33 @@ fn cameras_of_15_to_120_hz_and_150_ms_engage_and_stay() {
     }
 }
 
+/// A camera whose pictures come late and 2 to 40 ms apart: it is waited for as long as its gaps are
+/// long, and when it falls silent, for three of them.
+#[test]
+fn a_camera_that_jitters_stays_and_its_silence_is_declared() {
+    let (mut rig, mut counter) = (Rig::paper(), 0);
+    rig.silent[LANE] = true;
+    rig.curve(0.6);
+    rig.lane.age = Micros::from_ms(20);
+    let mut next_ms = 0;
+    for ms in 0..4000_u32 {
+        rig.engage = ms > 900;
+        if ms >= next_ms {
+            // Pictures close together, then a gap of 40 ms.
+            next_ms = ms + [8, 3, 2, 40, 5, 8, 25][counter as usize % 7];
+            let frame = rig.lane.encode(counter);
+            counter = counter.wrapping_add(1);
+            let result = rig.send(&frame);
+            rig.rejects.extend(result.err());
+        }
+        rig.tick();
+    }
+    assert_eq!(mode(&rig), Mode::Active);
+    let (lost, step) = rig.run_until(300, |step| step.command.mode == Mode::Handover);
+    assert!(step.command.faults.contains(Fault::LaneTimeout));
+    assert!((60..=121).contains(&lost), "{lost} ms");
+}
+
 #[test]
 fn a_sample_that_is_older_than_150_ms_is_none() {
     for (age_us, engages) in [(150_000, true), (150_100, false)] {

@@ -46,6 +46,8 @@ const LANE_PERIOD: Micros = Micros::from_us(66_667);
 const COLUMN_PERIOD: Micros = Micros::from_ms(20);
 const MOTION_PERIOD: Micros = Micros::from_ms(25);
 const REQUEST_PERIOD: Micros = Micros::from_ms(25);
+/// A sender's period is forgotten within 2^6 of its messages: half a second of a camera of 120 Hz.
+const PERIOD_SHIFT: u32 = 6;
 /// A lane sample that is older than this when it comes is none.
 const OLDEST_SAMPLE: Micros = Micros::from_ms(150);
 
@@ -109,16 +111,19 @@ impl<T: Words> Slot<T> {
         }
     }
 
-    /// Takes a value heard now. The sender's period falls at once, by half at most, and grows by an eighth: a few frames
-    /// that are lost, or that come together, do not change it by much. Unknown, it is the `slowest`.
+    /// Takes a value heard now. The sender's period is the longest time between two of its messages lately: it grows at
+    /// once and falls by a sixty-fourth of the way, so that a sender whose messages jitter is waited for as long as its gaps
+    /// are. Unknown, it is the `slowest`, and then the first time between two messages, but no less than a quarter of that.
     fn put(&mut self, value: T, now: Instant, slowest: Micros) {
-        let (period, apart) = (self.period.us(), now.since(self.at).us());
+        let (period, apart) = (self.period.us(), now.since(self.at).us().min(slowest.us()));
         let period = if self.state == LOST {
             slowest.us()
-        } else if apart < period {
-            apart.max(period / 2)
+        } else if period >= slowest.us() {
+            apart.max(slowest.us() / 4)
+        } else if apart > period {
+            apart
         } else {
-            apart.min(period.saturating_add(period / 8)).min(slowest.us())
+            period.saturating_sub(period.saturating_sub(apart) >> PERIOD_SHIFT)
         };
         self.period = Micros::from_us(period);
         (self.state, self.value, self.at) = (NEW, value, now);

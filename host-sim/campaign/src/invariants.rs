@@ -15,7 +15,7 @@
 //! | override | the bound that shrinks from 0.8 N.m of opposing driver torque |
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
 //! | engaging | into Active only from 500 ms of Standby and by a request that rose |
-//! | inputs | no input older than 30 ms in Active |
+//! | inputs | no input older than 30 ms in Active, no picture of a late camera older than 350 ms |
 //! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s |
 //! | fade | never grows, falls by 4 N.m/s |
 //! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked |
@@ -39,6 +39,8 @@ const OVERRIDE_SLOPE: f64 = 3.0;
 const TIMEOUT_US: u32 = 30_000;
 /// What an ECU that waits for three periods of a sender may wait longer where frames come up to 25 ms apart from their time.
 const LATE_US: u32 = 8_000;
+/// Oldest sample of a camera that is late: 150 ms, and three of the longest times between two pictures.
+const LATE_CAMERA_US: u32 = 350_000;
 const READY_US: u32 = 500_000;
 const FADE_NM_PER_S: f64 = 4.0;
 const HANDOVER_S: f64 = 2.0;
@@ -89,6 +91,8 @@ pub(super) struct InvariantChecker {
     starts_active: bool,
     /// When the latest sample in use was true, by the ECU's clock: lane, column, vehicle, demand.
     true_at_us: [Option<u32>; 4],
+    /// Whether a lane preview was ever old when it came.
+    camera_is_late: bool,
     driver_nm: f64,
     request: Option<bool>,
     /// A request that rose and has not yet been used.
@@ -110,6 +114,7 @@ impl InvariantChecker {
             last: None,
             starts_active,
             true_at_us: [None; 4],
+            camera_is_late: false,
             driver_nm: 0.0,
             request: None,
             rose: false,
@@ -137,8 +142,10 @@ impl InvariantChecker {
         match frame.id() {
             // Bit 55: the sender vouches for it.
             bytes::LANE if bytes::unsigned(frame, 55, 1) != 0 => {
-                let age_us = bytes::unsigned(frame, 46, 9) as u32 * 100;
+                let age = bytes::unsigned(frame, 46, 9) | bytes::unsigned(frame, 56, 2) << 9;
+                let age_us = age as u32 * 100;
                 self.true_at_us[0] = Some(now_us.wrapping_sub(age_us));
+                self.camera_is_late |= age_us > 0;
             }
             bytes::COLUMN => {
                 self.true_at_us[1] = Some(now_us);
@@ -311,7 +318,12 @@ impl InvariantChecker {
         if mode == ACTIVE {
             for (at, name) in self.true_at_us.iter().zip(["lane", "column", "speed", "request"]) {
                 let age_us = at.map_or(u32::MAX, |at| now_us.wrapping_sub(at));
-                if age_us > TIMEOUT_US + LATE_US {
+                let most_us = if name == "lane" && self.camera_is_late {
+                    LATE_CAMERA_US
+                } else {
+                    TIMEOUT_US + LATE_US
+                };
+                if age_us > most_us {
                     return Err(format!("Active with a {name} of {age_us} us"));
                 }
             }

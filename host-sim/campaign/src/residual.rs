@@ -16,6 +16,8 @@ const SURELY_SEEN: f64 = 1.02;
 
 /// A movement that was predicted and did not come, m.
 pub(super) const LANE_MARGIN_M: f64 = 0.4;
+/// A movement that nothing predicts, and that no vehicle makes, m.
+pub(super) const UNREAL_M: f64 = 0.8;
 /// Momentum on the column that did not show in the wheel, N.m.s.
 pub(super) const COLUMN_MARGIN_NM_S: f64 = 0.6;
 /// Further than the near-point error can go between two samples, m.
@@ -275,8 +277,9 @@ impl Residual {
             return f64::INFINITY;
         }
         let missing = (self.predicted_m - self.moved_m) * self.predicted_m.signum();
-        // Half the margin has to be predicted: a movement that nothing predicts proves nothing.
-        (missing / LANE_MARGIN_M).min(self.predicted_m.abs() / (0.5 * LANE_MARGIN_M))
+        // Half the margin has to be predicted: a small movement that nothing predicts proves nothing.
+        let slow = (missing / LANE_MARGIN_M).min(self.predicted_m.abs() / (0.5 * LANE_MARGIN_M));
+        slow.max(missing.abs() / UNREAL_M)
     }
 
     /// Share of the column's margin that is used.

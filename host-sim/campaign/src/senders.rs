@@ -189,7 +189,7 @@ impl Senders {
             let message = LanePreview {
                 e_y: Metres::from_m(e_y_m),
                 e_theta: Radians::from_rad(e_theta_rad),
-                age: Micros::from_us(0),
+                age: Micros::from_ms(observation.lane_age_ms),
                 valid: readings.lane_valid,
             };
             frames.push(message.encode(count(0)));

@@ -200,6 +200,7 @@ impl<G: Guidance> Simulation<G> {
         let observation = Observation {
             step: self.step,
             lane: lane.filter(|_| looks && !faults.lane_lost),
+            lane_age_ms: 0,
             driver_torque_nm: self.plant.arm_torque_nm() + remnant_nm,
             wheel_angle_rad: self.plant.wheel_angle_rad(),
             motor_torque_nm: self.motor_torque_nm,
@@ -440,12 +441,12 @@ impl Sensing {
 
     /// What the sensors make of the truth.
     fn of_truth(&mut self, truth: &Observation) -> Observation {
-        let seen = truth.lane.and_then(|lane| {
-            let [e_y_m, e_theta_rad] = self.camera.see(truth.step, [lane.e_y_m, lane.e_theta_rad])?;
-            Some(LaneErrors { e_y_m, e_theta_rad })
-        });
+        let seen = truth
+            .lane
+            .and_then(|lane| self.camera.see(truth.step, [lane.e_y_m, lane.e_theta_rad]));
         Observation {
-            lane: seen,
+            lane: seen.map(|([e_y_m, e_theta_rad], _)| LaneErrors { e_y_m, e_theta_rad }),
+            lane_age_ms: seen.map_or(0, |(_, age_steps)| age_steps),
             driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias,
             wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias.to_radians(),
             speed_m_per_s: self.errors.speed_gain * truth.speed_m_per_s,

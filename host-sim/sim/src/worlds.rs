@@ -67,7 +67,7 @@ enum Part {
     Motor,
     /// A boost curve.
     Assist,
-    /// Noise and jitter of a production camera whose delay nobody tells.
+    /// Delay, jitter and noise of a production camera.
     Camera,
     /// A road of mu 0.3, and curves to 3 m/s2.
     Slippery,
@@ -114,7 +114,7 @@ pub const WORLDS: [WorldKind; 11] = [
     ),
     world(
         "camera",
-        "everything, and a camera 40 ms late that does not say so, 10 ms of jitter, 0.03 m and 2 mrad of noise",
+        "everything, and a camera 40 ms late, 10 ms of jitter, 0.03 m and 2 mrad of noise",
         &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Camera],
     ),
     beyond(

@@ -5,7 +5,7 @@ use haptic_core::config::Setup;
 use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
 use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
-use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 use super::{Actuation, Guidance, Observation, is_limited};
 
@@ -39,7 +39,7 @@ impl Guidance for Direct {
                 Input::New(LaneSample {
                     e_y: Metres::from_m(errors.e_y_m),
                     e_theta: Radians::from_rad(errors.e_theta_rad),
-                    at: now,
+                    at: now.before(Micros::from_ms(observation.lane_age_ms)),
                 })
             }),
             column: Input::New(Column {

@@ -41,6 +41,8 @@ pub struct Observation {
     pub step: u32,
     /// The lane errors, in steps in which the guidance looks at the road.
     pub lane: Option<LaneErrors>,
+    /// How long ago they were true, ms: a camera says so with its picture.
+    pub lane_age_ms: u32,
     /// Driver torque on the column, N.m.
     pub driver_torque_nm: f64,
     /// Wheel angle, rad.

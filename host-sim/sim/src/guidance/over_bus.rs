@@ -59,7 +59,7 @@ impl OverBus {
             let preview = LanePreview {
                 e_y: Metres::from_m(errors.e_y_m),
                 e_theta: Radians::from_rad(errors.e_theta_rad),
-                age: Micros::from_us(0),
+                age: Micros::from_ms(observation.lane_age_ms),
                 valid: true,
             };
             let _ = self.sent.push(preview.encode(self.lane_counter));

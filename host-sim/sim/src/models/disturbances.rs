@@ -132,6 +132,7 @@ impl ErringGyro {
 /// A picture's lane errors (m, rad) on their way.
 #[derive(Debug, Clone, Copy)]
 struct Picture {
+    taken_step: u32,
     due_step: u32,
     errors: [f64; 2],
 }
@@ -160,11 +161,12 @@ impl ErringCamera {
         }
     }
 
-    /// Takes a picture's true errors (e_y' in m, e_theta' in rad) at a step; returns those that arrive then.
-    pub fn see(&mut self, step: u32, [e_y_m, e_theta_rad]: [f64; 2]) -> Option<[f64; 2]> {
+    /// Takes a picture's true errors (e_y' in m, e_theta' in rad) at a step; returns those that arrive then, and how long
+    /// ago they were true, steps.
+    pub fn see(&mut self, step: u32, [e_y_m, e_theta_rad]: [f64; 2]) -> Option<([f64; 2], u32)> {
         let errors = self.errors;
         let since_s = f64::from(step - self.last_step.unwrap_or(step)) * STEP_S;
-        self.last_step = Some(step);
+        let is_first = self.last_step.replace(step).is_none();
         if self.happens(errors.dropouts, since_s) {
             self.blind_until = step + (errors.dropout * f64::from(STEPS_PER_SECOND)) as u32;
         }
@@ -181,19 +183,25 @@ impl ErringCamera {
             e_theta_rad
                 + 1e-3 * (errors.camera_yaw + errors.heading_noise * self.normal(errors.heading_noise)),
         ];
-        let late_s = errors.camera_latency + errors.camera_jitter * self.normal(errors.camera_jitter);
+        // A camera was there before the run began: its first picture is not waited for.
+        let late_s = if is_first {
+            0.0
+        } else {
+            errors.camera_latency + errors.camera_jitter * self.normal(errors.camera_jitter)
+        };
         let late = (late_s.max(0.0) / STEP_S).round() as u32;
         if step >= self.blind_until {
             // A picture does not overtake the one before it.
             let after = self.on_their_way.back().map_or(0, |last| last.due_step);
             self.on_their_way.push_back(Picture {
+                taken_step: step,
                 due_step: (step + late).max(after),
                 errors: seen,
             });
         }
         let mut arrived = None;
         while let Some(picture) = self.on_their_way.front().filter(|p| p.due_step <= step) {
-            arrived = Some(picture.errors);
+            arrived = Some((picture.errors, step - picture.taken_step));
             self.on_their_way.pop_front();
         }
         arrived
@@ -217,7 +225,7 @@ impl ErringCamera {
 mod tests {
     use super::*;
 
-    fn pictures(errors: SensorErrors, count: u32) -> Vec<Option<[f64; 2]>> {
+    fn pictures(errors: SensorErrors, count: u32) -> Vec<Option<([f64; 2], u32)>> {
         let mut camera = ErringCamera::new(errors, 5);
         (0..count)
             .map(|n| camera.see(8 * n, [f64::from(n), 0.1]))
@@ -227,7 +235,7 @@ mod tests {
     #[test]
     fn a_camera_without_errors_shows_the_truth() {
         for (n, seen) in (0_u32..).zip(pictures(SensorErrors::default(), 100)) {
-            assert_eq!(seen, Some([f64::from(n), 0.1]));
+            assert_eq!(seen, Some(([f64::from(n), 0.1], 0)));
         }
     }
 
@@ -261,9 +269,11 @@ mod tests {
             ..SensorErrors::default()
         };
         let seen = pictures(errors, 100);
-        assert_eq!(seen[..10], [None; 10]);
-        for (n, seen) in (10_u32..).zip(&seen[10..]) {
-            assert_eq!(*seen, Some([f64::from(n - 10), 0.1]));
+        // The first is there when the run begins, the others come 80 ms late.
+        assert_eq!(seen[0], Some(([0.0, 0.1], 0)));
+        assert_eq!(seen[1..11], [None; 10]);
+        for (n, seen) in (11_u32..).zip(&seen[11..]) {
+            assert_eq!(*seen, Some(([f64::from(n - 10), 0.1], 80)));
         }
     }
 
@@ -277,7 +287,7 @@ mod tests {
         };
         let mut camera = ErringCamera::new(errors, 5);
         let seen: Vec<_> = (0..40_000)
-            .filter_map(|n| camera.see(8 * n, [0.5, 0.0]))
+            .filter_map(|n| Some(camera.see(8 * n, [0.5, 0.0])?.0))
             .collect();
         let moments = |of: fn(&[f64; 2]) -> f64| {
             let mean = seen.iter().map(of).sum::<f64>() / seen.len() as f64;
