@@ -10,6 +10,7 @@ use super::{
     CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S,
     T_P,
 };
+use crate::identify::diagnostics;
 use crate::identify::options::Options;
 use crate::identify::result::{AtTNms, Identification, STANDARD_NORMAL_95};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
@@ -94,7 +95,7 @@ impl Problem<'_> {
             found.fit_percent,
             &found.whiteness,
             &found.input_correlation,
-            self.log.resampled,
+            diagnostics::unexplained_autocorrelation(&found.traces.residual_nm, &self.log.resampling),
         ));
         refuted.extend(self.beside_nothing(optimum));
         let p = &optimum.point;
