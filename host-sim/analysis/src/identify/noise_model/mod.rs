@@ -20,6 +20,7 @@
 //! ended ([`report`]).
 
 mod evidence;
+mod finite;
 mod information;
 mod judge;
 mod report;
@@ -143,6 +144,8 @@ struct Problem<'a> {
     extended: bool,
     /// Standard deviation of t_nms about what is assumed, s, where it is estimated although nobody asked for it.
     t_nms_prior_s: Option<f64>,
+    /// Whether the disturbance's corner was estimated by restricted likelihood, and then held.
+    corner_restricted: bool,
 }
 
 /// One row of the loss: the prediction error and its negative derivatives.
@@ -198,6 +201,7 @@ impl<'a> Problem<'a> {
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
             t_nms_prior_s: None,
+            corner_restricted: false,
         }
     }
 
