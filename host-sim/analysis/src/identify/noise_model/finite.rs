@@ -106,18 +106,20 @@ fn mean_miss(mut stretches: Vec<Blocks>, root: &DMatrix<f64>, rows: usize, lags:
             pairs += both;
             constants += both / s.errors.len() as f64;
             for ((now, later), e) in s.regressors.iter().zip(&s.regressors[lag..]).zip(&s.errors) {
-                for i in 0..MOST {
-                    answer[i] += e * later[i];
-                    for j in 0..MOST {
-                        c[i][j] += now[i] * later[j];
+                for (a, x) in answer.iter_mut().zip(later) {
+                    *a += e * x;
+                }
+                for (c, x) in c.iter_mut().zip(now) {
+                    for (c, y) in c.iter_mut().zip(later) {
+                        *c += x * y;
                     }
                 }
             }
         }
         let trace = constants + rows * (0..MOST).map(|i| c[i][i]).sum::<f64>();
-        for j in 0..MOST {
+        for (j, (miss, a)) in miss.iter_mut().zip(&answer).enumerate() {
             let through: f64 = rows * (0..MOST).map(|i| c[i][j] * answer[i]).sum::<f64>();
-            miss[j] -= rows * (answer[j] * trace + through) / pairs.max(1.0);
+            *miss -= rows * (a * trace + through) / pairs.max(1.0);
         }
     }
     (root * DVector::from_column_slice(&miss[..count]))
