@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
 use super::{
-    CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S,
-    T_P,
+    COMPARED, CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
+    T_NMS_SD_S, T_P,
 };
 use crate::identify::diagnostics;
 use crate::identify::options::Options;
@@ -250,7 +250,7 @@ impl Problem<'_> {
         for i in (0..=T_P).chain([K_NMS, T_NMS, H_LATE, D_LATE]) {
             bounds[i] = Bounds::new(point[i], point[i]);
         }
-        let nothing = minimise(&point, &bounds, 1e-6, |p| self.sums::<CORE>(p));
+        let nothing = minimise(&point, &bounds, COMPARED, |p| self.sums::<CORE>(p));
         let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
         let gain =
             2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));

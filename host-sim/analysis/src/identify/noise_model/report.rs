@@ -73,7 +73,13 @@ impl Problem<'_> {
             .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
             .collect();
         let alternatives = self.alternatives(p, &core, error_variance);
-        let within: Vec<usize> = core.iter().copied().chain(corner).collect();
+        // What else may be estimated (the muscle, delays of sensors, the share of white noise) counts as known there.
+        let within: Vec<usize> = core
+            .iter()
+            .copied()
+            .chain(corner)
+            .filter(|&i| i <= RHO || i >= COUNT)
+            .collect();
         let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian);
         let trim = self.trim(optimum, &free, &errors, error_variance);
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
