@@ -221,24 +221,3 @@ fn the_png_is_twice_as_wide_as_the_page_and_holds_letters() {
     let ink = |p: &Pixmap| p.pixels().iter().filter(|p| p.red() < 128).count();
     assert!(ink(&lettered) > ink(&plain) + 200);
 }
-
-/// In a figure of rows the value runs from left to right: a whisker from -0.6 to 0.8 of twenty rows' second lies flat, from
-/// 20 to 90 hundredths of the width, in the second twentieth from the top.
-#[test]
-fn whiskers_of_a_figure_of_rows_lie_flat() {
-    let mut figure = alone(Mark::Whiskers(vec![[-0.6, 0.8]]), vec![(2.0, 0.1)]);
-    figure.rows = (0..20).map(|i| format!("row {i}")).collect();
-    let blue = Picture::of(&figure).blue();
-    let ends = |of: fn(&(f64, f64)) -> f64| {
-        let values = blue.iter().map(of);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        })
-    };
-    let ((left, right), (low, high)) = (ends(|p| p.0), ends(|p| p.1));
-    assert!(
-        (left - 20.0).abs() < 1.0 && (right - 90.0).abs() < 1.0,
-        "{left} {right}"
-    );
-    assert!(low > 0.79 && high < 0.91, "{low} {high}");
-}
