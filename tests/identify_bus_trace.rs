@@ -207,7 +207,7 @@ fn what_is_wrong_with_the_frames_is_counted_and_not_used() {
         of("Column")
     );
     assert!(
-        of("Column_DriverTorque").starts_with("1 pauses, the longest of 0.10"),
+        of("Column_DriverTorque").starts_with("1 pause, the longest of 0.10"),
         "{:?}",
         log.findings
     );

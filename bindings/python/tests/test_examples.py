@@ -35,6 +35,18 @@ def test_a_plant_of_ones_own():
     assert np.abs(results[True][0]).max() < np.abs(results[False][0]).max()
 
 
+@pytest.mark.parametrize("model", ["st", "mb"])
+def test_a_known_driver_on_a_vehicle_that_is_not_ours(model):
+    pytest.importorskip("vehiclemodels")
+    example = runpy.run_path(str(EXAMPLES / "identify_commonroad.py"))
+    fit = example["identified"](example["drive"](example["Vehicle"](model), 60.0, 1))
+    assert fit.refuted == []
+    for name, truth in example["truths"]().items():
+        low, high = fit[name].interval_95
+        assert low <= truth <= high, (name, truth, low, high)
+    assert fit["k_hg"].identified
+
+
 def test_the_readme(tmp_path, monkeypatch):
     text = (ROOT / "bindings" / "python" / "README.md").read_text()
     blocks = re.findall(r"```python\n(.*?)```", text, re.S)

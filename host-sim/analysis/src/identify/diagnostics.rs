@@ -46,6 +46,20 @@ pub fn autocorrelation(residual: &[f64], lags: usize) -> Vec<f64> {
         .collect()
 }
 
+/// The largest autocorrelation of `residual` beyond what reading off between rows explains. That gives white noise the
+/// autocorrelation `resampling`; the noise model may take up a part of it, so anything from nothing to all of it may be left.
+pub(crate) fn unexplained_autocorrelation(residual: &[f64], resampling: &[f64]) -> f64 {
+    let explained = resampling.iter().copied().chain(std::iter::repeat(0.0));
+    autocorrelation(residual, LAGS)
+        .into_iter()
+        .zip(explained)
+        .map(|(r, e)| r - r.clamp(e.min(0.0), e.max(0.0)))
+        .fold(
+            0.0,
+            |largest: f64, r| if r.abs() > largest.abs() { r } else { largest },
+        )
+}
+
 /// Ljung-Box test of `residual`, of which `estimated` noise parameters were fitted.
 pub(crate) fn whiteness(residual: &[f64], estimated: usize) -> Whiteness {
     let n = residual.len() as f64;
@@ -132,6 +146,25 @@ mod tests {
         impulse[17] = 1.0;
         let w = whiteness(&impulse, 2);
         assert_eq!((w.statistic, w.p_value, w.white), (0.0, 1.0, true));
+    }
+
+    /// Half of one value and half of the next: white noise gets the autocorrelation 1/2 at lag 1 and none beyond. Beside
+    /// that, an echo of 0.4 three rows later has (0.4 + 0.2 * 0) / (1 + 0.16) at lag 3, and is seen.
+    #[test]
+    fn what_resampling_explains_is_no_colour_and_more_is() {
+        let mut state: u64 = 7;
+        let white: Vec<f64> = (0..20_000)
+            .map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+            })
+            .collect();
+        let halves: Vec<f64> = white.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+        assert!((unexplained_autocorrelation(&halves, &[]) - 0.5).abs() < 0.03);
+        assert!(unexplained_autocorrelation(&halves, &[0.5]).abs() < 0.03);
+        let echo: Vec<f64> = halves.windows(4).map(|w| w[3] + 0.4 * w[0]).collect();
+        let left = unexplained_autocorrelation(&echo, &[0.5]);
+        assert!((left - 0.4 / 1.16).abs() < 0.03, "{left}");
     }
 
     /// The residual is the input of 6 samples before, which repeats every 6: correlation 1 already at lag 0, so

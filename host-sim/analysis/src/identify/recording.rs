@@ -2,8 +2,8 @@
 //!
 //! A column is the channel of its own name unless a [`Mapping`] names another. A channel's unit is converted where the file
 //! says it, or taken as said by a scale; what cannot be converted is refused. Channels of one table are taken row by
-//! row and checked as a CSV file's are. Channels with instants of their own are put on an even grid at the pace of the
-//! driver torque first: T_h as held, the others on the line between their neighbours.
+//! row and checked as a CSV file's are. Channels with instants of their own are taken at those of the driver torque, whose
+//! noise must stay as it is: T_h as held, the others on the line between their neighbours.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use super::log::{COLUMNS, DriveLog, LogError};
 const UNITS: [&str; 6] = ["s", "m", "rad", "rad", "N.m", "N.m"];
 const GUIDANCE: usize = 4;
 const DRIVER: usize = 5;
-/// Longest pause of a channel that has instants of its own, in its usual periods.
+/// Longest pause of a channel with instants of its own that is bridged here, in its usual periods.
 const LONGEST_PAUSE: f64 = 3.5;
 
 /// Which channel of a file is a column of a log: `NAME=CHANNEL` or `NAME=CHANNEL*SCALE`.
@@ -156,7 +156,7 @@ fn of_channels(
     let (time_s, values) = if one {
         rows(&columns)
     } else {
-        on_a_grid(&columns, &mut notes)?
+        at_the_torque(&columns, &mut notes)?
     };
     let log = DriveLog::from_rows(time_s, values, manual).map_err(|e| e.to_string())?;
     Ok((log, notes))
@@ -180,69 +180,90 @@ fn rows(columns: &[Option<Column<'_>>; 6]) -> (Vec<f64>, Values) {
     )
 }
 
-/// The columns at the pace of the driver torque, over the time that all cover.
-fn on_a_grid(
+/// A column's values where it has any, and its usual step, s.
+struct Course {
+    time_s: Vec<f64>,
+    values: Vec<f64>,
+    usual_s: f64,
+}
+
+impl Course {
+    fn of(column: &Column<'_>) -> Result<Self, String> {
+        let (group, series) = (column.group, column.series);
+        let known = group
+            .time_s
+            .iter()
+            .zip(&series.values)
+            .filter(|(_, v)| !v.is_nan());
+        let (time_s, values): (Vec<f64>, Vec<f64>) = known.map(|(t, v)| (*t, v * column.scale)).unzip();
+        let refuse = |what: String| Err(format!("channel {}: {what}", series.name));
+        if let Some(w) = time_s.windows(2).find(|w| w[1].is_nan() || w[1] <= w[0]) {
+            return refuse(format!("the time goes from {} to {} s: it must grow", w[0], w[1]));
+        }
+        let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        match steps.get(steps.len() / 2) {
+            Some(&usual_s) => Ok(Self {
+                time_s,
+                values,
+                usual_s,
+            }),
+            None => refuse(format!("it has {} values, too few", values.len())),
+        }
+    }
+
+    /// The values at rising instants, as held or on the line between neighbours; none in a pause and beyond the ends. Instants
+    /// up to a microsecond before a value have it already, as clocks round.
+    fn at(&self, instants_s: &[f64], held: bool) -> Vec<f64> {
+        let (time_s, last) = (&self.time_s, self.time_s.len() - 1);
+        let mut k = 0;
+        let value = |t: f64| {
+            while k < last && time_s[k + 1] <= t + 1e-6 {
+                k += 1;
+            }
+            let (past, next) = (t - time_s[k], (k + 1).min(last));
+            let step = time_s[next] - time_s[k];
+            let longest = LONGEST_PAUSE * self.usual_s;
+            if past < -1e-6 || past > longest || (past > 1e-6 && step > longest) {
+                f64::NAN
+            } else if held || next == k {
+                self.values[k]
+            } else {
+                self.values[k] + (past / step).max(0.0) * (self.values[next] - self.values[k])
+            }
+        };
+        instants_s.iter().copied().map(value).collect()
+    }
+}
+
+/// The columns at the driver torque's instants, over the time that all cover.
+fn at_the_torque(
     columns: &[Option<Column<'_>>; 6],
     notes: &mut Vec<String>,
 ) -> Result<(Vec<f64>, Values), String> {
-    let mut groups = Vec::new();
-    let mut rate_hz = 0.0;
-    for (i, column) in columns.iter().enumerate() {
-        let Some(column) = column else { continue };
-        let name = &column.series.name;
-        let course: Vec<(f64, f64)> = column
-            .group
-            .time_s
-            .iter()
-            .zip(&column.series.values)
-            .filter(|(_, v)| !v.is_nan())
-            .map(|(t, v)| (*t, v * column.scale))
-            .collect();
-        let mut steps: Vec<f64> = course.windows(2).map(|w| w[1].0 - w[0].0).collect();
-        steps.sort_by(f64::total_cmp);
-        let usual_s = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        if usual_s.is_nan() || usual_s <= 0.0 {
-            return Err(format!(
-                "channel {name}: it has {} values, too few, or no time that grows",
-                course.len()
-            ));
-        }
-        let pause = course
-            .windows(2)
-            .find(|w| !(0.0..=LONGEST_PAUSE * usual_s).contains(&(w[1].0 - w[0].0)));
-        if let Some(w) = pause {
-            let step = w[1].0 - w[0].0;
-            return Err(format!(
-                "channel {name}: a step of {step:.3} s at {:.3} s where {usual_s:.4} s is usual: cut the log there",
-                w[0].0
-            ));
-        }
-        if i == DRIVER {
-            rate_hz = 1.0 / usual_s;
-        }
-        let (time_s, values) = course.into_iter().unzip();
-        groups.push(Group {
-            name: COLUMNS[i].into(),
-            time_s,
-            channels: vec![Series {
-                name: COLUMNS[i].into(),
-                values,
-                ..Series::default()
-            }],
-        });
+    let mut courses: [Option<Course>; 6] = Default::default();
+    for (course, column) in courses.iter_mut().zip(columns) {
+        *course = column.as_ref().map(Course::of).transpose()?;
     }
-    let held = |name: &str| name == COLUMNS[GUIDANCE];
-    let grid = Recording { groups }
-        .on_grid(rate_hz, held)
-        .map_err(|e| e.to_string())?;
+    let all = || courses.iter().flatten();
+    let from = all().map(|c| c.time_s[0]).fold(f64::NEG_INFINITY, f64::max);
+    let to = all()
+        .map(|c| c.time_s[c.time_s.len() - 1])
+        .fold(f64::INFINITY, f64::min);
+    let torque = courses[DRIVER].as_ref().map_or(&[][..], |c| &c.time_s);
+    let instants: Vec<f64> = torque
+        .iter()
+        .copied()
+        .filter(|t| (from..=to).contains(t))
+        .collect();
+    if instants.is_empty() {
+        return Err("the channels have no time in common".to_owned());
+    }
     notes.push(format!(
-        "The channels have instants of their own: put on an even grid of {rate_hz:.1} Hz"
+        "The channels have instants of their own: taken at those of {}, one in {:.4} s",
+        columns[DRIVER].as_ref().map_or("", |c| c.series.name.as_str()),
+        courses[DRIVER].as_ref().map_or(0.0, |c| c.usual_s)
     ));
-    let mut made: Values = Default::default();
-    for channel in grid.channels {
-        if let Some(i) = COLUMNS.iter().position(|name| *name == channel.name) {
-            made[i] = Some(channel.values);
-        }
-    }
-    Ok((grid.time_s, made))
+    let values = std::array::from_fn(|i| Some(courses[i].as_ref()?.at(&instants, i == GUIDANCE)));
+    Ok((instants, values))
 }

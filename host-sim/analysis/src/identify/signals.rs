@@ -251,7 +251,7 @@ mod tests {
                 .map(|k| if k / 120 % 2 == 0 { 0.2 } else { -0.2 })
                 .collect(),
             driver_torque_nm: vec![0.0; 4800],
-            resampled: false,
+            resampling: Vec::new(),
             findings: Vec::new(),
         }
     }

@@ -32,10 +32,9 @@ const SMALL_SCALE: f64 = 0.1;
 const SMALL_DELAY_S: f64 = 0.0045;
 /// The same of T_d against the wheel angle, which moves t_p alone: less is not told from the column's own lags.
 const SMALL_DRIVER_DELAY_S: f64 = 0.015;
-/// Largest autocorrelation of residuals that leaves the noise model standing: more is another noise.
+/// Largest autocorrelation of residuals, beyond that of resampling, that leaves the noise model standing: more is another
+/// noise.
 const WHITE_ENOUGH: f64 = 0.1;
-/// The same where signals were read off between rows, so that neighbours share their noise.
-const WHITE_ENOUGH_RESAMPLED: f64 = 0.25;
 /// Largest cross-correlation with an input, in standard deviations, that leaves the driver model standing.
 const INDEPENDENT_ENOUGH: f64 = 7.0;
 
@@ -152,23 +151,22 @@ pub(crate) fn of_residuals(
     fit_percent: f64,
     white: &Whiteness,
     inputs: &[InputCorrelation],
-    resampled: bool,
+    unexplained_autocorrelation: f64,
 ) -> Vec<Refutation> {
     let mut out = Vec::new();
     if fit_percent > ALL_BUT_PERFECT {
         return out;
     }
-    let enough = if resampled {
-        WHITE_ENOUGH_RESAMPLED
-    } else {
-        WHITE_ENOUGH
-    };
-    if white.p_value < 1e-6 && white.largest_autocorrelation.abs() > enough {
+    if white.p_value < 1e-6 && unexplained_autocorrelation.abs() > WHITE_ENOUGH {
         out.push(Refutation {
             assumption: "the disturbance is a low-passed remnant and white sensor noise",
             evidence: format!(
-                "the prediction errors are not white: autocorrelation {:.3}",
-                white.largest_autocorrelation
+                "the prediction errors are not white: autocorrelation {unexplained_autocorrelation:.3}{}",
+                if white.largest_autocorrelation == unexplained_autocorrelation {
+                    ""
+                } else {
+                    " beyond that of resampling"
+                }
             ),
             cause: "a part of the drive is no driving, a sensor filters, or the driver is another one"
                 .to_owned(),

@@ -40,7 +40,7 @@ impl Recorder {
             wheel_angle_rad: Vec::new(),
             guidance_torque_nm: Vec::new(),
             driver_torque_nm: Vec::new(),
-            resampled: false,
+            resampling: Vec::new(),
             findings: Vec::new(),
         };
         Self {

@@ -92,7 +92,7 @@ impl Recording {
     ///
     /// # Errors
     /// As there.
-    pub fn on_grid(&self, rate_hz: f64, held: impl Fn(&str) -> bool) -> Result<Group, RecordingError> {
+    fn on_grid(&self, rate_hz: f64, held: impl Fn(&str) -> bool) -> Result<Group, RecordingError> {
         const MOST_VALUES: f64 = 1e8;
         self.check_names()?;
         let channels: Vec<(&Group, &Series)> = self

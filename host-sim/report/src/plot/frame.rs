@@ -168,14 +168,21 @@ impl<'a> Frame<'a> {
             Mark::Line => self.lines(series),
             Mark::Dots => vec![self.dots(style).with_data(self.places(series)).into()],
             Mark::Whiskers(ends) => {
-                let finite = series.points.iter().zip(ends).filter(|(p, _)| p.1.is_finite());
-                let (points, ends): (Vec<(f64, f64)>, Vec<[f64; 2]>) = finite.map(|(p, e)| (*p, *e)).unzip();
-                let arms = points
+                let whole = series
+                    .points
                     .iter()
-                    .zip(&ends)
-                    .map(|(p, [low, high])| (p.1 - low, high - p.1));
-                let dots = self.dots(style).with_data(points.iter().copied());
-                vec![dots.with_y_err_asymmetric(arms).into()]
+                    .zip(ends)
+                    .filter(|(p, _)| p.0.is_finite() && p.1.is_finite());
+                let arms = whole.map(|(p, [low, high])| (p.1 - low, high - p.1));
+                let dots = self.dots(style).with_data(self.places(series));
+                vec![
+                    if self.lies() {
+                        dots.with_x_err_asymmetric(arms)
+                    } else {
+                        dots.with_y_err_asymmetric(arms)
+                    }
+                    .into(),
+                ]
             }
             Mark::Stems if self.lies() => {
                 let places = self.places(series);
@@ -234,26 +241,27 @@ impl<'a> Frame<'a> {
             scale(self.x_limits, PAGE_WIDTH - LEFT - RIGHT),
             scale(self.y_limits, PANEL_HEIGHT),
         );
-        let mut plots = Vec::new();
-        for piece in polyline::in_view(&series.points, self.x_limits) {
-            let on_page: Vec<_> = polyline::thin(piece, MOST_POINTS)
-                .into_iter()
-                .map(|(x, y)| (x * x_scale, y * y_scale))
-                .collect();
-            let on_page = polyline::simplify(&on_page, TOLERANCE);
-            let scribble = polyline::length(&on_page) > SCRIBBLE;
-            let (dash, width) = if scribble {
-                ("", SCRIBBLE_WIDTH)
-            } else {
-                (style.dash, style.width)
-            };
-            let data = on_page
-                .into_iter()
-                .map(|(x, y)| (x / x_scale, y / y_scale))
-                .collect();
-            plots.push(line(data, style, dash, width));
-        }
-        plots
+        let on_page = |piece| {
+            let thinned = polyline::thin(piece, MOST_POINTS).into_iter();
+            let scaled: Vec<_> = thinned.map(|(x, y)| (x * x_scale, y * y_scale)).collect();
+            polyline::simplify(&scaled, TOLERANCE)
+        };
+        let pieces: Vec<_> = polyline::in_view(&series.points, self.x_limits)
+            .into_iter()
+            .map(on_page)
+            .collect();
+        // All pieces of a series look alike.
+        let scribble = pieces.iter().map(|p| polyline::length(p)).sum::<f64>() > SCRIBBLE;
+        let (dash, width) = if scribble {
+            ("", SCRIBBLE_WIDTH)
+        } else {
+            (style.dash, style.width)
+        };
+        let on_axes = |piece: Vec<(f64, f64)>| {
+            let data = piece.into_iter().map(|(x, y)| (x / x_scale, y / y_scale));
+            line(data.collect(), style, dash, width)
+        };
+        pieces.into_iter().map(on_axes).collect()
     }
 }
 

@@ -53,18 +53,25 @@ fn panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
     }
 }
 
-/// A line that is broken where the rows are.
-fn pieces(label: &str, style: usize, x: &[f64], y: &[f64]) -> Vec<Series> {
+/// What a line or an area breaks at: a place between rows that are no neighbours, from whose values nothing is drawn.
+fn broken<T: Copy>(x: &[f64], y: &[T], nothing: T) -> (Vec<f64>, Vec<T>) {
     let step = x.get(1).map_or(0.0, |second| 1.5 * (second - x[0]));
-    let mut out = Vec::new();
-    let mut from = 0;
-    for k in 1..=x.len() {
-        if k == x.len() || x[k] - x[k - 1] > step {
-            out.push(line(label, style, &x[from..k], &y[from..k]));
-            from = k;
+    let (mut places, mut values) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
+    for (k, (&at, &value)) in x.iter().zip(y).enumerate() {
+        if k > 0 && at - x[k - 1] > step {
+            places.push(0.5 * (at + x[k - 1]));
+            values.push(nothing);
         }
+        places.push(at);
+        values.push(value);
     }
-    out
+    (places, values)
+}
+
+/// A line that is broken where the rows are.
+fn broken_line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
+    let (x, y) = broken(x, y, f64::NAN);
+    line(label, style, &x, &y)
 }
 
 /// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %.
@@ -150,33 +157,42 @@ fn over(x: &str, panels: Vec<Panel>) -> Figure {
 
 fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
-    let mut series = pieces("measured", 0, &t.time_s, &t.measured_nm);
-    series.extend(pieces("simulated", 3, &t.time_s, &t.simulated_nm));
+    let series = vec![
+        broken_line("measured", 0, &t.time_s, &t.measured_nm),
+        broken_line("simulated", 3, &t.time_s, &t.simulated_nm),
+    ];
     let mut figure = over("Time (s)", vec![panel("", "Driver torque (N.m)", series)]);
+    figure.bands = left_out_bands(found);
+    figure
+}
+
+/// What was left out, and why.
+fn left_out_bands(found: &Identification) -> Vec<Band> {
     let left_out = found.preflight.iter().flat_map(|p| &p.left_out);
-    figure.bands = left_out
+    left_out
         .map(|l| Band {
             label: format!("left out: {}", l.reason),
             from: l.from_s,
             to: l.to_s,
             dark: l.reason != Reason::Asked,
         })
-        .collect();
-    figure
+        .collect()
 }
 
 fn residuals(found: &Identification) -> Figure {
     let t = &found.traces;
     let both = t.measured_nm.iter().zip(&t.simulated_nm);
     let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
-    let panel = |title: &str, y: &[f64]| panel(title, "(N.m)", vec![line("", 1, &t.time_s, y)]);
-    over(
+    let panel = |title: &str, y: &[f64]| panel(title, "(N.m)", vec![broken_line("", 1, &t.time_s, y)]);
+    let mut figure = over(
         "Time (s)",
         vec![
             panel("Measured minus simulated", &unexplained),
             panel("Residual of the loss", &t.residual_nm),
         ],
-    )
+    );
+    figure.bands = left_out_bands(found);
+    figure
 }
 
 fn correlogram(found: &Identification) -> Figure {
@@ -196,13 +212,14 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     let panel = |title: &str, unit: &str, h: &History| {
         let both = h.estimate.iter().zip(&h.standard_deviation);
         let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
+        let (x, ends) = broken(&t.time_s, &ends, [f64::NAN; 2]);
         let series = vec![
-            Series::interval("two standard deviations", 5, &t.time_s, &ends),
-            line("estimate", 1, &t.time_s, &h.estimate),
+            Series::interval("two standard deviations", 5, &x, &ends),
+            broken_line("estimate", 1, &t.time_s, &h.estimate),
         ];
         panel(title, unit, series)
     };
-    over(
+    let mut figure = over(
         "Time (s)",
         vec![
             panel("K_hg", "(-)", &t.k_hg),
@@ -211,7 +228,9 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
             panel("gain_3", "(N.m/rad)", &t.gain[2]),
             panel("t_p", "(s)", &t.t_p),
         ],
-    )
+    );
+    figure.bands = left_out_bands(&drive.results.identification);
+    figure
 }
 
 /// A figure with its caption.

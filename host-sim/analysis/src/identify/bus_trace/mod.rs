@@ -307,8 +307,9 @@ impl Course {
         Some([
             self.name.to_owned(),
             format!(
-                "{} pauses, the longest of {longest:.3} s, the first before line {}",
+                "{} pause{}, the longest of {longest:.3} s, the first before line {}",
                 long.len(),
+                if long.len() == 1 { "" } else { "s" },
                 self.line[k + 1]
             ),
             "bridged if short, else cut".to_owned(),

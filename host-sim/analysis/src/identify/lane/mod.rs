@@ -42,7 +42,7 @@ pub struct LaneNoise {
     pub left_sd: f64,
     /// Samples that were out of line.
     pub outliers: usize,
-    /// Whether the signal was smoothed.
+    /// Whether the signal was smoothed; one with next to no noise is only completed where values are missing.
     pub smoothed: bool,
 }
 
@@ -182,7 +182,7 @@ pub(crate) fn smooth(
             noise_sd: fit.noise_variance.sqrt(),
             left_sd: left,
             outliers: outliers.len(),
-            smoothed: true,
+            smoothed: !negligible,
         },
     }
 }

@@ -17,6 +17,9 @@ const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.05);
 /// Between uneven stamps that are farther apart than so many usual steps nothing is read off.
 const LONGEST_STEP: f64 = 3.5;
 
+/// Values on the grid that are so many apart share no row.
+const SHARED_LAGS: usize = 8;
+
 /// An even grid and how the rows lie on it.
 pub(super) struct Grid {
     pub start_s: f64,
@@ -80,8 +83,9 @@ impl Grid {
             let finding = [
                 "time_s".to_owned(),
                 format!(
-                    "{} rows lost in {gaps} gaps, the longest of {:.2} s",
+                    "{} rows lost in {gaps} gap{}, the longest of {:.2} s",
                     rows - time.len(),
+                    if gaps == 1 { "" } else { "s" },
                     most as f64 * dt_s
                 ),
                 "bridged if short, else cut".to_owned(),
@@ -122,9 +126,37 @@ impl Grid {
         })
     }
 
-    /// Whether signals are read off between rows.
-    pub(super) fn resamples(&self) -> bool {
-        matches!(self.place, Place::Between(_))
+    /// Autocorrelation, from lag 1 on, that reading off between rows gives to noise that is white from row to row; empty
+    /// where the rows are taken as they are.
+    pub(super) fn autocorrelation(&self, time: &[f64]) -> Vec<f64> {
+        let Place::Between(longest) = self.place else {
+            return Vec::new();
+        };
+        let weights: Vec<Weights> = self
+            .places(time)
+            .map(|(k, t)| Weights::between(time, k, t, longest, |_| true))
+            .collect();
+        let at = |lag: usize| -> f64 {
+            weights
+                .iter()
+                .zip(&weights[lag.min(weights.len())..])
+                .map(|(a, b)| a.shared(b))
+                .sum()
+        };
+        let power = at(0);
+        (1..=SHARED_LAGS).map(|lag| at(lag) / power).collect()
+    }
+
+    /// The instants of the grid, each with the row that it follows.
+    fn places<'a>(&'a self, time: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let mut k = 0;
+        (0..self.rows).map(move |row| {
+            let t = self.start_s + row as f64 * self.dt_s;
+            while k + 2 < time.len() && time[k + 1] <= t {
+                k += 1;
+            }
+            (k, t)
+        })
     }
 
     /// A column on the grid; no number where there is nothing to take it from.
@@ -138,57 +170,79 @@ impl Grid {
                 }
                 out
             }
-            Place::Between(longest) => {
-                let mut k = 0;
-                (0..self.rows)
-                    .map(|row| {
-                        let t = self.start_s + row as f64 * self.dt_s;
-                        while k + 2 < time.len() && time[k + 1] <= t {
-                            k += 1;
-                        }
-                        if time[k + 1] - time[k] > *longest && t > time[k] && t < time[k + 1] {
-                            return f64::NAN;
-                        }
-                        let step = column[k + 1] - column[k];
-                        let switched =
-                            c == GUIDANCE_COLUMN && step.abs() > SWITCH_RATE_NM_S * (time[k + 1] - time[k]);
-                        if switched {
-                            // It switched somewhere between the two.
-                            let middle = 0.5 * (time[k] + time[k + 1]);
-                            return if t < middle { column[k] } else { column[k + 1] };
-                        }
-                        between(time, &column, k, t, *longest)
-                    })
-                    .collect()
-            }
+            Place::Between(longest) => self
+                .places(time)
+                .map(|(k, t)| {
+                    if time[k + 1] - time[k] > *longest && t > time[k] && t < time[k + 1] {
+                        return f64::NAN;
+                    }
+                    let step = column[k + 1] - column[k];
+                    let switched =
+                        c == GUIDANCE_COLUMN && step.abs() > SWITCH_RATE_NM_S * (time[k + 1] - time[k]);
+                    if switched {
+                        // It switched somewhere between the two.
+                        let middle = 0.5 * (time[k] + time[k + 1]);
+                        return if t < middle { column[k] } else { column[k + 1] };
+                    }
+                    Weights::between(time, k, t, *longest, |i| column[i].is_finite()).of(&column)
+                })
+                .collect(),
         }
     }
 }
 
-/// The value at `t` between rows `k` and `k + 1`: on the parabola-like cubic through four rows, or on the line where
-/// there are not four near each other.
-fn between(time: &[f64], u: &[f64], k: usize, t: f64, longest: f64) -> f64 {
-    let share = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
-    let line = u[k] + share * (u[k + 1] - u[k]);
-    let whole = k >= 1
-        && k + 2 < time.len()
-        && time[k] - time[k - 1] <= longest
-        && time[k + 2] - time[k + 1] <= longest
-        && u[k - 1].is_finite()
-        && u[k + 2].is_finite();
-    if !whole || !line.is_finite() {
-        return line;
-    }
-    // Lagrange's polynomial.
-    (k - 1..=k + 2)
-        .map(|i| {
-            let weight: f64 = (k - 1..=k + 2)
+/// What rows add to a value between them.
+struct Weights {
+    first: usize,
+    /// Of the rows from `first` on.
+    weight: [f64; 4],
+    count: usize,
+}
+
+impl Weights {
+    /// Of the value at `t` between rows `k` and `k + 1`: on the cubic through four rows, or on the line where there
+    /// are not four near each other.
+    fn between(time: &[f64], k: usize, t: f64, longest: f64, known: impl Fn(usize) -> bool) -> Self {
+        let whole = k >= 1
+            && k + 2 < time.len()
+            && time[k] - time[k - 1] <= longest
+            && time[k + 2] - time[k + 1] <= longest
+            && (k - 1..=k + 2).all(known);
+        if !whole {
+            let share = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
+            let weight = [1.0 - share, share, 0.0, 0.0];
+            return Self {
+                first: k,
+                weight,
+                count: 2,
+            };
+        }
+        // Lagrange's polynomial.
+        let first = k - 1;
+        let weight = std::array::from_fn(|i| {
+            (0..4)
                 .filter(|&j| j != i)
-                .map(|j| (t - time[j]) / (time[i] - time[j]))
-                .product();
-            weight * u[i]
-        })
-        .sum()
+                .map(|j| (t - time[first + j]) / (time[first + i] - time[first + j]))
+                .product()
+        });
+        Self {
+            first,
+            weight,
+            count: 4,
+        }
+    }
+
+    fn of(&self, u: &[f64]) -> f64 {
+        let rows = &u[self.first..self.first + self.count];
+        rows.iter().zip(&self.weight).map(|(u, w)| u * w).sum()
+    }
+
+    /// Covariance of two values if the rows' noise is white, over its variance.
+    fn shared(&self, later: &Self) -> f64 {
+        let rows = self.first.max(later.first)..(self.first + self.count).min(later.first + later.count);
+        rows.map(|row| self.weight[row - self.first] * later.weight[row - later.first])
+            .sum()
+    }
 }
 
 /// The median step of stamps that grow, in a range that can be.

@@ -70,8 +70,9 @@ pub struct DriveLog {
     pub guidance_torque_nm: Vec<f64>,
     /// Driver torque T_d as measured, N.m.
     pub driver_torque_nm: Vec<f64>,
-    /// Whether the signals were read off between rows: neighbouring rows then share their noise.
-    pub resampled: bool,
+    /// Autocorrelation, from lag 1 on, that white noise has here because the signals were read off between rows; empty
+    /// where the rows are as recorded.
+    pub resampling: Vec<f64>,
     /// What was found when the log was read: what, found, done.
     pub findings: Vec<[String; 3]>,
 }
@@ -151,7 +152,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
-            resampled: false,
+            resampling: Vec::new(),
             findings,
         })
     }
@@ -266,7 +267,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
-            resampled: grid.resamples(),
+            resampling: grid.autocorrelation(&time),
             findings: grid.finding.into_iter().collect(),
         })
     }

@@ -7,9 +7,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
 use super::{
-    CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S, T_NMS_SD_S,
-    T_P,
+    COMPARED, CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
+    T_NMS_SD_S, T_P,
 };
+use crate::identify::diagnostics;
 use crate::identify::options::Options;
 use crate::identify::result::{AtTNms, Identification, STANDARD_NORMAL_95};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
@@ -27,6 +28,24 @@ const DRAWN: f64 = 3.0;
 const LEAST_GAIN: f64 = 60.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
 const GUIDED_NM: f64 = 0.03;
+
+/// Where the profile of the delay passes the 95 % level for the first and the last time, or ends below it. Between its points
+/// its root is taken as straight, as it is of a parabola.
+fn within_95(profile: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let first = profile.iter().position(|x| x[1] <= PROFILE_95)?;
+    let last = profile.iter().rposition(|x| x[1] <= PROFILE_95)?;
+    let passes = |inside: [f64; 2], outside: Option<&[f64; 2]>| {
+        let Some(outside) = outside else { return inside[0] };
+        let root = |x: f64| x.max(0.0).sqrt();
+        let share = (root(PROFILE_95) - root(inside[1])) / (root(outside[1]) - root(inside[1]));
+        inside[0] + share * (outside[0] - inside[0])
+    };
+    let before = first.checked_sub(1).and_then(|k| profile.get(k));
+    Some([
+        passes(profile[first], before),
+        passes(profile[last], profile.get(last + 1)),
+    ])
+}
 
 impl Problem<'_> {
     /// Standard errors that hold where the prediction errors are not quite white, and where the likelihood of the
@@ -50,12 +69,7 @@ impl Problem<'_> {
                 }
             })
             .collect();
-        let near: Vec<f64> = profile
-            .iter()
-            .filter(|x| x[1] <= PROFILE_95)
-            .map(|x| x[0])
-            .collect();
-        if let (Some(first), Some(last)) = (near.first(), near.last()) {
+        if let Some([first, last]) = within_95(profile) {
             let usual = errors[(T_P, T_P)].sqrt();
             let half = (p[T_P] - first).max(last - p[T_P]) / STANDARD_NORMAL_95;
             if usual > 0.0 && usual.is_finite() {
@@ -94,7 +108,7 @@ impl Problem<'_> {
             found.fit_percent,
             &found.whiteness,
             &found.input_correlation,
-            self.log.resampled,
+            diagnostics::unexplained_autocorrelation(&found.traces.residual_nm, &self.log.resampling),
         ));
         refuted.extend(self.beside_nothing(optimum));
         let p = &optimum.point;
@@ -236,7 +250,7 @@ impl Problem<'_> {
         for i in (0..=T_P).chain([K_NMS, T_NMS, H_LATE, D_LATE]) {
             bounds[i] = Bounds::new(point[i], point[i]);
         }
-        let nothing = minimise(&point, &bounds, 1e-6, |p| self.sums::<CORE>(p));
+        let nothing = minimise(&point, &bounds, COMPARED, |p| self.sums::<CORE>(p));
         let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
         let gain =
             2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
@@ -249,5 +263,26 @@ impl Problem<'_> {
             cause: "driver_torque_nm is noise, of another drive, or of nobody's hands".to_owned(),
             cure: "check the sensor and the column of the log".to_owned(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parabola of standard error 0.05 about 0.2 passes 3.841 at 0.2 -+ 1.96 * 0.05, whatever the points; cut off at 0.15, it
+    /// ends there.
+    #[test]
+    fn the_profile_passes_its_level_between_its_points() {
+        let points = |from: f64| -> Vec<[f64; 2]> {
+            let at = |i: u32| from + 0.03 * f64::from(i);
+            (0..13).map(at).map(|t| [t, ((t - 0.2) / 0.05).powi(2)]).collect()
+        };
+        let [low, high] = within_95(&points(0.02)).unwrap();
+        assert!(
+            (low - 0.102).abs() < 1e-4 && (high - 0.298).abs() < 1e-4,
+            "{low} {high}"
+        );
+        assert_eq!(within_95(&points(0.15)).unwrap()[0], 0.15);
     }
 }

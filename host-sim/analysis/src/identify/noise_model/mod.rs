@@ -20,6 +20,7 @@
 //! ended ([`report`]).
 
 mod evidence;
+mod finite;
 mod information;
 mod judge;
 mod report;
@@ -103,6 +104,8 @@ const T_NMS_SEARCHED_S: [f64; 2] = [0.03, 0.3];
 /// Expected improvement, as a share of the loss, below which the search ends. With tens of thousands of rows
 /// this leaves the estimate within two hundredths of a standard error of the optimum.
 const TOLERANCE: f64 = 1e-8;
+/// The same where it is only to be seen which of two ends is the better one.
+const COMPARED: f64 = 1e-5;
 /// Prediction errors below this, N.m, are those of interpolation in a record without noise: no sensor resolves
 /// them, and no share of them is worth an iteration. They are systematic, so that the rows do not average them out
 /// as if they were noise: the standard errors are never taken from smaller ones.
@@ -143,6 +146,8 @@ struct Problem<'a> {
     extended: bool,
     /// Standard deviation of t_nms about what is assumed, s, where it is estimated although nobody asked for it.
     t_nms_prior_s: Option<f64>,
+    /// Whether the disturbance's corner was estimated by restricted likelihood, and then held.
+    corner_restricted: bool,
 }
 
 /// One row of the loss: the prediction error and its negative derivatives.
@@ -198,6 +203,7 @@ impl<'a> Problem<'a> {
             stretches,
             extended: options.estimate.iter().any(Option::is_some) || options.late_s != [0.0; 2],
             t_nms_prior_s: None,
+            corner_restricted: false,
         }
     }
 
@@ -405,11 +411,11 @@ impl<'a> Problem<'a> {
                 .map_or_else(Vec::new, |(_, point)| point);
             (
                 start[T_P],
-                minimise(&start, &bounds, TOLERANCE, |p| self.evaluate(p)),
+                minimise(&start, &bounds, COMPARED, |p| self.evaluate(p)),
             )
         });
         ends.sort_by(|a, b| a.1.quadratic.loss.total_cmp(&b.1.quadratic.loss));
-        let starts = ends
+        let mut starts: Vec<Start> = ends
             .iter()
             .map(|(from, o)| Start {
                 from_t_p_s: *from,
@@ -417,7 +423,11 @@ impl<'a> Problem<'a> {
                 loss: o.quadratic.loss,
             })
             .collect();
-        let [(_, best), _] = ends;
+        let [(_, near), _] = ends;
+        let mut best = minimise(&near.point, &bounds, TOLERANCE, |p| self.evaluate(p));
+        best.history.splice(0..0, near.history);
+        starts[0].to_t_p_s = best.point[T_P];
+        starts[0].loss = best.quadratic.loss;
         (best, starts)
     }
 

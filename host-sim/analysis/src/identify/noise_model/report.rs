@@ -50,34 +50,51 @@ impl Problem<'_> {
         let rows = self.row_count();
         let variance = 2.0 * optimum.quadratic.loss / rows.saturating_sub(free.len()).max(1) as f64;
         let error_variance = variance.max(SMALLEST_ERROR_NM.powi(2));
-        let mut errors = covariance(&optimum.quadratic.hessian, &free) * error_variance;
+        // The corner that the restricted likelihood gave was estimated too.
+        let corner = (self.corner_restricted).then_some(RHO);
+        let estimated: Vec<usize> = free.iter().copied().chain(corner).collect();
+        let mut errors = covariance(&optimum.quadratic.hessian, &estimated) * error_variance;
         let delay_profile = self.profile(
             p,
             optimum.quadratic.loss,
             error_variance,
             errors[(T_P, T_P)].sqrt(),
         );
-        self.widen(&mut errors, p, &optimum.quadratic.hessian, &free, &delay_profile);
+        self.widen(
+            &mut errors,
+            p,
+            &optimum.quadratic.hessian,
+            &estimated,
+            &delay_profile,
+        );
         let core: Vec<usize> = free
             .iter()
             .copied()
             .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
             .collect();
         let alternatives = self.alternatives(p, &core, error_variance);
+        // What else may be estimated (the muscle, delays of sensors, the share of white noise) counts as known there.
+        let within: Vec<usize> = core
+            .iter()
+            .copied()
+            .chain(corner)
+            .filter(|&i| i <= RHO || i >= COUNT)
+            .collect();
+        let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian);
         let trim = self.trim(optimum, &free, &errors, error_variance);
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
         if !options.t_nms_known && !self.is_free(T_NMS) {
-            at_t_nms = Some(self.at_t_nms(p, &errors, &trim.pull));
+            at_t_nms = Some(self.at_t_nms(&unbiased, &errors, &trim.pull));
             drawn = self.widen_by_t_nms(&mut errors, &alternatives);
         }
         let parameter = |i: usize| {
             if !self.is_free(i) {
                 Parameter::fixed(p[i])
             } else if trim.contradicted[i] {
-                Parameter::not_identified(p[i], self.bounds[i])
+                Parameter::not_identified(unbiased[i], self.bounds[i])
             } else {
                 Parameter::estimated(
-                    p[i],
+                    unbiased[i],
                     trim.pull[i],
                     errors[(i, i)],
                     drawn[i],
@@ -112,7 +129,7 @@ impl Problem<'_> {
         notes.extend(split.err());
         let along_k_hg = trim.bounds.iter().all(|&(i, _)| i == K_HG);
         let combinations = if !options.manual && !k_hg.identified && along_k_hg {
-            self.combinations(p, &errors)
+            self.combinations(&unbiased, &errors)
         } else {
             Vec::new()
         };
@@ -170,6 +187,16 @@ impl Problem<'_> {
         found
     }
 
+    /// The driver's parameters less the bias of a finite record, within their bounds.
+    fn unbiased(&self, p: &[f64], estimated: &[usize], hessian: &DMatrix<f64>) -> Vec<f64> {
+        let bias = self.bias(p, &covariance(hessian, estimated));
+        let mut out = p.to_vec();
+        for i in estimated.iter().copied().filter(|&i| i <= T_P) {
+            out[i] = (p[i] - bias[i]).clamp(self.bounds[i].low, self.bounds[i].high);
+        }
+        out
+    }
+
     /// What the driver's bounds did to the optimum.
     fn trim(&self, optimum: &Optimum, free: &[usize], errors: &DMatrix<f64>, variance: f64) -> Trim {
         let held: Vec<usize> = free
@@ -180,7 +207,12 @@ impl Problem<'_> {
         let pull = if held.is_empty() {
             DVector::zeros(errors.nrows())
         } else {
-            -(errors * &optimum.quadratic.gradient) / variance
+            let mut gradient = optimum.quadratic.gradient.clone();
+            if self.corner_restricted {
+                // No bound holds it: the restricted likelihood has its own gradient.
+                gradient[RHO] = 0.0;
+            }
+            -(errors * gradient) / variance
         };
         let beyond = |i: usize, errors: &DMatrix<f64>| {
             pull[i].is_finite() && pull[i].abs() > TRIMMED_AT_MOST * errors[(i, i)].sqrt()

@@ -42,6 +42,7 @@ impl Problem<'_> {
         }
         let rho = (1.0 - centre.exp()).clamp(USUAL_RHO[0], USUAL_RHO[1]);
         self.bounds[RHO] = Bounds::new(rho, rho);
+        self.corner_restricted = true;
         let bounds = self.bounds.clone();
         let history = optimum.history;
         let mut found = minimise(&optimum.point, &bounds, TOLERANCE, |p| self.evaluate(p));

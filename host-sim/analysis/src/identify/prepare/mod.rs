@@ -177,7 +177,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         wheel_angle_rad: phi.signal,
         guidance_torque_nm: t_h.signal,
         driver_torque_nm: t_d.signal,
-        resampled: log.resampled,
+        resampling: log.resampling.clone(),
         findings: Vec::new(),
     };
     preflight.lane_noise = lane_noise;
