@@ -113,12 +113,48 @@ def controller(path):
     before = unit.get(*INPUTS)
     assert refused(lambda: unit.put(e_y_m=0.05, e_theta_rad=float("nan")))
     assert refused(lambda: unit.step(0, 0.0005)), "no multiple of 1 ms"
-    assert refused(lambda: unit.put(k_1=0.3)), "a parameter after the start"
+    assert refused(lambda: unit.put(k_1=0.3)), "a parameter while the unit guides"
+    assert refused(lambda: unit.turn(engaged_at_start=True)), "a fixed parameter after the start"
     assert refused(lambda: unit.put(torque_nm=1.0)), "an output"
     assert refused(lambda: unit.turn(e_y_m=True)), "another type"
     assert unit.get(*INPUTS) == before and unit.get("torque_nm") == then
     unit.end()
     return differing
+
+
+def tuned(path):
+    """Parameters set in Standby: from there on the torques of the library's ECU that starts with them at that instant."""
+    description = read_model_description(path)
+    parameters = {p["name"] for p in hg.parameters()}
+    tunable = {v.name for v in description.modelVariables if v.variability == "tunable"}
+    assert tunable == parameters and all(v.causality == "parameter" for v in description.modelVariables if v.name in tunable)
+    unit, start = Unit(path), 1000
+    ecu, bus = hg.Ecu({"k_1": 0.2, "torque_limit_nm": 2.0}, t_us=1000 * start), hg.Bus()
+    torque_nm, largest = 0.0, 0.0
+    for k, (e_y, e_theta, driver, wheel) in enumerate(samples()):
+        if k == start:
+            assert unit.code("mode") == 1, "Standby"
+            before = unit.get("k_1", "a_1", "torque_limit_nm")
+            # A value, a product of two that the ECU refuses, a value behind a good one, no number.
+            for bad in (dict(k_1=5.0), dict(k_1=4.0, a_1=100.0), dict(k_1=0.2, torque_limit_nm=6.0), dict(a_1=float("nan"))):
+                assert refused(lambda: unit.put(**bad)), bad
+                assert unit.get("k_1", "a_1", "torque_limit_nm") == before, bad
+            unit.put(k_1=0.2, torque_limit_nm=2.0)
+        values = dict(zip(INPUTS, (e_y, e_theta, driver, wheel, torque_nm, 16.5)))
+        unit.put(**values)
+        unit.turn(engage=k >= start + 600)
+        unit.step(k)
+        if k >= start:
+            for frame in bus.frames(1000 * k, **values, engage=k >= start + 600):
+                ecu.receive(*frame, 1000 * k)
+            torque_nm = ecu.step(1000 * k).torque_nm
+            assert unit.get("torque_nm")[0] == torque_nm, k
+            largest = max(largest, abs(torque_nm))
+    assert unit.code("mode") == 2 and largest > 0.05, "it guided"
+    torque = unit.get("torque_nm")
+    assert refused(lambda: unit.put(k_1=0.1)) and unit.get("k_1") == [0.2] and unit.get("torque_nm") == torque
+    unit.end()
+    return len(tunable)
 
 
 def coupled(directory, ending, until_s):
@@ -165,6 +201,7 @@ def main(directory, run_csv):
             problems = validate_fmu(str(directory / f"{model}.{ending}"))
             assert not problems, (model, ending, problems)
         differing = controller(directory / f"HapticController.{ending}")
+        print(f"{ending}: {tuned(directory / f'HapticController.{ending}')} parameters tunable in Standby, with the library's torques")
         print(f"{ending}: fmpy validate: no problem in {', '.join(MODELS)}; controller: {STEPS} torques, {differing} differ "
               "from the library's; state and refusals hold")
     with open(run_csv) as file:

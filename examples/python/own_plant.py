@@ -1,7 +1,8 @@
-"""The shipping ECU around a vehicle of somebody else: the single-track model of the package commonroad-vehicle-models.
+"""The shipping ECU around a vehicle of somebody else: the single-track and the multi-body model of the package
+commonroad-vehicle-models.
 
-The vehicle is a BMW 320i (its parameter set 2) at 60 km/h: a straight, a clothoid, a bend of 300 m radius. The
-driver is equations (7) and (8) of the paper with little delay and medium reliance; the ECU boots as on a vehicle and
+The vehicle is a BMW 320i (its parameter set 2) at 60 km/h: a straight, a clothoid, a bend of 300 m radius. The single-track
+model has 7 states, the multi-body model 29: three masses, springs, dampers, four wheels with Pacejka's tyres. The driver is equations (7) and (8) of the paper with little delay and medium reliance; the ECU boots as on a vehicle and
 is asked for guidance after 0.6 s. What the ECU takes for granted of its vehicle is set to this one's.
 
     pip install haptic-guidance commonroad-vehicle-models
@@ -12,7 +13,9 @@ import math
 from collections import deque
 
 import numpy as np
+from vehiclemodels.init_mb import init_mb
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
+from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st
 
 import haptic_guidance as hg
@@ -56,20 +59,58 @@ class Road:
         return (y - self.y[i]) * math.cos(h) - (x - self.x[i]) * math.sin(h), i
 
 
-def drive(guided, duration_s=30.0):
+class SingleTrack:
+    """Position, direction of movement, and the slip angle of the front axle, which turns the wheel back."""
+
+    def __init__(self):
+        self.state = np.array([0.0, 0.0, 0.0, SPEED_M_PER_S, 0.0, 0.0, 0.0])
+
+    def step(self, steering_rate):
+        self.state += STEP_S * np.array(vehicle_dynamics_st(self.state, [steering_rate, 0.0], CAR))
+
+    def place(self):
+        x, y, _, _, yaw, _, slip = self.state
+        return x, y, yaw + slip
+
+    def front_slip(self):
+        _, _, steering, _, _, yaw_rate, slip = self.state
+        return slip + CAR.a * yaw_rate / SPEED_M_PER_S - steering
+
+
+class MultiBody:
+    """The same of the multi-body model; its speed is held as a driver's foot would."""
+
+    def __init__(self):
+        self.state = np.array(init_mb([0.0, 0.0, 0.0, SPEED_M_PER_S, 0.0, 0.0, 0.0], CAR))
+
+    def step(self, steering_rate):
+        throttle = 2.0 * (SPEED_M_PER_S - self.state[3])
+        self.state += STEP_S * np.array(vehicle_dynamics_mb(self.state, [steering_rate, throttle], CAR))
+
+    def place(self):
+        state = self.state
+        return state[0], state[1], state[4] + math.atan2(state[10], state[3])
+
+    def front_slip(self):
+        state = self.state
+        return math.atan2(state[10] + CAR.a * state[5], state[3]) - state[2]
+
+
+def drive(guided, vehicle=SingleTrack, duration_s=30.0):
     """Drives; returns the lateral error over time, m, and every fault that the ECU named, with its first time."""
     road, ecu, bus = Road(), hg.Ecu(ECU_PARAMETERS), hg.Bus()
-    car = np.array([0.0, 0.0, 0.0, SPEED_M_PER_S, 0.0, 0.0, 0.0])
+    car = vehicle()
     k_d, k_nms, t_nms, k_hg = (3.0, 1.0, 0.1, 0.5) if guided else (4.0, 1.0, 0.1, 0.0)
     delayed = deque([0.0] * 100)  # t_p = 0.1 s
     wheel = wheel_rate = arm_nm = torque_nm = integral = 0.0
     error_m, faults = [], {}
     for k in range(int(duration_s / STEP_S)):
-        t_us, direction = 1000 * k, car[4] + car[6]
+        t_us = 1000 * k
         if k % 8 == 0:  # driver and camera look
-            e_y, e_theta = road.errors(car[0], car[1], direction, 0.3 * SPEED_M_PER_S, 1.0 * SPEED_M_PER_S)
-            seen = road.errors(car[0], car[1], direction, 0.3 * SPEED_M_PER_S, 0.7 * SPEED_M_PER_S)
-            error_m.append(road.foot(car[0], car[1])[0])
+            x, y, direction = car.place()
+            e_y, e_theta = road.errors(x, y, direction, 0.3 * SPEED_M_PER_S, 1.0 * SPEED_M_PER_S)
+            seen = road.errors(x, y, direction, 0.3 * SPEED_M_PER_S, 0.7 * SPEED_M_PER_S)
+            error_m.append(road.foot(x, y)[0])
         frames = bus.frames(
             t_us,
             e_y_m=seen[0],
@@ -91,16 +132,16 @@ def drive(guided, duration_s=30.0):
         delayed.append(0.1 * e_y + 0.05 * integral + 3.7 * e_theta)
         target = delayed.popleft()
         arm_nm += STEP_S / t_nms * ((k_d + k_nms) * target - k_nms * wheel - k_hg * torque_nm - arm_nm)
-        slip = car[6] + CAR.a * car[5] / SPEED_M_PER_S - K_T * wheel
-        wheel_rate += STEP_S / J_S * (arm_nm + torque_nm + K_ALN * slip - B_S * wheel_rate)
+        wheel_rate += STEP_S / J_S * (arm_nm + torque_nm + K_ALN * car.front_slip() - B_S * wheel_rate)
         wheel += STEP_S * wheel_rate
-        car += STEP_S * np.array(vehicle_dynamics_st(car, [K_T * wheel_rate, 0.0], CAR))
+        car.step(K_T * wheel_rate)
     return np.array(error_m), faults, step.mode
 
 
 if __name__ == "__main__":
-    for guided in (False, True):
-        error_m, faults, mode = drive(guided)
-        name = "guided" if guided else "unguided"
-        print(f"{name}: peak {np.abs(error_m).max():.3f} m, mean {np.abs(error_m).mean():.3f} m, ECU in {mode}")
-        print("  faults:", ", ".join(f"{fault} at {time_s:.3f} s" for fault, time_s in faults.items()) or "none")
+    for vehicle in (SingleTrack, MultiBody):
+        for guided in (False, True):
+            error_m, faults, mode = drive(guided, vehicle)
+            name = f"{vehicle.__name__}, {'guided' if guided else 'unguided'}"
+            print(f"{name}: peak {np.abs(error_m).max():.3f} m, mean {np.abs(error_m).mean():.3f} m, ECU in {mode}")
+            print("  faults:", ", ".join(f"{fault} at {time_s:.3f} s" for fault, time_s in faults.items()) or "none")

@@ -39,6 +39,8 @@ pub(crate) fn check() -> Result<()> {
     let python = wheel::python()?;
     let mut in_python = command(&python.to_string_lossy());
     in_python.arg("bindings/python/replay.py");
+    let mut simulated = command(&python.to_string_lossy());
+    simulated.arg("bindings/python/simulated.py").arg(SCENARIO);
     let in_c = command(&c_library::replay()?.to_string_lossy());
     println!("{SCENARIO}, frames that the controller sent\n");
     println!("{:<20} {:>9} {:>9}", "door", "frames", "differing");
@@ -50,7 +52,12 @@ pub(crate) fn check() -> Result<()> {
             differing.push(door.to_owned());
         }
     };
-    for (door, mut program) in [("Python", in_python), ("C", in_c)] {
+    let doors = [
+        ("Python, Ecu", in_python),
+        ("Python, simulate", simulated),
+        ("C", in_c),
+    ];
+    for (door, mut program) in doors {
         let (frames, wrong) = compared(&replayed(&mut program, &bus)?, &expected);
         row(door, frames, wrong);
     }

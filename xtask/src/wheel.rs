@@ -29,20 +29,22 @@ impl Options {
 }
 
 /// What a wheel must not link: the fault injector, serial ports, charts, the command line.
-const NOT_IN_A_WHEEL: [&str; 8] = [
+const NOT_IN_A_WHEEL: [&str; 10] = [
     "haptic-campaign",
     "haptic-target",
     "haptic-report",
     "host-sim",
     "serialport",
     "plotters",
+    "kuva",
+    "resvg",
     "clap",
     "indicatif",
 ];
 const LARGEST_MB: f64 = 5.0;
 const MATURIN: &str = "maturin>=1.9,<2";
 /// The tests, and the packages that the examples and the tests' peers need.
-const TEST_PACKAGES: [&str; 7] = [
+const TEST_PACKAGES: [&str; 11] = [
     "pytest",
     "pandas",
     "pyarrow",
@@ -50,6 +52,10 @@ const TEST_PACKAGES: [&str; 7] = [
     "cantools",
     "distributed",
     "commonroad-vehicle-models",
+    "gymnasium>=1.1",
+    "tqdm",
+    "nbclient",
+    "ipykernel",
 ];
 
 /// Builds the wheel, and tries it if asked to.

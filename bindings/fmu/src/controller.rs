@@ -3,6 +3,7 @@
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::config::Setup;
 use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::modes::Mode;
 use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_sim::models::sensors::camera_looks;
@@ -21,7 +22,7 @@ pub static ABOUT: About = About {
 /// Variables that are no parameters of the controller.
 const OWN: usize = 17;
 use Kind::{Boolean, Integer, Real};
-use Role::{Input, Output, Parameter};
+use Role::{Input, Output, Parameter, Tunable};
 
 /// Every variable, the controller's own parameters last.
 pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
@@ -114,7 +115,7 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
             all[i] = Variable {
                 start: parameter.default,
                 range: Some([parameter.min, parameter.max]),
-                ..variable(parameter.name, Real, Parameter, parameter.unit, parameter.meaning)
+                ..variable(parameter.name, Real, Tunable, parameter.unit, parameter.meaning)
             };
         }
         i += 1;
@@ -139,6 +140,7 @@ struct Controller {
     steps: u64,
     /// Frames that the camera has sent; column and host send on a grid of whole steps.
     pictures: u64,
+    mode: Mode,
 }
 
 impl Default for Controller {
@@ -147,15 +149,20 @@ impl Default for Controller {
             ecu: Ecu::new(Some(&Setup::PAPER), Boot::default(), Instant::from_us(0)),
             steps: 0,
             pictures: 0,
+            mode: Mode::Boot,
         }
     }
 }
 
+/// The parameters among the values, checked alone and together.
+fn setup_of(values: &[f64]) -> Result<Setup, String> {
+    let parameters = std::array::from_fn(|i| values[OWN + i]);
+    Setup::new(&Params::from_values(&parameters)).map_err(|e| e.to_string())
+}
+
 impl Model for Controller {
     fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
-        let parameters = std::array::from_fn(|i| values[OWN + i]);
-        let setup = Params::from_values(&parameters);
-        let setup = Setup::new(&setup).map_err(|e| e.to_string())?;
+        let setup = setup_of(values)?;
         let start = Instant::from_us(0);
         self.ecu = if values[ENGAGED] != 0.0 {
             Ecu::engaged(&setup, start)
@@ -163,6 +170,26 @@ impl Model for Controller {
             Ecu::new(Some(&setup), Boot::default(), start)
         };
         (self.steps, self.pictures) = (0, 0);
+        self.mode = if values[ENGAGED] != 0.0 {
+            Mode::Active
+        } else {
+            Mode::Boot
+        };
+        Ok(())
+    }
+
+    /// As on a vehicle: while nobody is guided, the ECU starts again with the new set.
+    fn tune(&mut self, values: &[f64]) -> Result<(), String> {
+        let setup = setup_of(values)?;
+        if !matches!(self.mode, Mode::Boot | Mode::Standby) {
+            return Err(format!(
+                "the ECU takes parameters in Boot and in Standby, and is in {:?}",
+                self.mode
+            ));
+        }
+        let now = Instant::from_us(self.steps.wrapping_mul(1000) as u32);
+        self.ecu = Ecu::new(Some(&setup), Boot::default(), now);
+        self.mode = Mode::Boot;
         Ok(())
     }
 
@@ -225,6 +252,7 @@ impl Model for Controller {
         }
         let command = self.ecu.step(now).command;
         let _ = self.ecu.background_step();
+        self.mode = command.mode;
         values[TORQUE..TORQUE + 5].copy_from_slice(&[
             command.torque.nm(),
             f64::from(command.mode as u8),

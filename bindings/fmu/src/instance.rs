@@ -65,7 +65,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets all values, or none.
+    /// Sets all values, or none. Tunable parameters that are set together are taken together.
     pub(crate) fn set(
         &mut self,
         references: &[u32],
@@ -73,6 +73,7 @@ impl Instance {
         value: impl Fn(usize) -> f64,
     ) -> Result<(), String> {
         let mut values = self.state.values.clone();
+        let mut tuned = None;
         for (i, &reference) in references.iter().enumerate() {
             let variable = self
                 .about
@@ -97,6 +98,15 @@ impl Instance {
                 ));
             }
             values[reference as usize] = value;
+            if variable.role == Role::Tunable && self.state.started {
+                tuned = Some(name);
+            }
+        }
+        if let Some(name) = tuned {
+            // A model that refuses stays as it was.
+            let mut model = self.state.model.copy();
+            model.tune(&values).map_err(|why| format!("{name}: {why}"))?;
+            self.state.model = model;
         }
         self.state.values = values;
         Ok(())

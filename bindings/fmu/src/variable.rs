@@ -9,6 +9,8 @@ pub enum Role {
     Output,
     /// Set before the start.
     Parameter,
+    /// Set before the start, and between steps where the model takes it.
+    Tunable,
 }
 
 /// The type of a variable; all are kept as numbers.
@@ -104,6 +106,14 @@ pub trait Model: Send {
     /// # Errors
     /// Why there is no next step.
     fn step(&mut self, values: &mut [f64]) -> Result<(), String>;
+
+    /// Takes tunable parameters that were set since the start.
+    ///
+    /// # Errors
+    /// Why they cannot be, or not now.
+    fn tune(&mut self, _values: &[f64]) -> Result<(), String> {
+        Err("it cannot be set now".into())
+    }
 
     /// The same again, for a state that is taken.
     fn copy(&self) -> Box<dyn Model>;

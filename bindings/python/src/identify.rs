@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{COLUMNS, DriveLog, Options, Recording, open_mapped};
+use haptic_analysis::identify::{COLUMNS, DriveLog, Mapping, Options, Recording, SingleTrack, open_mapped};
 use haptic_batch::identify::Method;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 use crate::errors;
 use crate::interrupt::interruptible;
 use crate::run::python;
+use crate::scenario::Scenario;
 
 /// Findings of an identification, for `haptic_guidance.identify`.
 #[pyfunction]
@@ -25,6 +26,9 @@ pub(crate) fn identify<'py>(
     estimate: Vec<String>,
     between: Vec<[f64; 2]>,
     as_published: bool,
+    maps: Vec<String>,
+    dbc: Option<PathBuf>,
+    vehicle: Option<&Bound<'py, Scenario>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let mut options = Options::given(manual, &fix).map_err(|error| errors::input(py, error))?;
     for what in &estimate {
@@ -36,11 +40,17 @@ pub(crate) fn identify<'py>(
         .map_err(|error| errors::input(py, error))?;
     let (name, (log, converted)) = match (path, columns) {
         (Some(path), _) => {
+            let maps = maps
+                .iter()
+                .map(|map| map.parse())
+                .collect::<Result<Vec<Mapping>, _>>();
+            let maps = maps.map_err(|error| errors::input(py, error))?;
             let how = Recording {
+                dbc: dbc.as_deref(),
+                vehicle: vehicle.map(|scenario| single_track(scenario.get())),
                 manual,
-                ..Recording::default()
             };
-            let opened = open_mapped(&path, &[], &how).map_err(|error| errors::input(py, error))?;
+            let opened = open_mapped(&path, &maps, &how).map_err(|error| errors::input(py, error))?;
             (path.display().to_string(), opened)
         }
         (None, Some(columns)) => ("columns".to_owned(), (log_of(py, columns, manual)?, Vec::new())),
@@ -75,6 +85,20 @@ pub(crate) fn identify<'py>(
     }
     made.set_item("traces", traces)?;
     Ok(made)
+}
+
+/// The vehicle of a scenario, as far as it decides how the vehicle turns.
+fn single_track(scenario: &Scenario) -> SingleTrack {
+    let v = scenario.inner.vehicle();
+    SingleTrack {
+        m: v.m,
+        i: v.i,
+        l_f: v.l_f,
+        l_r: v.l_r,
+        k_f: v.k_f,
+        k_r: v.k_r,
+        k_t: v.k_t,
+    }
 }
 
 /// The log of named arrays. They pass through the reader of log files, which checks them; numbers are written so that

@@ -4,10 +4,12 @@
 mod bus;
 mod ecu;
 mod errors;
+mod experiment;
 mod identify;
 mod interrupt;
 mod run;
 mod scenario;
+mod side_by_side;
 mod simulation;
 mod sweep;
 
@@ -20,11 +22,15 @@ mod _native {
     #[pymodule_export]
     use crate::ecu::{Ecu, Step, parameters};
     #[pymodule_export]
+    use crate::experiment::experiment;
+    #[pymodule_export]
     use crate::identify::identify;
     #[pymodule_export]
     use crate::run::{evaluate, metric_definitions, simulate};
     #[pymodule_export]
     use crate::scenario::Scenario;
+    #[pymodule_export]
+    use crate::side_by_side::Simulations;
     #[pymodule_export]
     use crate::simulation::{Action, Outcome, Simulation};
     #[pymodule_export]

@@ -20,10 +20,11 @@ def test_figure_9(tmp_path, monkeypatch):
     assert (tmp_path / "figure-9.png").stat().st_size > 10_000
 
 
-def test_a_plant_of_ones_own():
+@pytest.mark.parametrize("vehicle", ["SingleTrack", "MultiBody"])
+def test_a_plant_of_ones_own(vehicle):
     pytest.importorskip("vehiclemodels")
-    drive = runpy.run_path(str(EXAMPLES / "own_plant.py"))["drive"]
-    results = {guided: drive(guided) for guided in (False, True)}
+    example = runpy.run_path(str(EXAMPLES / "own_plant.py"))
+    results = {guided: example["drive"](guided, example[vehicle], 20.0) for guided in (False, True)}
     for guided, (error_m, faults, mode) in results.items():
         print(guided, np.abs(error_m).max(), faults, mode)
         assert mode == ("Active" if guided else "Standby")
@@ -45,6 +46,32 @@ def test_a_known_driver_on_a_vehicle_that_is_not_ours(model):
         low, high = fit[name].interval_95
         assert low <= truth <= high, (name, truth, low, high)
     assert fit["k_hg"].identified
+
+
+def test_the_agent(capsys):
+    pytest.importorskip("gymnasium")
+    runpy.run_path(str(EXAMPLES / "train_an_agent.py"))
+    printed = capsys.readouterr().out.splitlines()
+    returns = [float(line.split("return ")[1]) for line in printed]
+    assert len(returns) == 11 and all(value < 0 for value in returns)
+
+
+@pytest.mark.parametrize(("name", "figures"), [("figures_8_and_9", 2), ("identify_a_drive", 2), ("your_own_plant", 1)])
+def test_a_notebook(name, figures):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    folder = ROOT / "examples" / "notebooks"
+    notebook = nbformat.read(folder / f"{name}.ipynb", as_version=4)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    for cell in cells:
+        assert cell.outputs == [] and cell.execution_count is None, "it is kept without outputs"
+    options = dict(timeout=1800, startup_timeout=600, kernel_name="python3")
+    nbclient.NotebookClient(notebook, resources={"metadata": {"path": folder}}, **options).execute()
+    outputs = [output for cell in cells for output in cell.outputs]
+    assert all(cell.execution_count for cell in cells)
+    pictures = [output for output in outputs if "image/png" in output.get("data", {})]
+    assert len(pictures) >= figures
+    assert not any("OUTSIDE" in output.get("text", "") for output in outputs)
 
 
 def test_the_readme(tmp_path, monkeypatch):

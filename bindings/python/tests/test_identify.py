@@ -79,6 +79,85 @@ def test_a_stretch_and_more_parameters_can_be_asked_for():
         hg.identify(run, between_s=[(10.0, 5.0)])
 
 
+FOREIGN = {
+    "time_s": "t",
+    "e_y_m": "Lane Offset",
+    "e_theta_rad": "LaneHeading",
+    "wheel_angle_rad": "SteeringAngle*0.017453292519943295",
+    "guidance_torque_nm": "Motor * 0.001",
+    "driver_torque_nm": "TorsionBar*-1",
+}
+
+
+def foreign():
+    """The columns of a log by the names and units of another tool."""
+    columns = table(LOGS / "guided-probe-clean.csv")
+    return {
+        "t": columns["time_s"],
+        "Lane Offset": columns["e_y_m"],
+        "LaneHeading": columns["e_theta_rad"],
+        "SteeringAngle": np.degrees(columns["wheel_angle_rad"]),
+        "Motor": 1e3 * columns["guidance_torque_nm"],
+        "TorsionBar": -columns["driver_torque_nm"],
+        "Comment": ["a"] * len(columns["time_s"]),
+    }
+
+
+def test_columns_and_files_of_other_names_and_units_are_mapped(tmp_path):
+    expected = hg.identify(LOGS / "guided-probe-clean.csv")
+    columns = foreign()
+    path = tmp_path / "bench.csv"
+    names = [name for name in columns if name != "Comment"]
+    rows = [",".join(names)] + [",".join(repr(float(v)) for v in row) for row in zip(*(columns[n] for n in names))]
+    path.write_text("\n".join(rows) + "\n")
+    for drive in (columns, path):
+        fit = hg.identify(drive, map=FOREIGN)
+        for name in ("t_p", "gain_3", "k_hg"):
+            assert fit[name].estimate == pytest.approx(expected[name].estimate, rel=1e-4), name
+    pandas = pytest.importorskip("pandas")
+    assert hg.identify(pandas.DataFrame(columns), map=FOREIGN)["t_p"].identified
+
+
+def test_a_recording_of_the_bus_takes_another_vehicle_and_another_bus(tmp_path):
+    driver = {"t_p": 0.2, "K_hg": 0.4, "remnant_sd": 0.02}
+    bus = hg.simulate(hg.Scenario(driver=driver, guidance={"probe": True}), bus=True).bus
+    trace = tmp_path / "bus.log"
+    lines = (f"({t / 1e6:.6f}) can0 {i:03X}#{d.tobytes().hex().upper()}" for t, i, d in zip(*map(bus.get, ("t_us", "id", "data"))))
+    trace.write_text("\n".join(lines) + "\n")
+    own = hg.identify(trace, dbc=Path(__file__).parents[3] / "core" / "haptic.dbc")
+    assert own.results["parameters"] == hg.identify(trace).results["parameters"]
+    heavy = hg.identify(trace, vehicle=hg.Scenario(vehicle={"l_f": 1.4, "K_f": 30_000.0}))
+    assert heavy.results["parameters"] != own.results["parameters"]
+    with pytest.raises(hg.InputError, match="none.dbc"):
+        hg.identify(trace, dbc="none.dbc")
+    with pytest.raises(TypeError):
+        hg.identify(trace, vehicle="heavy")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (dict(map={"e_y": "t"}), "'e_y' is none of time_s"),
+        (dict(map={"e_y_m": "Offset"}), "e_y_m = 'Offset': there is no such column"),
+        (dict(map={"e_y_m": "Comment"}), "e_y_m = 'Comment': there is no such column of numbers"),
+        (dict(map={"e_y_m": "t*0"}), "the scale is no number other than 0"),
+        (dict(map={"e_y_m": "t*inf"}), "the scale is no number other than 0"),
+        (dict(map={"e_y_m": "t*wide"}), "the scale is no number other than 0"),
+        (dict(dbc="core/haptic.dbc"), "dbc: only for a recording of the bus"),
+        (dict(vehicle=hg.Scenario()), "vehicle: only for a recording of the bus"),
+    ],
+)
+def test_a_mapping_that_cannot_be_is_refused(options, says):
+    with pytest.raises(hg.InputError, match=says):
+        hg.identify(foreign(), **options)
+
+
+def test_a_mapping_of_a_file_is_refused_by_name():
+    for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "scale")]:
+        with pytest.raises(hg.InputError, match=says):
+            hg.identify(LOGS / "guided-probe-clean.csv", map=given)
+
+
 def test_what_cannot_be_fixed_is_refused():
     with pytest.raises(hg.InputError, match="k_x"):
         hg.identify(LOGS / "manual.csv", fix={"k_x": 1.0})

@@ -60,6 +60,32 @@ def test_pandas_and_arrow_share_the_memory():
     assert table["s_m"].chunk(0).buffers()[1].address == run["s_m"].ctypes.data
 
 
+def test_whatever_reads_arrow_reads_a_run():
+    pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
+    run = hg.simulate(hg.Scenario(course=SHORT))
+    # By the PyCapsule interface alone: neither knows a run.
+    table = pyarrow.table(run)
+    assert table.column_names == list(run.columns)
+    assert table["s_m"].chunk(0).buffers()[1].address == run["s_m"].ctypes.data
+    stream = pyarrow.RecordBatchReader.from_stream(run).read_all()
+    assert stream["e_y_m"].chunk(0).buffers()[1].address == run["e_y_m"].ctypes.data
+    if hasattr(pandas.DataFrame, "from_arrow"):
+        frame = pandas.DataFrame.from_arrow(run)
+        pandas.testing.assert_frame_equal(frame, run.to_pandas(), check_dtype=False)
+
+
+def test_a_run_has_a_figure(tmp_path):
+    pytest.importorskip("matplotlib")
+    run = hg.simulate(hg.Scenario(course=SHORT, failure={"kind": "torque", "time": 5}))
+    figure = run.figure()
+    error, torque, wheel = figure.axes
+    assert np.array_equal(error.lines[0].get_ydata(), run["lateral_error_m"])
+    assert [line.get_label() for line in torque.lines[:2]] == ["driver", "guidance"]
+    assert wheel.lines[1].get_xdata()[0] == 5.0, "the failure is marked"
+    figure.savefig(tmp_path / "run.png")
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+
+
 def test_a_run_can_be_pickled():
     run = hg.simulate(hg.Scenario(course=SHORT), bus=True)
     again = pickle.loads(pickle.dumps(run))
@@ -128,6 +154,57 @@ def test_the_evaluation_holds_its_claims_and_tells_its_progress():
     evaluation = hg.evaluate(progress=told.append)
     assert sum(told) == len(evaluation.results["runs"]) == len(evaluation.columns) == 30
     assert evaluation.results["claims"] and evaluation.all_claims_hold
+
+
+def test_progress_is_a_bar_of_tqdm_or_refused(capsys, monkeypatch):
+    pytest.importorskip("tqdm")
+    hg.experiment([3], progress=True)
+    assert "2/2" in capsys.readouterr().err
+    with pytest.raises(hg.InputError, match="progress: a str is neither True nor callable"):
+        hg.evaluate(progress="yes")
+    monkeypatch.setitem(__import__("sys").modules, "tqdm.auto", None)
+    with pytest.raises(hg.InputError, match="progress=True needs tqdm"):
+        hg.evaluate(progress=True)
+
+
+def test_the_participants_drive_and_are_identified():
+    told = []
+    found = hg.experiment([3, 7], probe_nm=0.2, seed=4, progress=told.append)
+    assert sum(told) == 4 == len(found.drives)
+    drives = found.results["drives"]
+    assert [(d["participant"], d["guided"]) for d in drives] == [(3, False), (3, True), (7, False), (7, True)]
+    # Table 6 of the paper, participant 3.
+    text = (Path(__file__).parents[3] / "host-sim" / "sim" / "data" / "participants.toml").read_text()
+    guided = text.split("number = 3")[1].split("guided")[1]
+    t_p = float(guided.split("t_p = ")[1].split(",")[0].split("\n")[0].split("}")[0])
+    assert drives[1]["truth"]["t_p"] == t_p
+    estimate = drives[1]["noise_model"]["parameters"]["t_p"]
+    assert abs(estimate["estimate"] - t_p) < 4 * estimate["standard_error"]
+    # What was recorded gives the same driver again.
+    again = hg.identify(found.drives[1])
+    assert abs(again["t_p"].estimate - estimate["estimate"]) < 0.1 * estimate["standard_error"]
+    pytest.importorskip("pandas")
+    frame = found.to_pandas()
+    assert list(frame["participant"]) == [3, 3, 7, 7] and frame["true_t_p"][1] == t_p
+    assert frame["k_hg"][1] == drives[1]["noise_model"]["parameters"]["k_hg"]["estimate"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "says"),
+    [
+        (dict(participants=[15]), hg.RangeError, "participants = 15 is outside 1 to 14"),
+        (dict(participants=[-1]), hg.RangeError, "participants = -1 is outside 1 to 14"),
+        (dict(participants=[]), hg.InputError, "at least one"),
+        (dict(participants=[1.5]), hg.InputError, "whole numbers"),
+        (dict(participants="1"), hg.InputError, "whole numbers"),
+        (dict(probe_nm=0.4), hg.RangeError, "probe_amplitude_nm = 0.4 N.m is outside 0 to 0.3"),
+        (dict(probe_nm=float("nan")), hg.RangeError, "probe_amplitude_nm"),
+        (dict(seed=-1), hg.RangeError, "seed = -1 is outside 0"),
+    ],
+)
+def test_what_is_no_experiment_is_refused(arguments, error, says):
+    with pytest.raises(error, match=says):
+        hg.experiment(**arguments)
 
 
 def test_ctrl_c_ends_a_long_call_and_the_gil_is_free():

@@ -9,6 +9,7 @@
 //! - [`handover`]: what a failed input costs, by speed, delay and reliance.
 //! - [`identify`]: one recorded drive.
 //! - [`run`]: one scenario.
+//! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
@@ -44,6 +45,7 @@ pub mod identify;
 mod record;
 pub mod reliance;
 pub mod run;
+pub mod study;
 pub mod sweep;
 
 pub mod stability;

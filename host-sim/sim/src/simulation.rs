@@ -36,7 +36,8 @@ const DIVERGED_M: f64 = 10.0;
 
 /// Samples per second of a trace.
 pub const SAMPLE_RATE_HZ: u32 = 200;
-const STEPS_PER_SAMPLE: u32 = STEPS_PER_SECOND / SAMPLE_RATE_HZ;
+/// Steps from one sample of a trace to the next.
+pub const STEPS_PER_SAMPLE: u32 = STEPS_PER_SECOND / SAMPLE_RATE_HZ;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq)]

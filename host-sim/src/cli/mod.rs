@@ -32,6 +32,7 @@ mod road;
 mod run;
 mod series;
 mod stability;
+mod study;
 mod sweep;
 
 use std::fmt::Display;
@@ -96,6 +97,9 @@ enum Command {
     Bus(bus::Arguments),
     /// Many drives with varied fields (lists, ranges, distributions), a row of a table each, on threads and shards
     Sweep(sweep::Arguments),
+    /// Participants and conditions from one file: the order of each participant, a recording of each session that is never
+    /// overwritten, metrics by condition
+    Study(study::Arguments),
     /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
     Reliance(reliance::Arguments),
 }
@@ -146,6 +150,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Live(arguments)) => live::run(&arguments),
         Some(Command::Bus(arguments)) => bus::run(&arguments),
         Some(Command::Sweep(arguments)) => sweep::run(&arguments),
+        Some(Command::Study(arguments)) => study::run(&arguments),
         Some(Command::Reliance(arguments)) => reliance::run(&arguments),
     };
     match result {

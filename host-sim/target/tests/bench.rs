@@ -81,7 +81,10 @@ fn clients_and_the_ecu_hear_each_other_and_nobody_himself() {
         faulty.count()
     };
     assert!((990..=1010).contains(&count(&told)), "{}", count(&told));
-    assert!(told.iter().all(|g| g.mode == Mode::Standby && g.torque.nm() == 0.0));
+    assert!(
+        told.iter()
+            .all(|g| g.mode == Mode::Standby && g.torque.nm() == 0.0)
+    );
 
     // One leaves; the bus goes on for the other.
     drop(one);

@@ -135,6 +135,7 @@ fn roles(variable: &Variable) -> (&'static str, &'static str) {
         (Role::Output, Kind::Real) => ("output", "continuous"),
         (Role::Output, _) => ("output", "discrete"),
         (Role::Parameter, _) => ("parameter", "fixed"),
+        (Role::Tunable, _) => ("parameter", "tunable"),
     }
 }
 

@@ -12,6 +12,7 @@ Examples
 """
 
 from ._errors import InputError, RangeError
+from ._identify import Fit, Parameter, identify
 from ._native import (
     Action,
     Bus,
@@ -24,7 +25,7 @@ from ._native import (
     metric_definitions,
     parameters,
 )
-from ._results import Evaluation, Fit, Parameter, Run, evaluate, identify, simulate
+from ._results import Evaluation, Experiment, Run, evaluate, experiment, simulate
 from ._sweep import SweepResult, sweep
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "Bus",
     "Ecu",
     "Evaluation",
+    "Experiment",
     "Fit",
     "Frame",
     "InputError",
@@ -44,6 +46,7 @@ __all__ = [
     "Step",
     "SweepResult",
     "evaluate",
+    "experiment",
     "identify",
     "metric_definitions",
     "parameters",

@@ -180,7 +180,22 @@ def identify(
     estimate: list[str],
     between: list[list[float]],
     as_published: bool,
+    maps: list[str],
+    dbc: Optional[str],
+    vehicle: Optional[Scenario],
 ) -> dict[str, Any]: ...
+def experiment(
+    participants: list[int], probe_nm: float, seed: int, progress: Optional[Callable[[int], object]]
+) -> dict[str, Any]: ...
+
+class Simulations:
+    def __init__(self, count: int) -> None: ...
+    @staticmethod
+    def channels() -> list[str]: ...
+    def begin(self, index: int, scenario: Scenario, seed: int) -> np.ndarray: ...
+    def step(
+        self, hand_torque_nm: np.ndarray, authority: np.ndarray, active: np.ndarray, steps: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
 
 class Sweep:
     @staticmethod

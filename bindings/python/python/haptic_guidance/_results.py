@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
 from . import _native
-from ._errors import InputError
+from ._errors import InputError, check_range
 from ._native import Scenario
+from ._progress import Progress, telling
 
 if TYPE_CHECKING:
+    import matplotlib.figure
     import pandas
     import pyarrow
 
@@ -75,6 +76,31 @@ class Run:
 
         return pyarrow.table({name: pyarrow.array(column) for name, column in self.columns.items()})
 
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """The columns for whatever reads the Arrow PyCapsule interface: pandas, Polars, DuckDB (needs pyarrow)."""
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
+
+    def figure(self) -> matplotlib.figure.Figure:
+        """Lateral error, torques and wheel angle over time (needs matplotlib)."""
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(8, 7), layout="constrained")
+        error, torque, wheel = figure.subplots(3, sharex=True)
+        time_s = self["time_s"]
+        error.plot(time_s, self["lateral_error_m"])
+        error.set_ylabel("lateral error (m)")
+        torque.plot(time_s, self["driver_torque_nm"], label="driver")
+        torque.plot(time_s, self["guidance_torque_nm"], label="guidance")
+        torque.set_ylabel("torque (N.m)")
+        torque.legend()
+        wheel.plot(time_s, self["wheel_angle_rad"])
+        wheel.set(ylabel="wheel angle (rad)", xlabel="time (s)")
+        failure_s = self.scenario.failure_time_s
+        if failure_s is not None:
+            for panel in (error, torque, wheel):
+                panel.axvline(failure_s, color="black", linestyle=":")
+        return figure
+
 
 def simulate(scenario: Scenario, *, bus: bool = False) -> Run:
     """Simulate a scenario to its end.
@@ -132,7 +158,7 @@ def evaluate(
     scenario: Optional[Scenario] = None,
     *,
     window_m: Optional[tuple[float, float]] = None,
-    progress: Optional[Callable[[int], object]] = None,
+    progress: Progress = None,
 ) -> Evaluation:
     """Run the paper's evaluation: three drivers, four conditions, with and without failure.
 
@@ -142,162 +168,87 @@ def evaluate(
         Gives course, speed, sensors, vehicle, guidance and the time of the failure.
     window_m : (float, float), optional
         Stretch to measure, m along the course.
-    progress : callable, optional
-        Called with the number of runs done since the last call, such as ``tqdm.tqdm(total=30).update``.
+    progress : bool or callable, optional
+        True shows a bar (needs tqdm); a callable hears the number of runs done since it was last called.
 
     Returns
     -------
     Evaluation
     """
     window = None if window_m is None else list(window_m)
-    made = _native.evaluate(Scenario() if scenario is None else scenario, window, progress)
+    with telling(progress, 30, "runs") as tell:
+        made = _native.evaluate(Scenario() if scenario is None else scenario, window, tell)
     return Evaluation(made["results"], made["columns"])
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One identified parameter of a driver.
+class Experiment:
+    """The paper's participants, driven, identified and driven again.
 
     Attributes
     ----------
-    name, unit : str
-        The paper's symbol and its unit.
-    estimate : float or None
-        None where the data do not identify it.
-    standard_error : float or None
-        None where the data put no bound on it.
-    interval_95 : (float, float) or None
-        95 % interval, cut to the range that the parameter can have.
-    identified, on_bound, fixed : bool
-        Whether the data identify it, whether the search ended on a bound, whether it was given.
-    optimum : float or None
-        Where the search ended.
-    """
-
-    name: str
-    unit: str
-    estimate: Optional[float]
-    standard_error: Optional[float]
-    interval_95: Optional[tuple[float, float]]
-    identified: bool
-    on_bound: bool
-    fixed: bool
-    optimum: Optional[float]
-
-
-@dataclass(frozen=True)
-class Fit:
-    """An identified driver.
-
-    Attributes
-    ----------
-    parameters : dict of str to Parameter
-        By the paper's symbol in lower case. ``fit["k_d"]`` is short for one.
     results : dict
-        What ``host-sim identify --json`` prints.
-    traces : dict of str to numpy.ndarray
-        Measured and simulated torque and the residuals, over time.
+        What ``host-sim experiment --json`` prints: for each drive the truth, and what either method found.
+    drives : list of dict of str to numpy.ndarray
+        What was recorded of each drive, in the order of ``results["drives"]``; `identify` takes each.
     """
 
-    parameters: dict[str, Parameter]
     results: dict[str, Any] = field(repr=False)
-    traces: dict[str, np.ndarray] = field(repr=False)
+    drives: list[dict[str, np.ndarray]] = field(repr=False)
 
-    def __getitem__(self, name: str) -> Parameter:
-        return self.parameters[name]
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row for each drive: who, truth, and by the default method estimate and standard error (needs pandas)."""
+        import pandas
 
-    @property
-    def fit_percent(self) -> float:
-        """Fit of the simulated driver torque, 100*(1 - |y - yhat|/|y - mean y|)."""
-        return self.results["fit_percent"]
-
-    @property
-    def notes(self) -> list[str]:
-        """What the data or the log could not give."""
-        return self.results["notes"]
-
-    @property
-    def refuted(self) -> list[Any]:
-        """Assumptions that the record refutes: with any, nothing is identified."""
-        return self.results["refuted"]
-
-    @property
-    def residuals_are_white(self) -> bool:
-        """Whether the residuals are white, as they must be for the standard errors to hold."""
-        return self.results["whiteness"]["white"]
-
-    @property
-    def covariance(self) -> tuple[list[str], np.ndarray]:
-        """Names, and the covariance of the errors of those parameters; NaN where a variance is unbounded."""
-        names = self.results["correlation"]["names"]
-        matrix = np.array(self.results["correlation"]["matrix"], dtype=float).reshape(len(names), len(names))
-        errors = np.array([self.parameters[name].standard_error for name in names], dtype=float)
-        return names, matrix * np.outer(errors, errors)
+        rows = []
+        for drive in self.results["drives"]:
+            found = drive["noise_model"]
+            row = {"participant": drive["participant"], "guided": drive["guided"]}
+            row.update({f"true_{name.lower()}": drive["truth"][name] for name in ("t_p", "k_d", "k_hg")})
+            for name, parameter in found["parameters"].items():
+                row[name], row[f"{name}_standard_error"] = parameter["estimate"], parameter["standard_error"]
+            row["fit_percent"] = found["fit_percent"]
+            row["trajectory_error_m"] = found["trajectory_error_m"]
+            rows.append(row)
+        return pandas.DataFrame(rows)
 
 
-def identify(
-    drive: Union[str, os.PathLike[str], Mapping[str, Any], Run],
+def experiment(
+    participants: Sequence[int] = range(1, 15),
     *,
-    manual: bool = False,
-    fix: Optional[Mapping[str, float]] = None,
-    estimate: Optional[Mapping[str, Optional[tuple[float, float]]]] = None,
-    between_s: Sequence[tuple[float, float]] = (),
-    as_published: bool = False,
-) -> Fit:
-    """Identify the driver of a recorded drive.
+    probe_nm: float = 0.0,
+    seed: int = 1,
+    progress: Progress = None,
+) -> Experiment:
+    """Let the paper's participants drive as drivers with a known truth, identify them, and drive what was identified again.
 
     Parameters
     ----------
-    drive : path, mapping or Run
-        A CSV, MAT or MDF 4 file, a recording of the bus (candump, ASC, BLF); columns by name (a DataFrame is a mapping
-        too); or a run.
-        Needed are ``time_s``, ``e_y_m``, ``e_theta_rad``, ``wheel_angle_rad``, ``guidance_torque_nm`` and
-        ``driver_torque_nm``.
-    manual : bool, optional
-        A drive without guidance: K_hg is no part of the model.
-    fix : mapping of str to float, optional
-        Parameters that are known, such as ``{"k_nms": 1.0}``.
-    estimate : mapping of str to (float, float) or None, optional
-        What else to estimate, with its range or None for the widest: ``k_nms``, ``t_nms``, ``t_h_late``, ``t_d_late``.
-    between_s : sequence of (float, float), optional
-        Stretches of the drive to use, s; all of it if not given.
-    as_published : bool, optional
-        The paper's method instead of prediction errors with a noise model.
+    participants : sequence of int, optional
+        Numbers of tables 5 and 6, 1 to 14.
+    probe_nm : float, optional
+        Amplitude of the probe in the guided drives, N.m, 0 to 0.3; without it K_hg is hardly identified.
+    seed : int, optional
+        Of the torque that no model explains.
+    progress : bool or callable, optional
+        True shows a bar (needs tqdm); a callable hears the number of drives done since it was last called.
 
     Returns
     -------
-    Fit
+    Experiment
+        Of each participant a manual and a guided drive.
 
     Raises
     ------
-    InputError
-        A column that is missing, uneven in time, in a wrong unit or too short; a parameter that cannot be fixed.
+    RangeError
+        A number that is no participant's; a probe outside its range.
     """
-    fixed = [f"{name}={float(value)!r}" for name, value in (fix or {}).items()]
-    wanted = [name if ends is None else f"{name}={ends[0]!r}..{ends[1]!r}" for name, ends in (estimate or {}).items()]
-    options = (manual, fixed, wanted, [list(stretch) for stretch in between_s], as_published)
-    if isinstance(drive, (str, os.PathLike)):
-        made = _native.identify(os.fspath(drive), None, *options)
-    else:
-        table = drive.columns if isinstance(drive, Run) else drive
-        columns = {str(name): _column(name, table[name]) for name in table.keys()}
-        made = _native.identify(None, {n: c for n, c in columns.items() if c is not None}, *options)
-    parameters = {}
-    for name, unit in made["units"].items():
-        found = dict(made["results"]["parameters"][name])
-        interval = found.pop("interval_95")
-        parameters[name] = Parameter(
-            name=name, unit=unit, interval_95=None if interval is None else tuple(interval), **found
-        )
-    return Fit(parameters, made["results"], made["traces"])
-
-
-def _column(name: Any, values: Any) -> Optional[np.ndarray]:
-    """A column as float64; None for one that is no numbers, which the estimator may not need."""
-    try:
-        column = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        return None
-    if column.ndim != 1:
-        raise InputError(f"{name}: {column.ndim} dimensions, one is wanted")
-    return column
+    if isinstance(participants, (str, bytes)) or not all(
+        isinstance(number, (int, np.integer)) for number in participants
+    ):
+        raise InputError(f"participants = {participants!r}: a list of whole numbers is wanted")
+    numbers = [int(number) for number in participants]
+    check_range("seed", seed, 0, 2**53, "")
+    with telling(progress, 2 * len(numbers), "drives") as tell:
+        made = _native.experiment(numbers, probe_nm, int(seed), tell)
+    return Experiment(made["results"], made["drives"])

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Optional, Union
 
 from ._native import Sweep
+from ._progress import telling
 
 __all__ = ["SweepResult", "sweep"]
 
@@ -70,7 +71,7 @@ def sweep(
     out: Union[str, os.PathLike[str]] = "out/sweep",
     in_flight: int = 256,
     retries: int = 3,
-    progress: Optional[Callable[[int, int], None]] = None,
+    progress: Union[bool, Callable[[int, int], None], None] = None,
 ) -> SweepResult:
     """Drive a sweep, or what is missing of it.
 
@@ -87,8 +88,8 @@ def sweep(
         Chunks that are handed out at once.
     retries : int
         How often a chunk is handed out again whose worker died.
-    progress : callable, optional
-        Called with the number of chunks done and of all, behind each.
+    progress : bool or callable, optional
+        True shows a bar (needs tqdm); a callable is called with the number of chunks done and of all, behind each.
 
     Returns
     -------
@@ -103,11 +104,13 @@ def sweep(
     plan = Sweep.load(spec)
     out = Path(out)
     todo = plan.missing(out)
-    if executor is None:
-        with ThreadPoolExecutor(os.cpu_count()) as threads:
-            _drive_all(plan, todo, threads, out, in_flight, retries, progress)
-    else:
-        _drive_all(plan, todo, executor, out, in_flight, retries, progress)
+    with telling(progress if isinstance(progress, bool) else None, len(todo), "chunks") as bar:
+        tell = progress if bar is None else lambda done, of: bar(1)
+        if executor is None:
+            with ThreadPoolExecutor(os.cpu_count()) as threads:
+                _drive_all(plan, todo, threads, out, in_flight, retries, tell or None)
+        else:
+            _drive_all(plan, todo, executor, out, in_flight, retries, tell or None)
     return SweepResult(out, plan.finish(out))
 
 

@@ -16,6 +16,7 @@ pub mod identify;
 pub mod reliance;
 pub mod run;
 pub mod stability;
+pub mod study;
 pub mod sweep;
 
 use crate::document::WriteError;

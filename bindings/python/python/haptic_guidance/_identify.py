@@ -1,0 +1,202 @@
+"""Identification of a recorded drive."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from . import _native
+from ._errors import InputError
+from ._native import Scenario
+from ._results import Run
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One identified parameter of a driver.
+
+    Attributes
+    ----------
+    name, unit : str
+        The paper's symbol and its unit.
+    estimate : float or None
+        None where the data do not identify it.
+    standard_error : float or None
+        None where the data put no bound on it.
+    interval_95 : (float, float) or None
+        95 % interval, cut to the range that the parameter can have.
+    identified, on_bound, fixed : bool
+        Whether the data identify it, whether the search ended on a bound, whether it was given.
+    optimum : float or None
+        Where the search ended.
+    """
+
+    name: str
+    unit: str
+    estimate: Optional[float]
+    standard_error: Optional[float]
+    interval_95: Optional[tuple[float, float]]
+    identified: bool
+    on_bound: bool
+    fixed: bool
+    optimum: Optional[float]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An identified driver.
+
+    Attributes
+    ----------
+    parameters : dict of str to Parameter
+        By the paper's symbol in lower case. ``fit["k_d"]`` is short for one.
+    results : dict
+        What ``host-sim identify --json`` prints.
+    traces : dict of str to numpy.ndarray
+        Measured and simulated torque and the residuals, over time.
+    """
+
+    parameters: dict[str, Parameter]
+    results: dict[str, Any] = field(repr=False)
+    traces: dict[str, np.ndarray] = field(repr=False)
+
+    def __getitem__(self, name: str) -> Parameter:
+        return self.parameters[name]
+
+    @property
+    def fit_percent(self) -> float:
+        """Fit of the simulated driver torque, 100*(1 - |y - yhat|/|y - mean y|)."""
+        return self.results["fit_percent"]
+
+    @property
+    def notes(self) -> list[str]:
+        """What the data or the log could not give."""
+        return self.results["notes"]
+
+    @property
+    def refuted(self) -> list[Any]:
+        """Assumptions that the record refutes: with any, nothing is identified."""
+        return self.results["refuted"]
+
+    @property
+    def residuals_are_white(self) -> bool:
+        """Whether the residuals are white, as they must be for the standard errors to hold."""
+        return self.results["whiteness"]["white"]
+
+    @property
+    def covariance(self) -> tuple[list[str], np.ndarray]:
+        """Names, and the covariance of the errors of those parameters; NaN where a variance is unbounded."""
+        names = self.results["correlation"]["names"]
+        matrix = np.array(self.results["correlation"]["matrix"], dtype=float).reshape(len(names), len(names))
+        errors = np.array([self.parameters[name].standard_error for name in names], dtype=float)
+        return names, matrix * np.outer(errors, errors)
+
+
+def identify(
+    drive: Union[str, os.PathLike[str], Mapping[str, Any], Run],
+    *,
+    manual: bool = False,
+    fix: Optional[Mapping[str, float]] = None,
+    estimate: Optional[Mapping[str, Optional[tuple[float, float]]]] = None,
+    between_s: Sequence[tuple[float, float]] = (),
+    as_published: bool = False,
+    map: Optional[Mapping[str, str]] = None,
+    dbc: Union[str, os.PathLike[str], None] = None,
+    vehicle: Optional[Scenario] = None,
+) -> Fit:
+    """Identify the driver of a recorded drive.
+
+    Parameters
+    ----------
+    drive : path, mapping or Run
+        A CSV, MAT or MDF 4 file, a recording of the bus (candump, ASC, BLF); columns by name (a DataFrame is a mapping
+        too); or a run.
+        Needed are ``time_s``, ``e_y_m``, ``e_theta_rad``, ``wheel_angle_rad``, ``guidance_torque_nm`` and
+        ``driver_torque_nm``.
+    manual : bool, optional
+        A drive without guidance: K_hg is no part of the model.
+    fix : mapping of str to float, optional
+        Parameters that are known, such as ``{"k_nms": 1.0}``.
+    estimate : mapping of str to (float, float) or None, optional
+        What else to estimate, with its range or None for the widest: ``k_nms``, ``t_nms``, ``t_h_late``, ``t_d_late``.
+    between_s : sequence of (float, float), optional
+        Stretches of the drive to use, s; all of it if not given.
+    as_published : bool, optional
+        The paper's method instead of prediction errors with a noise model.
+    map : mapping of str to str, optional
+        Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}``. Without a scale the unit
+        is converted if a file says it.
+    dbc : path, optional
+        What the frames of a recording of the bus mean, if it is not the product's own bus.
+    vehicle : Scenario, optional
+        The vehicle of a recording of the bus, if not that of table 9. The bus does not carry the driver's far point; it is
+        computed with this vehicle.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        A column that is missing, uneven in time, in a wrong unit or too short; a parameter that cannot be fixed.
+    """
+    fixed = [f"{name}={float(value)!r}" for name, value in (fix or {}).items()]
+    wanted = [name if ends is None else f"{name}={ends[0]!r}..{ends[1]!r}" for name, ends in (estimate or {}).items()]
+    options = (manual, fixed, wanted, [list(stretch) for stretch in between_s], as_published)
+    maps = dict(map or {})
+    if isinstance(drive, (str, os.PathLike)):
+        texts = [f"{name}={channel}" for name, channel in maps.items()]
+        frames = None if dbc is None else os.fspath(dbc)
+        made = _native.identify(os.fspath(drive), None, *options, texts, frames, vehicle)
+    else:
+        for name, given in (("dbc", dbc), ("vehicle", vehicle)):
+            if given is not None:
+                raise InputError(f"{name}: only for a recording of the bus; columns need none")
+        table = drive.columns if isinstance(drive, Run) else drive
+        columns = {str(name): _column(name, table[name]) for name in table.keys()}
+        columns = {name: column for name, column in columns.items() if column is not None}
+        columns.update({name: _mapped(name, channel, columns) for name, channel in maps.items()})
+        made = _native.identify(None, columns, *options, [], None, None)
+    parameters = {}
+    for name, unit in made["units"].items():
+        found = dict(made["results"]["parameters"][name])
+        interval = found.pop("interval_95")
+        parameters[name] = Parameter(
+            name=name, unit=unit, interval_95=None if interval is None else tuple(interval), **found
+        )
+    return Fit(parameters, made["results"], made["traces"])
+
+
+def _column(name: Any, values: Any) -> Optional[np.ndarray]:
+    """A column as float64; None for one that is no numbers, which the estimator may not need."""
+    try:
+        column = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    if column.ndim != 1:
+        raise InputError(f"{name}: {column.ndim} dimensions, one is wanted")
+    return column
+
+
+_NEEDED = ("time_s", "e_y_m", "e_theta_rad", "wheel_angle_rad", "guidance_torque_nm", "driver_torque_nm")
+
+
+def _mapped(name: str, given: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """A column of another name, times its scale, as ``--map`` of the command line has it."""
+    if name not in _NEEDED:
+        raise InputError(f"map: {name!r} is none of {', '.join(_NEEDED)}")
+    channel, star, factor = given.rpartition("*") if "*" in given else (given, "", "1")
+    try:
+        scale = float(factor)
+    except ValueError:
+        scale = 0.0
+    if scale == 0.0 or not np.isfinite(scale):
+        raise InputError(f"map: {name} = {given!r}: the scale is no number other than 0")
+    if channel.strip() not in columns:
+        raise InputError(f"map: {name} = {given!r}: there is no such column of numbers; there are {', '.join(columns)}")
+    return columns[channel.strip()] * scale

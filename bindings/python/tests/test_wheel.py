@@ -1,0 +1,48 @@
+"""What is installed: small, typed, and without what does not belong into somebody else's process."""
+
+import importlib.metadata
+from pathlib import Path
+
+import pytest
+
+import haptic_guidance as hg
+
+# Names of crates stand in the paths of the source lines that a panic would print.
+NOT_LINKED = (b"haptic-campaign", b"host-sim/campaign", b"host-sim/target", b"host-sim/report", b"serialport", b"kuva", b"plotters", b"resvg")
+
+
+def installed():
+    return [Path(file.locate()) for file in importlib.metadata.files("haptic-guidance")]
+
+
+def test_the_package_is_typed_and_small():
+    files = installed()
+    names = {file.name for file in files}
+    assert {"py.typed", "_native.pyi", "__init__.py", "envs.py"} <= names
+    assert sum(file.stat().st_size for file in files if "__pycache__" not in file.parts) < 20e6
+
+
+def test_no_injector_no_serial_port_no_charts():
+    libraries = [file for file in installed() if file.suffix == ".so" or ".so." in file.name]
+    assert len(libraries) == 1, "one native library"
+    library = libraries[0].read_bytes()
+    # The crates that are linked show that a linked one would be seen.
+    for there in (b"host-sim/sim/src", b"host-sim/analysis/src", b"pyo3"):
+        assert there in library, there
+    for name in NOT_LINKED:
+        assert name not in library, name
+    assert not hasattr(hg._native, "inject")
+
+
+def test_gymnasium_and_the_rest_are_optional():
+    wanted = importlib.metadata.requires("haptic-guidance")
+    needed = [line for line in wanted if "extra ==" not in line]
+    assert [line.split(">")[0] for line in needed] == ["numpy"]
+    extras = set(importlib.metadata.metadata("haptic-guidance").get_all("Provides-Extra"))
+    assert {"gym", "progress", "plot", "pandas", "arrow"} <= extras
+
+
+def test_the_version_is_the_programs():
+    cargo = Path(__file__).parents[3] / "Cargo.toml"
+    version = next(line.split('"')[1] for line in cargo.read_text().splitlines() if line.startswith("version = "))
+    assert importlib.metadata.version("haptic-guidance") == version

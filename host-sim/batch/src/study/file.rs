@@ -1,0 +1,221 @@
+//! A study file, checked: every session's scenario is built before anything is driven.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use haptic_sim::input::{InputError, parse_toml};
+use haptic_sim::models::road::Course;
+use haptic_sim::participants::participants as published;
+use haptic_sim::scenario::{FailureKind, Scenario};
+use haptic_sim::seeds::named;
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use super::{Order, Session, Study, Who};
+use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyFile {
+    name: String,
+    #[serde(default = "one")]
+    seed: u64,
+    #[serde(default)]
+    order: Order,
+    #[serde(default)]
+    scenario: Table,
+    condition: Vec<ConditionFile>,
+    participant: Vec<ParticipantFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConditionFile {
+    name: String,
+    #[serde(default)]
+    scenario: Table,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ParticipantFile {
+    name: String,
+    published: Option<u32>,
+    driver: Option<Table>,
+    #[serde(default)]
+    person: bool,
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// Longest name: it becomes the name of a directory.
+const LONGEST_NAME: usize = 40;
+
+pub(super) fn load(path: &Path) -> Result<Study, InputError> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
+    from_text(&name, &text, path.parent().unwrap_or(Path::new("")))
+}
+
+pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study, InputError> {
+    let file: StudyFile = parse_toml(source, text)?;
+    let bad = |message: String| InputError::new(source, message);
+    check_names("study", [&file.name]).map_err(bad)?;
+    check_names("condition", file.condition.iter().map(|c| &c.name)).map_err(bad)?;
+    check_names("participant", file.participant.iter().map(|p| &p.name)).map_err(bad)?;
+    let rows = file.order.rows(file.condition.len());
+    let mut sessions = Vec::new();
+    for (number, participant) in file.participant.iter().enumerate() {
+        let order = &rows[number % rows.len()];
+        for (place, condition) in order.iter().enumerate() {
+            let condition = &file.condition[*condition];
+            let session = session(source, &file, participant, condition, folder)?;
+            sessions.push(Session {
+                position: place + 1,
+                ..session
+            });
+        }
+    }
+    let mut notes = Vec::new();
+    if file.participant.len() % rows.len() != 0 {
+        notes.push(format!(
+            "{} participants share {} orders: some orders come once more than others",
+            file.participant.len(),
+            rows.len()
+        ));
+    }
+    Ok(Study {
+        name: file.name,
+        conditions: file.condition.into_iter().map(|c| c.name).collect(),
+        sessions,
+        notes,
+    })
+}
+
+fn check_names<'a>(what: &str, names: impl IntoIterator<Item = &'a String>) -> Result<(), String> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) {
+            return Err(format!(
+                "{what} {name:?}: a name is 1 to {LONGEST_NAME} letters, digits, - and _, for a directory bears it"
+            ));
+        }
+        // Some disks do not tell large letters from small ones.
+        if !seen.insert(name.to_lowercase()) {
+            return Err(format!("{what} {name:?} is there twice"));
+        }
+    }
+    if seen.is_empty() {
+        return Err(format!("there is no [[{what}]]"));
+    }
+    Ok(())
+}
+
+/// The session of a participant under a condition, in the first place.
+fn session(
+    source: &str,
+    file: &StudyFile,
+    participant: &ParticipantFile,
+    condition: &ConditionFile,
+    folder: &Path,
+) -> Result<Session, InputError> {
+    let here = format!(
+        "{source}: participant {}, condition {}",
+        participant.name, condition.name
+    );
+    let bad = |message: String| InputError::new(&here, message);
+    let mut fields = file.scenario.clone();
+    merge(&mut fields, &condition.scenario);
+    if fields.contains_key("seed") {
+        return Err(bad(
+            "seed: every session has its own, from the study's seed".into()
+        ));
+    }
+    let manual = fields.get("condition").and_then(Value::as_str) == Some("manual");
+    let who = match (participant.published, &participant.driver, participant.person) {
+        (None, None, true) => Who::Person,
+        (Some(number), None, false) => {
+            let mut driver = Table::new();
+            driver.insert(
+                "driver".into(),
+                Value::Table(of_published(number, manual).map_err(bad)?),
+            );
+            merge(&mut fields, &driver);
+            Who::Simulated
+        }
+        (None, Some(given), false) => {
+            let mut driver = Table::new();
+            driver.insert("driver".into(), Value::Table(given.clone()));
+            merge(&mut fields, &driver);
+            Who::Simulated
+        }
+        _ => return Err(bad("one of published, driver and person = true is wanted".into())),
+    };
+    // 53 bits, which every reader of a number takes whole.
+    let seed = named(named(file.seed, &participant.name), &condition.name) >> 11;
+    fields.insert("seed".into(), Value::Integer(seed as i64));
+    let scenario = Scenario::from_toml(&here, &fields.to_string(), |course, lane| {
+        let path = folder.join(course);
+        let bytes = std::fs::read(&path).map_err(|e| InputError::new(path.display(), e))?;
+        // By the name in the file: from where the command was called is no part of a session.
+        Course::from_text(course, &String::from_utf8_lossy(&bytes), lane)
+    })?;
+    scenario.check_times().map_err(|e| bad(e.to_string()))?;
+    if who == Who::Person && scenario.failure().kind != FailureKind::None {
+        return Err(bad(
+            "failure: a person's recording does not say when it came; only simulated \
+                        participants can have one"
+                .into(),
+        ));
+    }
+    Ok(Session {
+        participant: participant.name.clone(),
+        condition: condition.name.clone(),
+        position: 1,
+        who,
+        scenario,
+    })
+}
+
+/// The driver of table 5 or 6, with the remnant that belongs to it.
+fn of_published(number: u32, manual: bool) -> Result<Table, String> {
+    let all = published();
+    let found = all.iter().find(|p| p.number == number);
+    let found = found.ok_or_else(|| format!("published = {number} is outside 1 to {}", all.len()))?;
+    let (driver, remnant_nm) = if manual {
+        (found.manual, REMNANT_MANUAL_NM)
+    } else {
+        (found.guided, REMNANT_GUIDED_NM)
+    };
+    let mut fields = Table::new();
+    for (name, value) in [
+        ("a_1", Some(driver.a_1)),
+        ("a_2", Some(driver.a_2)),
+        ("a_3", Some(driver.a_3)),
+        ("t_p", Some(driver.t_p)),
+        ("K_d", Some(driver.k_d)),
+        ("K_hg", driver.k_hg),
+        ("remnant_sd", Some(remnant_nm)),
+    ] {
+        if let Some(value) = value {
+            fields.insert(name.into(), Value::Float(value));
+        }
+    }
+    Ok(fields)
+}
+
+/// Puts fields over others, tables field by field.
+fn merge(into: &mut Table, over: &Table) {
+    for (name, value) in over {
+        match (into.get_mut(name), value) {
+            // A course is one value.
+            (Some(Value::Table(old)), Value::Table(new)) if name != "course" => merge(old, new),
+            _ => {
+                into.insert(name.clone(), value.clone());
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! A study with participants: conditions, who drives them, and in which order, from one file.
+//!
+//! A *session* is one participant under one condition. A participant is simulated (one of the paper's, or a driver of the file) or a
+//! person, whose drive was recorded elsewhere and is imported. What a session recorded is kept in a directory of its own with version,
+//! seed and scenario, and is never written again; a study that was interrupted goes on where it was.
+//!
+//! - [`Study::load`]: the file, checked; every session's scenario.
+//! - [`Study::import`]: a person's recording.
+//! - [`Study::run`]: the simulated sessions that are missing.
+//! - [`Study::results`]: what is recorded, measured, and what is not there yet.
+
+mod file;
+mod order;
+mod store;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use haptic_sim::input::InputError;
+use haptic_sim::scenario::Scenario;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use order::Order;
+
+use crate::record::RunRecord;
+
+/// A study, checked.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Its name.
+    pub name: String,
+    /// Names of the conditions, as listed.
+    pub conditions: Vec<String>,
+    /// Every session: participants as listed, each in the order that the participant meets the conditions.
+    pub sessions: Vec<Session>,
+    /// What a reader has to know of the design.
+    pub notes: Vec<String>,
+}
+
+/// Who drives a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Who {
+    /// A driver model.
+    Simulated,
+    /// Somebody, recorded elsewhere.
+    Person,
+}
+
+/// Where a recording comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// Of this program.
+    Simulated,
+    /// A file that was brought in.
+    Imported,
+}
+
+/// One participant under one condition.
+#[derive(Debug, Clone)]
+pub struct Session {
+    /// Name of the participant.
+    pub participant: String,
+    /// Name of the condition.
+    pub condition: String,
+    /// Place in the participant's order, from 1.
+    pub position: usize,
+    /// Who drives.
+    pub who: Who,
+    /// Everything that decides it. Of a person it says road, speed and guidance, and the driver is not meant.
+    pub scenario: Scenario,
+}
+
+/// A session in the results.
+#[derive(Debug, Clone, Serialize)]
+pub struct SessionResult {
+    /// Name of the participant.
+    pub participant: String,
+    /// Place in the participant's order, from 1.
+    pub position: usize,
+    /// Name of the condition.
+    pub condition: String,
+    /// Who drives.
+    pub who: Who,
+    /// Of all random numbers.
+    pub seed: u64,
+    /// What was recorded; nothing if it is missing.
+    pub recorded: Option<Recorded>,
+}
+
+/// A recording, measured.
+#[derive(Debug, Clone, Serialize)]
+pub struct Recorded {
+    /// Where it comes from.
+    pub source: Source,
+    /// The program that kept it.
+    pub version: String,
+    /// Its record; the condition in it is the scenario's.
+    pub record: RunRecord,
+}
+
+/// What a study found so far.
+#[derive(Debug, Clone, Serialize)]
+pub struct StudyResults {
+    /// Its name.
+    pub study: String,
+    /// Names of the conditions, as listed.
+    pub conditions: Vec<String>,
+    /// Every session, in order.
+    pub sessions: Vec<SessionResult>,
+    /// What a reader has to know.
+    pub notes: Vec<String>,
+}
+
+impl Study {
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// The file, the participant and the condition, the field, its value and its range.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        file::load(path)
+    }
+
+    /// Keeps a person's recording. `what` is `PARTICIPANT/CONDITION`.
+    ///
+    /// # Errors
+    /// A session that the study does not have, is simulated or is recorded already; a file that is no drive of it.
+    pub fn import(&self, out: &Path, what: &str, file: &Path) -> Result<(), String> {
+        let found = self
+            .sessions
+            .iter()
+            .find(|s| format!("{}/{}", s.participant, s.condition) == what);
+        let Some(session) = found else {
+            let names: Vec<String> = self
+                .sessions
+                .iter()
+                .filter(|s| s.who == Who::Person)
+                .map(|s| format!("{}/{}", s.participant, s.condition))
+                .collect();
+            return Err(format!(
+                "{what}: no session of a person; there are: {}",
+                names.join(", ")
+            ));
+        };
+        if session.who != Who::Person {
+            return Err(format!("{what}: this participant is simulated"));
+        }
+        let place = store::place(out, session);
+        if place.exists() {
+            return Err(store::already(&place));
+        }
+        store::import(self, session, out, file)
+    }
+
+    /// Drives the simulated sessions that are missing; `done` is called after each, from any thread. What is recorded in `out` is
+    /// checked first: with another session in a place nothing is driven.
+    ///
+    /// # Errors
+    /// A place with another session in it; what the disk says.
+    pub fn run(&self, out: &Path, done: impl Fn() + Sync) -> Result<(), String> {
+        let missing = self.missing(out)?;
+        missing.into_par_iter().try_for_each(|session| {
+            store::drive(self, session, out)?;
+            done();
+            Ok(())
+        })
+    }
+
+    /// Simulated sessions that are not recorded yet.
+    ///
+    /// # Errors
+    /// A place with another session in it.
+    pub fn missing(&self, out: &Path) -> Result<Vec<&Session>, String> {
+        let mut missing = Vec::new();
+        for session in &self.sessions {
+            let there = store::read(self, session, out)?.is_some();
+            if !there && session.who == Who::Simulated {
+                missing.push(session);
+            }
+        }
+        Ok(missing)
+    }
+
+    /// What is recorded, measured from the recordings alone.
+    ///
+    /// # Errors
+    /// A recording that cannot be read, or is another session's.
+    pub fn results(&self, out: &Path) -> Result<StudyResults, String> {
+        let result = |session: &Session| -> Result<SessionResult, String> {
+            let found = store::read(self, session, out)?;
+            Ok(SessionResult {
+                participant: session.participant.clone(),
+                position: session.position,
+                condition: session.condition.clone(),
+                who: session.who,
+                seed: session.scenario.seed(),
+                recorded: found.map(|(stored, record)| Recorded {
+                    source: stored.source,
+                    version: stored.version,
+                    record,
+                }),
+            })
+        };
+        let sessions = self
+            .sessions
+            .par_iter()
+            .map(result)
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut notes = self.notes.clone();
+        let mut versions: Vec<&str> = sessions
+            .iter()
+            .filter_map(|s| s.recorded.as_ref().map(|r| r.version.as_str()))
+            .collect();
+        versions.sort_unstable();
+        versions.dedup();
+        if versions.len() > 1 {
+            notes.push(format!(
+                "sessions are of several versions: {}",
+                versions.join(", ")
+            ));
+        }
+        Ok(StudyResults {
+            study: self.name.clone(),
+            conditions: self.conditions.clone(),
+            sessions,
+            notes,
+        })
+    }
+}

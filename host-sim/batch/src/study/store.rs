@@ -1,0 +1,249 @@
+//! Sessions on a disk. Each has a directory of its own, which appears whole or not at all and is never written again.
+//!
+//! `sessions/PARTICIPANT/POSITION-CONDITION/` holds `session.toml` (who, what, when in the order, version, seed), `scenario.toml`
+//! (whole) and `drive.csv` (what was recorded).
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use haptic_log::trace::Trace;
+use haptic_sim::input::parse_toml;
+use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::simulation::{Ending, Run, simulate};
+use serde::{Deserialize, Serialize};
+
+use super::{Session, Source, Study};
+use crate::record::{RunRecord, default_window};
+
+/// What a session's directory says of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Stored {
+    pub(super) study: String,
+    pub(super) participant: String,
+    pub(super) condition: String,
+    pub(super) position: usize,
+    pub(super) seed: u64,
+    pub(super) version: String,
+    pub(super) source: Source,
+    pub(super) diverged: bool,
+}
+
+/// Largest difference between the speed of a recording and the scenario's, as a share.
+const SPEED_WITHIN: f64 = 0.02;
+/// Shortest recording that is a drive, s.
+const LEAST_S: f64 = 5.0;
+
+pub(super) fn place(out: &Path, session: &Session) -> PathBuf {
+    out.join("sessions")
+        .join(&session.participant)
+        .join(format!("{}-{}", session.position, session.condition))
+}
+
+/// What is recorded of a session, if it is: checked to be this session.
+pub(super) fn read(
+    study: &Study,
+    session: &Session,
+    out: &Path,
+) -> Result<Option<(Stored, RunRecord)>, String> {
+    let place = place(out, session);
+    if !place.exists() {
+        return Ok(None);
+    }
+    let text = |name: &str| {
+        let path = place.join(name);
+        fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+    };
+    let name = place.join("session.toml").display().to_string();
+    let stored: Stored = parse_toml(&name, &text("session.toml")?).map_err(|e| e.to_string())?;
+    let another = |what: &str| {
+        Err(format!(
+            "{}: recorded {what}; nothing recorded is overwritten: give another --out",
+            place.display()
+        ))
+    };
+    if stored.study != study.name {
+        return another(&format!("in study {}", stored.study));
+    }
+    if (stored.position, &stored.participant, &stored.condition)
+        != (session.position, &session.participant, &session.condition)
+    {
+        return another("as another session");
+    }
+    let path = place.join("scenario.toml").display().to_string();
+    let scenario = Scenario::from_toml(&path, &text("scenario.toml")?, |course, _| {
+        Err(haptic_sim::input::InputError::new(
+            course,
+            "a stored scenario holds its course",
+        ))
+    });
+    if scenario.map_err(|e| e.to_string())? != written_and_read(session)? {
+        return another("with another scenario or seed");
+    }
+    let path = place.join("drive.csv");
+    let trace = fs::File::open(&path)
+        .map_err(|e| e.to_string())
+        .and_then(|file| Trace::read_csv(file).map_err(|e| e.to_string()))
+        .map_err(|e| format!("{}: {e}", path.display()))?;
+    let record = measured(session, trace, stored.diverged);
+    Ok(Some((stored, record)))
+}
+
+/// The scenario as its file gives it back: a course of OpenDRIVE is moved by rounding.
+fn written_and_read(session: &Session) -> Result<Scenario, String> {
+    let text = session.scenario.to_toml();
+    Scenario::from_toml("scenario", &text, |course, _| {
+        Err(haptic_sim::input::InputError::new(
+            course,
+            "a stored scenario holds its course",
+        ))
+    })
+    .map_err(|e| e.to_string())
+}
+
+fn measured(session: &Session, trace: Trace, diverged: bool) -> RunRecord {
+    let s_m = trace.samples.last().map_or(0.0, |sample| sample.s_m);
+    let run = Run {
+        trace,
+        ending: if diverged {
+            Ending::Diverged { s_m }
+        } else {
+            Ending::CourseEnd
+        },
+        steps: 0,
+    };
+    RunRecord::new(
+        &session.scenario,
+        &run,
+        default_window(session.scenario.course()),
+        None,
+    )
+}
+
+/// Drives a simulated participant, and keeps what was recorded.
+pub(super) fn drive(study: &Study, session: &Session, out: &Path) -> Result<(), String> {
+    let run = simulate(&session.scenario);
+    let mut csv = Vec::new();
+    run.trace.write_csv(&mut csv).map_err(|e| e.to_string())?;
+    keep(study, session, out, &csv, Source::Simulated, run.diverged())
+}
+
+/// Keeps what a person's drive left, byte for byte, if it is one of this session.
+pub(super) fn import(study: &Study, session: &Session, out: &Path, file: &Path) -> Result<(), String> {
+    let named = |what: String| format!("{}: {what}", file.display());
+    let csv = fs::read(file).map_err(|e| named(e.to_string()))?;
+    let trace = Trace::read_csv(&csv[..]).map_err(|e| named(e.to_string()))?;
+    check(session, &trace).map_err(named)?;
+    keep(study, session, out, &csv, Source::Imported, false)
+}
+
+/// What tells a recording of this session from one of another.
+fn check(session: &Session, trace: &Trace) -> Result<(), String> {
+    let (Some(first), Some(last)) = (trace.samples.first(), trace.samples.last()) else {
+        return Err("there are no rows".into());
+    };
+    for (row, sample) in trace.samples.iter().enumerate() {
+        let values = [
+            sample.time_s,
+            sample.s_m,
+            sample.lateral_error_m,
+            sample.driver_torque_nm,
+        ];
+        if values.iter().any(|value| !value.is_finite()) {
+            return Err(format!("row {}: a value is missing", row + 1));
+        }
+    }
+    let lasts_s = last.time_s - first.time_s;
+    if lasts_s < LEAST_S {
+        return Err(format!(
+            "it lasts {lasts_s:.1} s, and a drive at least {LEAST_S} s"
+        ));
+    }
+    let speed = (last.s_m - first.s_m) / lasts_s;
+    let wanted = session.scenario.speed_m_per_s();
+    if (speed / wanted - 1.0).abs() > SPEED_WITHIN {
+        return Err(format!(
+            "driven at {:.1} km/h, and condition {} is at {:.1} km/h",
+            speed * 3.6,
+            session.condition,
+            wanted * 3.6
+        ));
+    }
+    let guided = trace
+        .samples
+        .iter()
+        .any(|sample| sample.guidance_torque_nm != 0.0);
+    let wanted = session.scenario.condition() != Condition::Manual;
+    if guided != wanted {
+        let says = |with: bool| if with { "with guidance" } else { "without guidance" };
+        return Err(format!(
+            "driven {}, and condition {} is {}",
+            says(guided),
+            session.condition,
+            says(wanted)
+        ));
+    }
+    Ok(())
+}
+
+/// Writes a session's directory beside its place and moves it there.
+fn keep(
+    study: &Study,
+    session: &Session,
+    out: &Path,
+    csv: &[u8],
+    source: Source,
+    diverged: bool,
+) -> Result<(), String> {
+    let place = place(out, session);
+    let stored = Stored {
+        study: study.name.clone(),
+        participant: session.participant.clone(),
+        condition: session.condition.clone(),
+        position: session.position,
+        seed: session.scenario.seed(),
+        version: crate::VERSION.into(),
+        source,
+        diverged,
+    };
+    let about = toml::to_string(&stored).map_err(|e| e.to_string())?;
+    let folder = place.parent().unwrap_or(out);
+    let beside = folder.join(format!(
+        ".{}.{}.unfinished",
+        session.condition,
+        std::process::id()
+    ));
+    let write = || -> io::Result<()> {
+        fs::create_dir_all(folder)?;
+        // Of a process with the same number that was killed.
+        let _ = fs::remove_dir_all(&beside);
+        fs::create_dir(&beside)?;
+        for (name, bytes) in [
+            ("session.toml", about.as_bytes()),
+            ("scenario.toml", session.scenario.to_toml().as_bytes()),
+            ("drive.csv", csv),
+        ] {
+            let path = beside.join(name);
+            fs::write(&path, bytes)?;
+            fs::File::open(&path)?.sync_all()?;
+        }
+        // A directory with something in it is not replaced.
+        fs::rename(&beside, &place)
+    };
+    write().map_err(|e| {
+        let _ = fs::remove_dir_all(&beside);
+        if place.exists() {
+            already(&place)
+        } else {
+            format!("{}: {e}", place.display())
+        }
+    })
+}
+
+pub(super) fn already(place: &Path) -> String {
+    format!(
+        "{} is recorded already, and nothing recorded is overwritten",
+        place.display()
+    )
+}

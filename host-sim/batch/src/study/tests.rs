@@ -1,0 +1,225 @@
+//! What is refused, and that nothing recorded is lost.
+
+use std::fs;
+use std::path::Path;
+
+use super::*;
+
+const STUDY: &str = r#"
+name = "reliance"
+seed = 7
+[scenario]
+speed = 60
+[scenario.course]
+name = "one curve"
+lane_width = 3.6
+[[scenario.course.segment]]
+length = 100.0
+curvature_start = 0.0
+curvature_end = 0.0
+[[scenario.course.segment]]
+length = 200.0
+curvature_start = 0.003
+curvature_end = 0.003
+[[condition]]
+name = "manual"
+scenario = { condition = "manual" }
+[[condition]]
+name = "guided"
+scenario = { condition = "mid", guidance = { probe = true } }
+[[participant]]
+name = "P01"
+published = 3
+[[participant]]
+name = "P02"
+driver = { t_p = 0.3, remnant_sd = 0.05 }
+[[participant]]
+name = "P03"
+person = true
+"#;
+
+fn study(text: &str) -> Result<Study, String> {
+    file::from_text("study.toml", text, Path::new("")).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_session_is_the_run_of_its_scenario() {
+    let out = tempfile::tempdir().unwrap();
+    let study = study(STUDY).unwrap();
+    let orders: Vec<&str> = study.sessions.iter().map(|s| s.condition.as_str()).collect();
+    assert_eq!(
+        orders,
+        ["manual", "guided", "guided", "manual", "manual", "guided"]
+    );
+    assert_eq!(study.notes.len(), 1, "three participants share two orders");
+    study.run(out.path(), || ()).unwrap();
+    let results = study.results(out.path()).unwrap();
+    let recorded: Vec<bool> = results.sessions.iter().map(|s| s.recorded.is_some()).collect();
+    assert_eq!(recorded, [true, true, true, true, false, false]);
+    let seeds: std::collections::BTreeSet<u64> = results.sessions.iter().map(|s| s.seed).collect();
+    assert_eq!(seeds.len(), 6);
+    let session = &study.sessions[1];
+    assert_eq!(
+        (session.scenario.driver().t_p, session.scenario.gains().k_hg > 0.0),
+        {
+            let third = haptic_sim::participants::participants()[2].guided;
+            (third.t_p, third.k_hg.unwrap() > 0.0)
+        }
+    );
+    let run = haptic_sim::simulation::simulate(&session.scenario);
+    let mut csv = Vec::new();
+    run.trace.write_csv(&mut csv).unwrap();
+    let place = out.path().join("sessions/P01/2-guided");
+    assert_eq!(fs::read(place.join("drive.csv")).unwrap(), csv);
+    let peak = results.sessions[1]
+        .recorded
+        .as_ref()
+        .unwrap()
+        .record
+        .metrics
+        .peak_lateral_error_m
+        .unwrap();
+    let expected = run
+        .trace
+        .samples
+        .iter()
+        .map(|s| s.lateral_error_m.abs())
+        .fold(0.0, f64::max);
+    assert!((peak - expected).abs() < 1e-6, "{peak} {expected}");
+    let about = fs::read_to_string(place.join("session.toml")).unwrap();
+    assert!(about.contains(crate::VERSION) && about.contains(&format!("seed = {}", session.scenario.seed())));
+}
+
+#[test]
+fn a_study_goes_on_and_overwrites_nothing() {
+    let out = tempfile::tempdir().unwrap();
+    let first = study(STUDY).unwrap();
+    first.run(out.path(), || ()).unwrap();
+    let kept = out.path().join("sessions/P02/1-guided");
+    let before = fs::read(kept.join("drive.csv")).unwrap();
+    fs::remove_dir_all(out.path().join("sessions/P01/1-manual")).unwrap();
+    let driven = std::sync::atomic::AtomicU32::new(0);
+    first
+        .run(out.path(), || {
+            driven.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        })
+        .unwrap();
+    assert_eq!(driven.into_inner(), 1, "only what was missing");
+    // A participant more changes nothing of the others.
+    let more = study(&format!(
+        "{STUDY}[[participant]]\nname = \"P04\"\npublished = 4\n"
+    ))
+    .unwrap();
+    more.run(out.path(), || ()).unwrap();
+    assert!(more.results(out.path()).unwrap().sessions[7].recorded.is_some());
+    // Another seed, speed or name is another study.
+    for (from, to, says) in [
+        ("seed = 7", "seed = 8", "another scenario or seed"),
+        ("speed = 60", "speed = 61", "another scenario or seed"),
+        ("\"reliance\"", "\"trust\"", "in study reliance"),
+    ] {
+        let error = study(&STUDY.replace(from, to))
+            .unwrap()
+            .run(out.path(), || ())
+            .unwrap_err();
+        assert!(error.contains(says) && error.contains("P01"), "{error}");
+        assert_eq!(fs::read(kept.join("drive.csv")).unwrap(), before);
+    }
+}
+
+#[test]
+fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
+    let out = tempfile::tempdir().unwrap();
+    let study = study(STUDY).unwrap();
+    let file = |name: &str, change: &dyn Fn(&Scenario) -> Scenario| {
+        // A person with a hand like that of the model.
+        let run = haptic_sim::simulation::simulate(&change(&study.sessions[5].scenario));
+        let path = out.path().join(name);
+        run.trace.write_csv(fs::File::create(&path).unwrap()).unwrap();
+        path
+    };
+    let guided = file("drive.csv", &|s| s.clone());
+    let fast = file("fast.csv", &|s| s.to_builder().speed_kmh(80.0).build().unwrap());
+    let short = out.path().join("short.csv");
+    let text = fs::read_to_string(&guided).unwrap();
+    fs::write(&short, text.lines().take(200).collect::<Vec<_>>().join("\n")).unwrap();
+    let foreign = out.path().join("foreign.csv");
+    fs::write(&foreign, "a,b\n1,2\n").unwrap();
+    for (what, path, says) in [
+        (
+            "P03/guided",
+            &fast,
+            "driven at 80.0 km/h, and condition guided is at 60.0 km/h",
+        ),
+        (
+            "P03/manual",
+            &guided,
+            "driven with guidance, and condition manual is without guidance",
+        ),
+        ("P03/guided", &short, "it lasts 1.0 s"),
+        ("P03/guided", &foreign, "time_s"),
+        ("P03/guided", &out.path().join("none.csv"), "none.csv"),
+        ("P02/guided", &guided, "this participant is simulated"),
+        ("P03/wet", &guided, "there are: P03/manual, P03/guided"),
+    ] {
+        let error = study.import(out.path(), what, path).unwrap_err();
+        assert!(error.contains(says), "{error}");
+        assert!(!out.path().join("sessions").exists(), "{what}: nothing is left");
+    }
+    study.import(out.path(), "P03/guided", &guided).unwrap();
+    let place = out.path().join("sessions/P03/2-guided");
+    assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
+    let error = study.import(out.path(), "P03/guided", &fast).unwrap_err();
+    assert!(error.contains("2-guided is recorded already"), "{error}");
+    assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
+    let results = study.results(out.path()).unwrap();
+    assert_eq!(
+        results.sessions[5].recorded.as_ref().unwrap().source,
+        Source::Imported
+    );
+}
+
+#[test]
+fn what_is_no_study_is_refused_by_name() {
+    for (from, to, says) in [
+        (
+            "published = 3",
+            "published = 15",
+            "participant P01, condition manual: published = 15 is outside 1 to 14",
+        ),
+        (
+            "t_p = 0.3",
+            "t_p = 3.0",
+            "participant P02, condition guided: driver.t_p = 3 s is outside 0.001 to 2 s",
+        ),
+        ("speed = 60", "sped = 60", "sped"),
+        ("speed = 60", "seed = 60", "seed: every session has its own"),
+        (
+            "person = true",
+            "person = false",
+            "one of published, driver and person",
+        ),
+        (
+            "person = true",
+            "person = true\npublished = 2",
+            "one of published, driver and person",
+        ),
+        ("\"P02\"", "\"p01\"", "participant \"p01\" is there twice"),
+        ("\"P02\"", "\"a/b\"", "participant \"a/b\": a name is"),
+        ("seed = 7", "order = \"random\"", "balanced-latin-square"),
+        ("seed = 7", "sed = 7", "sed"),
+        (
+            "probe = true }",
+            "probe = true }, failure = { kind = \"torque\", time = 5 }",
+            "P03, condition guided: failure: a person's",
+        ),
+    ] {
+        let error = study(&STUDY.replace(from, to)).unwrap_err();
+        assert!(
+            error.starts_with("study.toml: ") && error.contains(says),
+            "{error}"
+        );
+    }
+    let nobody = STUDY.split("[[participant]]").next().unwrap();
+    assert!(study(nobody).unwrap_err().contains("participant"));
+}

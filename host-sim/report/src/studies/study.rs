@@ -1,0 +1,170 @@
+//! What a study with participants leaves: a row for each session, metrics by condition.
+
+use std::path::Path;
+
+use super::OutputError;
+use crate::document::{Cell, Provenance, Stamped, Table, write_file, write_json};
+use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_batch::study::{Recorded, Session, SessionResult, StudyResults, Who};
+
+/// Writes the table of sessions (CSV) and the results (JSON).
+///
+/// # Errors
+/// What could not be written.
+pub fn write(results: &StudyResults, directory: &Path) -> Result<(), OutputError> {
+    write_file(&directory.join("sessions.csv"), |file| {
+        let metrics: Vec<&str> = DEFINITIONS.iter().map(|d| d.name).collect();
+        let metrics = metrics.join(",");
+        writeln!(
+            file,
+            "participant,position,condition,who,seed,source,version,diverged,end_m,{metrics}"
+        )?;
+        for session in &results.sessions {
+            let Some(recorded) = &session.recorded else {
+                continue;
+            };
+            writeln!(file, "{}", row(session, recorded))?;
+        }
+        Ok(())
+    })?;
+    write_json(&directory.join("results.json"), &stamped(results))?;
+    Ok(())
+}
+
+/// A session as a line of the table. Names hold no commas.
+fn row(session: &SessionResult, recorded: &Recorded) -> String {
+    let record = &recorded.record;
+    let source = match recorded.source {
+        haptic_batch::study::Source::Simulated => "simulated",
+        haptic_batch::study::Source::Imported => "imported",
+    };
+    let mut fields = vec![
+        session.participant.clone(),
+        session.position.to_string(),
+        session.condition.clone(),
+        who(session.who).into(),
+        session.seed.to_string(),
+        source.into(),
+        recorded.version.clone(),
+        record.diverged.to_string(),
+        record.end_m.to_string(),
+    ];
+    let metric = |d: &Definition| (d.value)(&record.metrics).map_or(String::new(), |value| value.to_string());
+    fields.extend(DEFINITIONS.iter().map(metric));
+    fields.join(",")
+}
+
+fn who(who: Who) -> &'static str {
+    match who {
+        Who::Simulated => "simulated",
+        Who::Person => "person",
+    }
+}
+
+/// The results as JSON holds them.
+pub fn stamped(results: &StudyResults) -> Stamped<'_, StudyResults> {
+    Provenance::of(None).stamp(results)
+}
+
+fn text(text: impl Into<String>) -> Cell {
+    Cell::Text(text.into())
+}
+
+/// Who drives what, in which order: a row for each participant.
+pub fn plan(sessions: &[Session]) -> Table {
+    let places = sessions.iter().map(|s| s.position).max().unwrap_or(0);
+    let mut columns = vec!["Participant".to_owned(), "Who".to_owned()];
+    columns.extend((1..=places).map(|place| place.to_string()));
+    let rows = sessions.chunks(places.max(1)).map(|of_one| {
+        let mut row = vec![text(&of_one[0].participant), text(who(of_one[0].who))];
+        row.extend(of_one.iter().map(|session| text(&session.condition)));
+        row
+    });
+    Table {
+        caption: String::new(),
+        columns,
+        rows: rows.collect(),
+    }
+}
+
+/// Every session, with what two of its metrics are.
+pub fn sessions(results: &StudyResults) -> Table {
+    let row = |session: &SessionResult| {
+        let recorded = session.recorded.as_ref();
+        let metric = |name: &str| {
+            let found = DEFINITIONS.iter().find(|d| d.name == name);
+            let value = recorded
+                .zip(found)
+                .and_then(|(r, d)| (d.value)(&r.record.metrics));
+            Cell::Number { value, decimals: 3 }
+        };
+        let state = match (recorded, session.who) {
+            (Some(recorded), _) if recorded.record.diverged => "left the road",
+            (Some(_), _) => "recorded",
+            (None, Who::Person) => "waits for a person",
+            (None, Who::Simulated) => "not driven",
+        };
+        vec![
+            text(&session.participant),
+            text(session.position.to_string()),
+            text(&session.condition),
+            text(state),
+            metric("peak_lateral_error_m"),
+            metric("rms_driver_torque_nm"),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: [
+            "Participant",
+            "Place",
+            "Condition",
+            "State",
+            "Peak lateral error (m)",
+            "RMS driver torque (N.m)",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: results.sessions.iter().map(row).collect(),
+    }
+}
+
+/// Each metric by condition: mean and standard deviation over the sessions that did not leave the road.
+pub fn by_condition(results: &StudyResults) -> Table {
+    let mut columns = vec!["Metric".to_owned(), "Unit".to_owned()];
+    for condition in &results.conditions {
+        columns.extend([condition.clone(), "SD".into(), "n".into()]);
+    }
+    let values = |condition: &str, d: &Definition| -> Vec<f64> {
+        let of = results.sessions.iter().filter(|s| s.condition == condition);
+        let good = of
+            .filter_map(|s| s.recorded.as_ref())
+            .filter(|r| !r.record.diverged);
+        good.filter_map(|r| (d.value)(&r.record.metrics)).collect()
+    };
+    let row = |d: &Definition| {
+        let mut cells = vec![text(d.label), text(d.unit)];
+        for condition in &results.conditions {
+            let values = values(condition, d);
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+            let deviation = (n > 1.0).then(|| (square / (n - 1.0)).sqrt());
+            cells.extend([
+                // Of no value it is no number, which a table shows as a dash.
+                Cell::number(mean, 4),
+                Cell::Number {
+                    value: deviation,
+                    decimals: 4,
+                },
+                Cell::number(n, 0),
+            ]);
+        }
+        cells
+    };
+    Table {
+        caption: String::new(),
+        columns,
+        rows: DEFINITIONS.iter().map(row).collect(),
+    }
+}
