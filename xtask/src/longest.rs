@@ -147,9 +147,12 @@ impl<'a> Paths<'a> {
             .remove(&address)
             .with_context(|| format!("no function at {address:#x}, or it calls itself"))?;
         let flows = self.flows(&instructions).with_context(|| name.clone())?;
-        let mut costs = Vec::with_capacity(flows.len());
-        for flow in &flows {
-            costs.push(1 + flow.call.map_or(Ok(0), |call| self.of_function(call))?);
+        // What fills the space behind a function reads as instructions too, and nothing leads there.
+        let all = reached(&flows);
+        let mut costs = vec![0; flows.len()];
+        for place in &all {
+            let call = flows[*place].call;
+            costs[*place] = 1 + call.map_or(Ok(0), |call| self.of_function(call))?;
         }
         let bound = LOOPS.iter().find(|(start, ..)| name.starts_with(start));
         let graph = Graph {
@@ -157,7 +160,6 @@ impl<'a> Paths<'a> {
             costs,
             rounds: bound.map(|(_, rounds, _)| *rounds),
         };
-        let all = (0..graph.next.len()).collect();
         let longest = graph
             .longest(&all, &BTreeSet::from([0]), &BTreeSet::new())
             .with_context(|| name.clone())?;
@@ -227,6 +229,18 @@ impl<'a> Paths<'a> {
         }
         Ok(targets.into_iter().collect())
     }
+}
+
+/// The places that a function can come to from its first.
+fn reached(flows: &[Flow]) -> BTreeSet<usize> {
+    let mut reached = BTreeSet::new();
+    let mut open = vec![0];
+    while let Some(place) = open.pop() {
+        if reached.insert(place) {
+            open.extend(&flows[place].next);
+        }
+    }
+    reached
 }
 
 /// `beq` for `b`, and not `bic`.
@@ -321,7 +335,7 @@ fn groups<I: Iterator<Item = usize>>(
 mod tests {
     use super::*;
 
-    /// Two ways, of three and of one instructions; a call of two; a loop of three, which may begin eight times; and a
+    /// Two ways, of three and of one instructions; a call of two; padding that reads as a branch; a loop of three, which may begin eight times; and a
     /// table of two, with a byte that only fills it.
     const TEXT: &str = "
 00000100 <haptic_core::ecu::Ecu::receive::h01>:
@@ -332,6 +346,7 @@ mod tests {
  108:      \tmovs\tr3, #0x1
  10a:      \tbl\t0x120 <memory> @ imm = #0x10
  10e:      \tpop\t{r4, pc}
+ 110:      \tbmi\t0x13c <haptic_core::ecu::Ecu::step::h02+0xc> @ imm = #0x28
 
 00000120 <memory>:
  120:      \tmovs\tr0, #0x0

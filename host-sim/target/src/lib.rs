@@ -12,7 +12,7 @@
 //! - [`image`]: builds the lock-step image. - [`qemu`]: the machine. - `adapter`: the way to a board.
 //! - `link`: frames as bytes.
 //! - [`comparator`]: compares the answers, on its own thread. - [`stepped`]: a target for a caller that compares by itself,
-//!   and may reach into its memory. - [`bench`]: a bus that keeps the time of the wall. - [`parameters`]: a product's, over
+//!   and may reach into its memory. - [`mod@bench`]: a bus that keeps the time of the wall. - [`parameters`]: a product's, over
 //!   the same adapters. - [`live`]: what goes over a bus.
 //!
 //! ```

@@ -79,7 +79,7 @@ pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study
         }
     }
     let mut notes = Vec::new();
-    if file.participant.len() % rows.len() != 0 {
+    if !file.participant.len().is_multiple_of(rows.len()) {
         notes.push(format!(
             "{} participants share {} orders: some orders come once more than others",
             file.participant.len(),
