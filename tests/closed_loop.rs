@@ -231,6 +231,11 @@ fn the_example_drives_stay_engaged_and_unwarned() {
     for name in ["live-estimate", "relying-driver"] {
         let path = format!("{}/examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let scenario = haptic_batch::files::load_scenario(Path::new(&path)).unwrap();
+        let whole = Failure {
+            kind: FailureKind::None,
+            ..scenario.failure()
+        };
+        let scenario = scenario.to_builder().failure(whole).build().unwrap();
         let mut host = ReceiverState::TRUSTED;
         observe(&scenario, |outcome: &Outcome| {
             let guidance = Guidance::decode(&mut host, &outcome.frames_out[0]).unwrap();

@@ -17,14 +17,15 @@ fn the_image_survives_what_the_host_survives() {
 #[test]
 fn flipped_bits_of_the_image_stop_it() {
     let row = rows().find(|row| row.name == "flip-state").unwrap();
-    let campaign = target::run(&World::new(), &[row], 1..9, || ()).unwrap();
+    let campaign = target::run(&World::new(), &[row], 1..17, || ()).unwrap();
     let failed: Vec<_> = campaign.failures().collect();
     assert!(failed.is_empty(), "{failed:#?}");
     let [flips] = &campaign.rows[..] else {
         panic!("one row")
     };
     assert_eq!(flips.class, Class::C);
-    assert!(flips.seen >= 2, "{} of 8 flips were seen", flips.seen);
+    // Most of the controller's memory is history and filters, whose flips end nothing; what is vital is kept twice.
+    assert!(flips.seen >= 2, "{} of 16 flips were seen", flips.seen);
     assert!(
         flips.worst_reaction_ms <= Some(10),
         "{:?} ms",

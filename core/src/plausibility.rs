@@ -12,7 +12,7 @@
 //! The change predicted and the change seen are both summed with a memory of 1 s; the preview is declared implausible
 //! when the prediction exceeds what was seen, in the prediction's direction, by the margin. So a frozen, flipped or too
 //! small error is found when it must have moved; an error that moves *more* than predicted (gust, noise, a camera's
-//! scale) is a valid extreme and meets the envelope only, up to [`UNREAL`]: with a measured yaw rate, what goes further than
+//! scale) is a valid extreme and meets the envelope only, up to `UNREAL`: with a measured yaw rate, what goes further than
 //! that beyond the prediction is a line that slides away. A yaw error that is frozen or flipped predicts a movement that
 //! does not come, and is found the same way.
 //!

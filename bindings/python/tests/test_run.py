@@ -173,15 +173,15 @@ def test_the_participants_drive_and_are_identified():
     assert sum(told) == 4 == len(found.drives)
     drives = found.results["drives"]
     assert [(d["participant"], d["guided"]) for d in drives] == [(3, False), (3, True), (7, False), (7, True)]
-    # Table 6 of the paper, participant 3.
+    # Table 6 of the paper, participant 7.
     text = (Path(__file__).parents[3] / "host-sim" / "sim" / "data" / "participants.toml").read_text()
-    guided = text.split("number = 3")[1].split("guided")[1]
+    guided = text.split("number = 7")[1].split("guided")[1]
     t_p = float(guided.split("t_p = ")[1].split(",")[0].split("\n")[0].split("}")[0])
-    assert drives[1]["truth"]["t_p"] == t_p
-    estimate = drives[1]["noise_model"]["parameters"]["t_p"]
+    assert drives[3]["truth"]["t_p"] == t_p
+    estimate = drives[3]["noise_model"]["parameters"]["t_p"]
     assert abs(estimate["estimate"] - t_p) < 4 * estimate["standard_error"]
     # What was recorded gives the same driver again.
-    again = hg.identify(found.drives[1])
+    again = hg.identify(found.drives[3])
     assert abs(again["t_p"].estimate - estimate["estimate"]) < 0.1 * estimate["standard_error"]
     pytest.importorskip("pandas")
     frame = found.to_pandas()
