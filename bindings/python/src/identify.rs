@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{COLUMNS, DriveLog, Mapping, Options, Recording, SingleTrack, open_mapped};
-use haptic_batch::identify::Method;
+use haptic_analysis::identify::{COLUMNS, DriveLog, Mapping, Options, Recording, open_mapped};
+use haptic_batch::identify::{Method, single_track};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -47,7 +47,7 @@ pub(crate) fn identify<'py>(
             let maps = maps.map_err(|error| errors::input(py, error))?;
             let how = Recording {
                 dbc: dbc.as_deref(),
-                vehicle: vehicle.map(|scenario| single_track(scenario.get())),
+                vehicle: vehicle.map(|scenario| single_track(&scenario.get().inner)),
                 manual,
             };
             let opened = open_mapped(&path, &maps, &how).map_err(|error| errors::input(py, error))?;
@@ -85,20 +85,6 @@ pub(crate) fn identify<'py>(
     }
     made.set_item("traces", traces)?;
     Ok(made)
-}
-
-/// The vehicle of a scenario, as far as it decides how the vehicle turns.
-fn single_track(scenario: &Scenario) -> SingleTrack {
-    let v = scenario.inner.vehicle();
-    SingleTrack {
-        m: v.m,
-        i: v.i,
-        l_f: v.l_f,
-        l_r: v.l_r,
-        k_f: v.k_f,
-        k_r: v.k_r,
-        k_t: v.k_t,
-    }
 }
 
 /// The log of named arrays. They pass through the reader of log files, which checks them; numbers are written so that

@@ -7,13 +7,28 @@ use super::RunRecord;
 use super::experiment::identified_driver;
 use super::record::default_window;
 use haptic_analysis::identify::{
-    Difference, DriveLog, FixError, Identification, Options, Population, Tracking, differences,
+    Difference, DriveLog, FixError, Identification, Options, Population, SingleTrack, Tracking, differences,
     identify_and_track, identify_as_published, identify_together_and_track, identify_with_noise_model,
     population, track,
 };
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Scenario};
 use haptic_sim::simulation::simulate;
+
+/// The vehicle of a scenario, as far as it decides how the vehicle turns: what a recording of the bus does not hold.
+#[must_use]
+pub fn single_track(scenario: &Scenario) -> SingleTrack {
+    let v = scenario.vehicle();
+    SingleTrack {
+        m: v.m,
+        i: v.i,
+        l_f: v.l_f,
+        l_r: v.l_r,
+        k_f: v.k_f,
+        k_r: v.k_r,
+        k_t: v.k_t,
+    }
+}
 
 /// How to identify.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

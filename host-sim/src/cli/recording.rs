@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use haptic_analysis::identify::{DriveLog, Mapping, Recording, SingleTrack, open_mapped};
+use haptic_analysis::identify::{DriveLog, Mapping, Recording, open_mapped};
 use haptic_batch::files::load_scenario;
+use haptic_batch::identify::single_track;
 
 use super::BadInput;
 
@@ -42,24 +43,13 @@ impl RecordingArguments {
             .collect::<Result<Vec<Mapping>, _>>()?;
         let recording = Recording {
             dbc: self.dbc.as_deref(),
-            vehicle: self.vehicle.as_deref().map(vehicle).transpose()?,
+            vehicle: self
+                .vehicle
+                .as_deref()
+                .map(|path| load_scenario(path).map(|scenario| single_track(&scenario)))
+                .transpose()?,
             manual,
         };
         Ok(open_mapped(path, &maps, &recording)?)
     }
-}
-
-/// The vehicle of a scenario file, as far as it decides how the vehicle turns.
-fn vehicle(path: &Path) -> Result<SingleTrack, BadInput> {
-    let scenario = load_scenario(path)?;
-    let v = scenario.vehicle();
-    Ok(SingleTrack {
-        m: v.m,
-        i: v.i,
-        l_f: v.l_f,
-        l_r: v.l_r,
-        k_f: v.k_f,
-        k_r: v.k_r,
-        k_t: v.k_t,
-    })
 }

@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use haptic_log::trace::Trace;
-use haptic_sim::input::parse_toml;
+use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::scenario::{Condition, Scenario};
 use haptic_sim::simulation::{Ending, Run, simulate};
 use serde::{Deserialize, Serialize};
@@ -72,13 +72,8 @@ pub(super) fn read(
         return another("as another session");
     }
     let path = place.join("scenario.toml").display().to_string();
-    let scenario = Scenario::from_toml(&path, &text("scenario.toml")?, |course, _| {
-        Err(haptic_sim::input::InputError::new(
-            course,
-            "a stored scenario holds its course",
-        ))
-    });
-    if scenario.map_err(|e| e.to_string())? != written_and_read(session)? {
+    // As a file gives it back: a course of OpenDRIVE is moved by rounding.
+    if scenario(&path, &text("scenario.toml")?)? != scenario(&path, &session.scenario.to_toml())? {
         return another("with another scenario or seed");
     }
     let path = place.join("drive.csv");
@@ -90,14 +85,10 @@ pub(super) fn read(
     Ok(Some((stored, record)))
 }
 
-/// The scenario as its file gives it back: a course of OpenDRIVE is moved by rounding.
-fn written_and_read(session: &Session) -> Result<Scenario, String> {
-    let text = session.scenario.to_toml();
-    Scenario::from_toml("scenario", &text, |course, _| {
-        Err(haptic_sim::input::InputError::new(
-            course,
-            "a stored scenario holds its course",
-        ))
+/// The scenario of a stored text.
+fn scenario(name: &str, text: &str) -> Result<Scenario, String> {
+    Scenario::from_toml(name, text, |course, _| {
+        Err(InputError::new(course, "a stored scenario holds its course"))
     })
     .map_err(|e| e.to_string())
 }
