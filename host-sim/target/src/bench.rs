@@ -7,6 +7,7 @@
 //!
 //! Not here: a product's parameters, its flash and its watchdog, which the lock-step image has not (`cargo xtask qemu`).
 
+use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
@@ -21,7 +22,10 @@ use super::stepped::Stepped;
 const TICK: Duration = Duration::from_millis(1);
 /// A host that is behind by less catches up; a signal's age limit is 30 ms.
 const CATCHES_UP: Duration = Duration::from_millis(10);
-/// A client that does not read loses frames beyond so many bytes, three seconds of the bus.
+/// So many frames pass in a millisecond: eight bytes take at least 222 us at 500 kbit/s. Others wait, as they do for a bus. Of more clients one frame each
+/// passes.
+const PER_TICK: usize = 4;
+/// A client that does not read loses what is said to it beyond so many bytes, three seconds of the bus.
 const UNREAD: usize = 1 << 16;
 
 /// The bus: the ECU, and whoever joined.
@@ -38,6 +42,8 @@ struct Client {
     parser: Parser,
     /// Frames pass while the client has the channel open.
     open: bool,
+    /// Frames that wait for the bus.
+    waiting: VecDeque<Frame>,
     unsent: Vec<u8>,
 }
 
@@ -48,10 +54,13 @@ impl Bench {
     /// What is missing, or why nobody can listen there.
     pub fn start(address: &str) -> Result<Self, PilError> {
         let cannot = |e: std::io::Error| PilError::Failed(format!("cannot listen on {address}: {e}"));
+        // A wrong address is told before the image is built, and nobody waits at the door while it is.
+        drop(TcpListener::bind(address).map_err(cannot)?);
+        let ecu = Stepped::start(false)?;
         let listener = TcpListener::bind(address).map_err(cannot)?;
         listener.set_nonblocking(true).map_err(cannot)?;
         Ok(Self {
-            ecu: Stepped::start(false)?,
+            ecu,
             listener,
             clients: Vec::new(),
             time_us: 0,
@@ -76,10 +85,7 @@ impl Bench {
         while let Ok((stream, _)) = self.listener.accept() {
             self.clients.extend(Client::new(stream));
         }
-        let mut heard = Vec::new();
-        for (index, client) in self.clients.iter_mut().enumerate() {
-            heard.extend(client.receive().into_iter().map(|frame| (index, frame)));
-        }
+        let heard = self.on_the_bus();
         let frames: Vec<Frame> = heard.iter().map(|(_, frame)| *frame).collect();
         self.ecu.tick(quantity::Instant::from_us(self.time_us), &frames)?;
         self.time_us = self.time_us.wrapping_add(1000);
@@ -91,6 +97,22 @@ impl Bench {
         }
         self.clients.retain_mut(Client::flush);
         Ok(())
+    }
+
+    /// The frames of this millisecond, each with its client: the clients take turns.
+    fn on_the_bus(&mut self) -> Vec<(usize, Frame)> {
+        self.clients.iter_mut().for_each(Client::receive);
+        let mut heard = Vec::new();
+        while heard.len() < PER_TICK {
+            let before = heard.len();
+            for (index, client) in self.clients.iter_mut().enumerate() {
+                heard.extend(client.waiting.pop_front().map(|frame| (index, frame)));
+            }
+            if heard.len() == before {
+                break;
+            }
+        }
+        heard
     }
 
     /// Keeps the time of the wall until `ended`; `late` is told by how much this host was behind whenever the ECU's clock
@@ -133,35 +155,46 @@ impl Client {
             stream,
             parser: Parser::default(),
             open: false,
+            waiting: VecDeque::new(),
             unsent: Vec::new(),
         })
     }
 
-    /// The frames that came, and the protocol's answers to them.
-    fn receive(&mut self) -> Vec<Frame> {
+    /// Takes what came, and answers as the protocol has it. Who sends more than the bus carries has to wait.
+    fn receive(&mut self) {
+        if self.waiting.len() >= PER_TICK {
+            return;
+        }
         let mut bytes = [0; 4096];
-        let mut frames = Vec::new();
         // A client that is gone says so when something is sent to it.
         let Ok(count) = self.stream.read(&mut bytes) else {
-            return frames;
+            return;
         };
-        for line in bytes[..count].iter().filter_map(|byte| self.parser.push(*byte)) {
+        for byte in &bytes[..count] {
+            let Some(line) = self.parser.push(*byte) else {
+                continue;
+            };
             let mut answer = line.answer();
             match line {
                 Line::Open => self.open = true,
                 Line::Close => self.open = false,
-                Line::Frame(frame) if self.open => frames.push(frame),
+                Line::Frame(frame) if self.open => self.waiting.push_back(frame),
                 Line::Frame(_) => answer = slcan::ERROR,
                 _ => {}
             }
-            self.unsent.extend_from_slice(answer);
+            self.say(answer);
         }
-        frames
     }
 
     fn send(&mut self, frame: &Frame) {
-        if self.open && self.unsent.len() < UNREAD {
-            self.unsent.extend_from_slice(&slcan::format(frame));
+        if self.open {
+            self.say(&slcan::format(frame));
+        }
+    }
+
+    fn say(&mut self, bytes: &[u8]) {
+        if self.unsent.len() < UNREAD {
+            self.unsent.extend_from_slice(bytes);
         }
     }
 

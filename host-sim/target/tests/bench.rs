@@ -88,6 +88,25 @@ fn clients_and_the_ecu_hear_each_other_and_nobody_himself() {
             .all(|g| g.mode == Mode::Standby && g.torque.nm() == 0.0)
     );
 
+    // A flood waits for the bus, which carries four frames in a millisecond, and nothing of it is lost.
+    let flood: Vec<u8> = (0..400_u16)
+        .flat_map(|k| slcan::format(&Frame::new(0x700, &k.to_le_bytes()).unwrap()))
+        .collect();
+    one.stream.write_all(&flood).unwrap();
+    let mut passed = Vec::new();
+    for _ in 0..200 {
+        bench.tick().unwrap();
+        let now: Vec<Frame> = other.heard().into_iter().filter(|f| f.id() == 0x700).collect();
+        assert!(now.len() <= 4, "{} in a millisecond", now.len());
+        passed.extend(now);
+    }
+    let order: Vec<u16> = passed
+        .iter()
+        .map(|frame| u16::from_le_bytes([frame.data()[0], frame.data()[1]]))
+        .collect();
+    assert_eq!(order, (0..400).collect::<Vec<_>>());
+    let _ = one.heard();
+
     // One leaves; the bus goes on for the other.
     drop(one);
     let mut heard = 0;
