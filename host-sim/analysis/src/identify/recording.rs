@@ -3,7 +3,8 @@
 //! A column is the channel of its own name unless a [`Mapping`] names another. A channel's unit is converted where the file
 //! says it, or taken as said by a scale; what cannot be converted is refused. Channels of one table are taken row by
 //! row and checked as a CSV file's are. Channels with instants of their own are taken at those of the driver torque, whose
-//! noise must stay as it is: T_h as held, the others on the line between their neighbours.
+//! noise must stay as it is: T_h as held, and lane signals that are slower than the torque too, for a line between two
+//! pictures would hide the camera's noise; the others on the line between their neighbours.
 
 use std::path::Path;
 
@@ -15,8 +16,11 @@ use super::bus_trace;
 use super::log::{COLUMNS, DriveLog, LogError};
 
 const UNITS: [&str; 6] = ["s", "m", "rad", "rad", "N.m", "N.m"];
+const LANE: [usize; 2] = [1, 2];
 const GUIDANCE: usize = 4;
 const DRIVER: usize = 5;
+/// A lane signal whose usual step is so many of the driver torque's is slower.
+const SLOWER: f64 = 1.5;
 /// Longest pause of a channel with instants of its own that is bridged here, in its usual periods.
 const LONGEST_PAUSE: f64 = 3.5;
 
@@ -259,11 +263,72 @@ fn at_the_torque(
     if instants.is_empty() {
         return Err("the channels have no time in common".to_owned());
     }
+    let pace_s = courses[DRIVER].as_ref().map_or(0.0, |c| c.usual_s);
     notes.push(format!(
         "The channels have instants of their own: taken at those of {}, one in {:.4} s",
         columns[DRIVER].as_ref().map_or("", |c| c.series.name.as_str()),
-        courses[DRIVER].as_ref().map_or(0.0, |c| c.usual_s)
+        pace_s
     ));
-    let values = std::array::from_fn(|i| Some(courses[i].as_ref()?.at(&instants, i == GUIDANCE)));
+    let values = std::array::from_fn(|i| {
+        let course = courses[i].as_ref()?;
+        let is_slow_lane = LANE.contains(&i) && course.usual_s > SLOWER * pace_s;
+        Some(course.at(&instants, i == GUIDANCE || is_slow_lane))
+    });
     Ok((instants, values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A channel in a group of its own: `count` values, one each `period_s` from `start_s` on.
+    fn group(name: &str, unit: &str, start_s: f64, period_s: f64, value: impl Fn(usize) -> f64) -> Group {
+        let count = (12.0 / period_s) as usize;
+        Group {
+            name: name.into(),
+            time_s: (0..count).map(|k| start_s + period_s * k as f64).collect(),
+            channels: vec![Series {
+                name: name.into(),
+                unit: unit.into(),
+                source: String::new(),
+                values: (0..count).map(value).collect(),
+            }],
+        }
+    }
+
+    #[test]
+    fn a_slow_camera_is_held_and_a_slow_angle_is_not() {
+        let zigzag = |k: usize| [0.2, -0.2][k % 2];
+        let recording = Recording {
+            groups: vec![
+                group("Torque", "N.m", 0.0, 0.01, zigzag),
+                group("Angle", "rad", 0.0, 0.04, |k| 0.01 * k as f64),
+                group("Assist", "N.m", 0.0, 0.04, |k| 0.01 * k as f64),
+                group("Offset", "cm", 0.0, 0.04, |k| 100.0 * zigzag(k)),
+                group("Heading", "rad", 0.0, 0.01, zigzag),
+            ],
+        };
+        let map = |text: &str| text.parse::<Mapping>().unwrap();
+        let maps = [
+            "driver_torque_nm=Torque",
+            "wheel_angle_rad=Angle",
+            "guidance_torque_nm=Assist",
+            "e_y_m=Offset",
+            "e_theta_rad=Heading",
+        ]
+        .map(map);
+        let (log, _) = of_channels(&recording, &maps, false).unwrap();
+        assert!((log.dt_s - 0.01).abs() < 1e-12, "{}", log.dt_s);
+        for k in 0..800 {
+            let near =
+                |value: f64, wanted: f64| assert!((value - wanted).abs() < 1e-9, "{k}: {value} {wanted}");
+            // Each picture with its own noise, and no value that no picture had.
+            near(log.e_y_m[k], zigzag(k / 4));
+            near(log.guidance_torque_nm[k], 0.01 * (k / 4) as f64);
+            near(log.wheel_angle_rad[k], 0.01 * k as f64 / 4.0);
+            // As quick as the torque: value for value.
+            near(log.e_theta_rad[k], zigzag(k));
+            near(log.driver_torque_nm[k], zigzag(k));
+        }
+    }
 }
