@@ -154,19 +154,23 @@ fn a_bank_pushes_to_the_lower_side_and_wind_to_where_it_blows() {
     assert!(blown.yaw_rate_rad_s > 1e-3, "{blown:?}");
 }
 
-/// CommonRoad's single-track vehicle (tests/tools/commonroad_single_track.py) in a lane change and in a curve of
-/// 2.5 m/s^2: yaw rate and side-slip angle within 2 % of their peaks.
+/// CommonRoad's vehicles (tests/tools/commonroad_vehicles.py) in a lane change and in a curve of 2.5 m/s^2. The single-track
+/// one: yaw rate and side-slip angle within 2 % of their peaks. The multi-body one leans, and its tyres are others: yaw rate
+/// within 5 %; the side-slip angle, 4 to 6 mrad at most, within 40 % of that.
 #[test]
 fn the_vehicle_is_that_of_commonroad() {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/data/commonroad_single_track.csv"
+        "/../../tests/data/commonroad_vehicles.csv"
     );
     let text = std::fs::read_to_string(path).unwrap();
     let rows: Vec<(&str, Vec<f64>)> = text
         .lines()
         .skip(1)
-        .map(|line| line.split_once(',').unwrap())
+        .map(|line| {
+            let comma = line.match_indices(',').nth(1).unwrap().0;
+            (&line[..comma], &line[comma + 1..])
+        })
         .map(|(name, values)| (name, values.split(',').map(|v| v.parse().unwrap()).collect()))
         .collect();
     // Parameter set 2, a BMW 320i: its tyres give 21.92 times the load per radian on both axles, so it is neutral.
@@ -189,7 +193,12 @@ fn the_vehicle_is_that_of_commonroad() {
     };
     for tyres in [Tyres::Linear, Tyres::Saturating] {
         let tyre = SingleTrack::new(&vehicle, tyres, 0.4);
-        for manoeuvre in ["lane_change", "curve"] {
+        for (manoeuvre, bounds) in [
+            ("single_track,lane_change", [0.02, 0.02]),
+            ("single_track,curve", [0.02, 0.02]),
+            ("multi_body,lane_change", [0.05, 0.4]),
+            ("multi_body,curve", [0.05, 0.4]),
+        ] {
             let rows: Vec<&Vec<f64>> = rows.iter().filter(|r| r.0 == manoeuvre).map(|r| &r.1).collect();
             assert_eq!(rows.len(), 300);
             let (mut motion, mut worst, mut peak) = ([0.0; 2], [0.0_f64; 2], [0.0_f64; 2]);
@@ -219,7 +228,7 @@ fn the_vehicle_is_that_of_commonroad() {
             assert!(lateral_m_per_s2 > 2.4, "{manoeuvre}: {lateral_m_per_s2}");
             for i in 0..2 {
                 let share = worst[i] / peak[i];
-                assert!(share < 0.02, "{tyres:?} {manoeuvre} {i}: {share}");
+                assert!(share < bounds[i], "{tyres:?} {manoeuvre} {i}: {share}");
             }
         }
     }
