@@ -1,9 +1,12 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
 use haptic_core::config::Config;
+use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
+use haptic_core::faults::FaultSet;
 use haptic_core::law::{LaneSample, Law, LawState, Since};
+use haptic_core::modes::Mode;
 use haptic_core::params::Params;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -218,5 +221,43 @@ fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
     for (ms, grown) in [(30, 0.03), (500, 0.5), (501, 0.5), (5_000, 0.5)] {
         let difference = read(ms) - read(0);
         assert!((difference - grown).abs() < 1e-3, "{ms} ms: {difference}");
+    }
+}
+
+/// The controller without its bus, active from the start, on lane errors that stand still and a driver who holds against
+/// the torque: `K_1*a_1*e_y` once it has wound up.
+#[test]
+fn the_controller_alone_gives_the_law() {
+    let controller = Controller::new(Config::new(&Params::PAPER).unwrap());
+    for e_y in [-0.6, 0.4] {
+        let mut state = ControllerState::engaged(Instant::from_us(0));
+        let mut applied = Torque::ZERO;
+        for ms in 1..=3000 {
+            let now = Instant::from_us(1000 * ms);
+            let inputs = Inputs {
+                lane: Input::New(LaneSample {
+                    e_y: Metres::from_m(e_y),
+                    e_theta: Radians::ZERO,
+                    at: now,
+                }),
+                column: Input::New(Column {
+                    driver_torque: Torque::from_nm(-applied.nm()),
+                    wheel_angle: Radians::ZERO,
+                }),
+                motion: Input::New(Motion::new([Speed::from_m_per_s(20.0); 2], None)),
+                request: Input::New(Request {
+                    engage: true,
+                    authority: Ratio::from_si(1.0),
+                    probe: false,
+                }),
+                line_moved: false,
+                faults: FaultSet::NONE,
+            };
+            let command = controller.step(&mut state, now, applied, &inputs);
+            assert_eq!(command.mode, Mode::Active, "{ms} {command:?}");
+            applied = command.torque;
+        }
+        let wanted = Params::PAPER.k_1 * Params::PAPER.a_1 * e_y;
+        assert!((applied.nm() - wanted).abs() < 1e-3, "{} {wanted}", applied.nm());
     }
 }

@@ -9,25 +9,63 @@ use serde_json::Value;
 
 use crate::tool::{self, cargo, run};
 
-/// What decides or guards a torque, with the tests that must notice a defect in it.
-const MUTATED: [(&str, &[&str]); 14] = [
+/// Every file of the core, what decides or guards a torque first, with the tests that must notice a defect in it beside its
+/// own unit tests. What cannot be noticed is in `.cargo/mutants.toml`, with its reason.
+const MUTATED: [(&str, &[&str]); 36] = [
     ("envelope.rs", &["envelope"]),
     ("modes.rs", &["modes"]),
-    ("bus/e2e.rs", &["e2e", "edges"]),
+    ("bus/e2e.rs", &["e2e", "edges", "dbc"]),
     ("monitor.rs", &["monitor", "probe"]),
-    ("plausibility.rs", &["plausibility"]),
-    ("controller.rs", &["ecu", "probe", "edges", "endurance"]),
-    ("ecu.rs", &["ecu", "memory", "probe", "edges", "endurance"]),
-    ("ecu/receivers.rs", &["ecu", "memory", "edges", "endurance"]),
+    ("plausibility.rs", &["plausibility", "road", "edges", "ecu"]),
+    (
+        "controller.rs",
+        &["ecu", "probe", "edges", "endurance", "memory", "road"],
+    ),
+    (
+        "controller/step.rs",
+        &["ecu", "probe", "edges", "endurance", "memory", "road", "motor"],
+    ),
+    (
+        "ecu.rs",
+        &["ecu", "memory", "probe", "edges", "endurance", "attacks"],
+    ),
+    (
+        "ecu/receivers.rs",
+        &["ecu", "memory", "edges", "endurance", "attacks"],
+    ),
+    ("ecu/injection.rs", &["ecu", "memory", "monitor", "edges"]),
     ("ramp.rs", &["ramp", "ecu", "endurance"]),
-    ("redundant.rs", &["memory"]),
+    ("redundant.rs", &["memory", "ecu"]),
     ("stored.rs", &["stored"]),
     ("download.rs", &["download"]),
-    ("actuator.rs", &["edges", "ecu"]),
+    ("actuator.rs", &["edges", "ecu", "motor"]),
     ("faults.rs", &["faults", "ecu", "dbc", "edges"]),
+    ("hands.rs", &["road", "ecu"]),
+    ("law.rs", &["law_oracle"]),
+    ("schedule.rs", &["schedule", "params"]),
+    ("past.rs", &["plausibility", "road"]),
+    ("probe.rs", &["probe"]),
+    ("sine.rs", &["probe"]),
+    ("quantity.rs", &["quantity", "law_oracle", "ecu"]),
+    ("quantity/arithmetic.rs", &["quantity", "law_oracle", "ecu"]),
+    (
+        "config.rs",
+        &["params", "monitor", "schedule", "plausibility", "probe"],
+    ),
+    ("params.rs", &["params", "stored"]),
+    ("rejections.rs", &["attacks", "dbc"]),
+    ("background.rs", &["probe", "ecu", "attacks"]),
+    ("estimator.rs", &["probe"]),
+    ("estimator/average.rs", &["probe"]),
+    ("bus/frame.rs", &["frame", "dbc"]),
+    ("bus/slcan.rs", &["slcan"]),
+    ("bus/messages/mod.rs", &["dbc", "ecu"]),
+    ("bus/messages/inputs.rs", &["dbc", "ecu", "edges"]),
+    ("bus/messages/outputs.rs", &["dbc", "ecu", "attacks"]),
+    ("bus/messages/service.rs", &["dbc", "download", "attacks"]),
 ];
 
-/// Line, region and branch coverage of `core/` by its own tests; less than all of it is an error.
+/// Line, region and branch coverage of `core/` by its own tests; less than all lines and branches is an error.
 pub(crate) fn coverage() -> Result<()> {
     let place = tool::root().join("target/coverage");
     let profiles = place.join("profiles");
@@ -70,14 +108,15 @@ pub(crate) fn coverage() -> Result<()> {
     run(&mut report("report")?)?;
     let summary: Value = serde_json::from_str(&tool::output(report("export")?.arg("-summary-only"))?)?;
     let totals = &summary["data"][0]["totals"];
-    for kind in ["lines", "regions", "branches"] {
+    // A region is missed too where a `?` has an error that cannot come: those are shown above, and are no error.
+    for kind in ["lines", "branches"] {
         let [count, covered] = ["count", "covered"].map(|figure| totals[kind][figure].as_u64());
         ensure!(
             count.is_some() && count == covered,
             "{kind}: {covered:?} of {count:?} are covered; where not: llvm-cov show"
         );
     }
-    println!("every line, region and branch of core/ is covered");
+    println!("every line and every branch of core/ is covered");
     Ok(())
 }
 
@@ -132,6 +171,7 @@ fn command_for(
         .args(["-f", &source])
         .arg("--output")
         .arg(&place)
+        .arg("--cargo-arg=--lib")
         .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")));
     if let Some(base) = base {
         let difference = tool::output(tool::command("git").args(["diff", base, "--", &source]))?;
@@ -189,9 +229,6 @@ fn mutate(base: Option<&str>, sample: Option<usize>) -> Result<()> {
     for survivor in &survivors {
         println!("  {survivor}");
     }
-    ensure!(
-        base.is_none() || survivors.is_empty(),
-        "no test notices these defects in the changed lines"
-    );
+    ensure!(survivors.is_empty(), "no test notices these defects");
     Ok(())
 }
