@@ -144,16 +144,25 @@ pub(crate) fn mutants_of_last_commit() -> Result<()> {
     }
     let commit = git(&["rev-parse", "--short=6", "HEAD"]).unwrap_or_default();
     let seed = usize::from_str_radix(commit.trim(), 16).unwrap_or_default();
-    mutate(Some("HEAD~1"), Some(seed))
+    mutate(&|_| true, Some("HEAD~1"), Some(seed))
 }
 
-/// A defect in each expression of what guards a torque, or only in those that differ from `base`; those that no test
-/// notices are printed, and are an error where only a difference was tried.
-pub(crate) fn mutants(base: Option<&str>) -> Result<()> {
+/// A defect in each expression of the core, or of some of its files, or only in lines that differ from `base`; an error
+/// names those that no test notices.
+pub(crate) fn mutants(files: &[String], base: Option<&str>) -> Result<()> {
     if !tool::exists("cargo-mutants") {
         bail!("cargo-mutants is missing: cargo install cargo-mutants");
     }
-    mutate(base, None)
+    let known = |file: &&String| MUTATED.iter().any(|(name, _)| name == file);
+    if let Some(file) = files.iter().find(|file| !known(file)) {
+        let names: Vec<&str> = MUTATED.iter().map(|(name, _)| *name).collect();
+        bail!(
+            "{file}: no file of core/src that is mutated; there are {}",
+            names.join(", ")
+        );
+    }
+    let wanted = |file: &str| files.is_empty() || files.iter().any(|wanted| wanted == file);
+    mutate(&wanted, base, None)
 }
 
 /// `cargo mutants` for a file, with the tests that must notice; None where it does not differ from `base`.
@@ -172,6 +181,8 @@ fn command_for(
         .arg("--output")
         .arg(&place)
         .arg("--cargo-arg=--lib")
+        // Each file is tried in a copy of the sources; what they depend on is built once.
+        .env("CARGO_TARGET_DIR", tool::root().join("target/mutants/build"))
         .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")));
     if let Some(base) = base {
         let difference = tool::output(tool::command("git").args(["diff", base, "--", &source]))?;
@@ -186,11 +197,12 @@ fn command_for(
 }
 
 /// All of them, or [`SAMPLE`] that a number picks.
-fn mutate(base: Option<&str>, sample: Option<usize>) -> Result<()> {
+fn mutate(wanted: &dyn Fn(&str) -> bool, base: Option<&str>, sample: Option<usize>) -> Result<()> {
+    let files = || MUTATED.iter().filter(|(file, _)| wanted(file));
     let shard = match sample {
         Some(seed) => {
             let mut count = 0;
-            for (file, tests) in MUTATED {
+            for (file, tests) in files() {
                 if let Some((_, mut command)) = command_for(file, tests, base)? {
                     count += tool::output(command.arg("--list"))?.lines().count();
                 }
@@ -202,7 +214,7 @@ fn mutate(base: Option<&str>, sample: Option<usize>) -> Result<()> {
         None => None,
     };
     let mut survivors = Vec::new();
-    for (file, tests) in MUTATED {
+    for (file, tests) in files() {
         let Some((place, mut command)) = command_for(file, tests, base)? else {
             continue;
         };
@@ -218,7 +230,8 @@ fn mutate(base: Option<&str>, sample: Option<usize>) -> Result<()> {
         );
         for outcome in ["missed.txt", "timeout.txt"] {
             let path = place.join("mutants.out").join(outcome);
-            if base.is_some() && !path.exists() {
+            // A file, or a difference, that holds nothing to mutate leaves no list.
+            if !path.exists() {
                 continue;
             }
             let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
