@@ -135,7 +135,7 @@ const fn phase_per_us(frequency_hz: f64) -> u32 {
 /// of 15 mm and 1.5 mrad, three times what a camera has, moves the law's rates by its share of a sample.
 const fn monitor_band_nm(p: &Params) -> f64 {
     let tau_s = 1.0 / (2.0 * core::f64::consts::PI * p.rate_corner_hz);
-    let apart_s = if tau_s > 0.04 { tau_s - 0.02 } else { 0.06 - tau_s };
+    let apart_s = f64::max(tau_s - 0.02, 0.06 - tau_s);
     let noise_per_s = 1.5 / (tau_s + 1.0 / 120.0);
     let a_rate = p.k_1 * p.a_2 * (4.0 * apart_s + 0.015 * noise_per_s);
     let theta_rate = p.k_1 * p.a_4 * (apart_s + 0.001_5 * noise_per_s);
@@ -197,8 +197,7 @@ impl Estimator {
             shortest * (shortest - assumed) / (1.0 + shortest * assumed),
             longest * (longest - assumed) / (1.0 + longest * assumed),
         ];
-        let below = if below < 0.0 { -below } else { below };
-        let above = if above < 0.0 { -above } else { above };
+        let (below, above) = (below.abs(), above.abs());
         Self {
             phase_per_us: phase_per_us(p.probe_frequency_hz),
             periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,

@@ -265,7 +265,7 @@ impl Estimator {
         let power = applied.re * applied.re + applied.im * applied.im;
         // A sine's coefficient is half its amplitude times the sum of the window.
         let least = LEAST_SHARE * 0.5 * self.amplitude_nm * block.weight;
-        (power > 0.0 && power >= least * least).then(|| -(re * applied.re + im * applied.im) / power)
+        ((power > 0.0) & (power >= least * least)).then(|| -(re * applied.re + im * applied.im) / power)
     }
 }
 

@@ -65,3 +65,50 @@ impl HandsState {
         self.without
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn without_ms(state: &HandsState) -> u32 {
+        state.without().us() / 1000
+    }
+
+    fn let_go(felt: Torque) -> HandsState {
+        let mut state = HandsState::NEW;
+        state.feel(felt);
+        state.guided(ACTS, Micros::from_ms(500));
+        state
+    }
+
+    #[test]
+    fn a_hand_is_a_change_or_a_torque_that_no_offset_is() {
+        let bit = Torque::from_bits(1);
+        for sign in [1, -1] {
+            let signed = |torque: Torque| if sign < 0 { torque.opposite() } else { torque };
+            // From an offset on: as much as FELT beside it is none, a bit more is one.
+            let mut state = let_go(signed(Torque::from_nm(0.2)));
+            state.feel(signed(Torque::from_nm(0.2).plus(FELT)));
+            assert_eq!(without_ms(&state), 500);
+            state.feel(signed(Torque::from_nm(0.2).plus(FELT).plus(bit)));
+            assert_eq!(without_ms(&state), 0);
+            // The same torque all the time.
+            for (torque, left) in [(HELD, 500), (HELD.plus(bit), 0)] {
+                let mut state = let_go(signed(torque));
+                state.feel(signed(torque));
+                assert_eq!(without_ms(&state), left, "{torque:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn only_a_guidance_that_acts_counts_and_each_begins_anew() {
+        let mut state = let_go(Torque::ZERO);
+        state.guided(ACTS.plus(Torque::from_bits(-1)), Micros::from_ms(500));
+        assert_eq!(without_ms(&state), 500);
+        state.guided(ACTS.opposite(), Micros::from_ms(500));
+        assert_eq!(without_ms(&state), 1000);
+        state.begin();
+        assert_eq!(without_ms(&state), 0);
+    }
+}

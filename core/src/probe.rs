@@ -109,7 +109,7 @@ mod tests {
                 }
             }
         }
-        assert!(steepest > 0.99 * PI && steepest < 1.013 * PI, "{steepest}");
+        assert!((0.99 * PI..1.013 * PI).contains(&steepest), "{steepest}");
     }
 
     #[test]

@@ -107,7 +107,7 @@ fn a_gap_of_twenty_milliseconds_is_bridged() {
 #[test]
 fn a_masquerade_succeeds_and_leaves_its_trace_in_the_counts() {
     let mut rig = Rig::active_in_curve(0.0);
-    let mut rejections = Rejections::NONE;
+    let mut rejections = Rejections::default();
     let mut accepted = [0, 0];
     for _ in 0..250 {
         while !rig.ticks.is_multiple_of(8) {

@@ -307,3 +307,22 @@ fn the_first_reading_takes_six_seconds_whenever_the_probe_begins() {
         assert!((5_990..=6_040).contains(&ms), "{ms} ms, begun at {start_us} us");
     }
 }
+
+/// Where the answer is always one and the same, parameters are written at speed, or never.
+#[test]
+fn stands_by_both_of_its_speeds_and_only_when_they_are_known() {
+    let mut rig = Rig::paper();
+    rig.run(600);
+    for (speeds, silent, stands) in [
+        ([16.0, 16.0], false, false),
+        ([0.0, 0.0], false, true),
+        ([0.0, 1.0], false, false),
+        ([1.0, 0.0], false, false),
+        ([0.0, 0.0], true, false),
+    ] {
+        rig.speeds = speeds;
+        rig.silent[2] = silent;
+        rig.run(600);
+        assert_eq!(rig.ecu.stands(), stands, "{speeds:?}, silent: {silent}");
+    }
+}

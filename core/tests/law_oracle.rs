@@ -1,9 +1,12 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
 use haptic_core::config::Config;
+use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
+use haptic_core::faults::FaultSet;
 use haptic_core::law::{LaneSample, Law, LawState, Since};
+use haptic_core::modes::Mode;
 use haptic_core::params::Params;
-use haptic_core::quantity::{Instant, Metres, Micros, Radians};
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -218,5 +221,127 @@ fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
     for (ms, grown) in [(30, 0.03), (500, 0.5), (501, 0.5), (5_000, 0.5)] {
         let difference = read(ms) - read(0);
         assert!((difference - grown).abs() < 1e-3, "{ms} ms: {difference}");
+    }
+}
+
+/// The controller without its bus, active from the start, on lane errors that stand still and a driver who holds against
+/// the torque: `K_1*a_1*e_y` once it has wound up.
+#[test]
+fn the_controller_alone_gives_the_law() {
+    let controller = Controller::new(Config::new(&Params::PAPER).unwrap());
+    for e_y in [-0.6, 0.4] {
+        let mut state = ControllerState::engaged(Instant::from_us(0));
+        let mut applied = Torque::ZERO;
+        for ms in 1..=3000 {
+            let now = Instant::from_us(1000 * ms);
+            let inputs = Inputs {
+                lane: Input::New(LaneSample {
+                    e_y: Metres::from_m(e_y),
+                    e_theta: Radians::ZERO,
+                    at: now,
+                }),
+                column: Input::New(Column {
+                    driver_torque: Torque::from_nm(-applied.nm()),
+                    wheel_angle: Radians::ZERO,
+                }),
+                motion: Input::New(Motion::new([Speed::from_m_per_s(20.0); 2], None)),
+                request: Input::New(Request {
+                    engage: true,
+                    authority: Ratio::from_si(1.0),
+                    probe: false,
+                }),
+                line_moved: false,
+                faults: FaultSet::NONE,
+            };
+            let command = controller.step(&mut state, now, applied, &inputs);
+            assert_eq!(command.mode, Mode::Active, "{ms} {command:?}");
+            applied = command.torque;
+        }
+        let wanted = Params::PAPER.k_1 * Params::PAPER.a_1 * e_y;
+        assert!((applied.nm() - wanted).abs() < 1e-3, "{} {wanted}", applied.nm());
+    }
+}
+
+/// A sample that was old when it came, and what the vehicle did since, against the kinematics in f64: both errors go on at
+/// their rates; the heading is `turned` beyond that, grown as the square of the time, so that a third of its age counts for
+/// the way aside, beside what the near point is moved by.
+#[test]
+fn what_the_vehicle_did_since_an_old_sample_is_made_up_for() {
+    let law = Config::PAPER.law;
+    let p = Params::PAPER;
+    let mut rng = SmallRng::seed_from_u64(7);
+    let mut furthest = 0.0_f64;
+    for _ in 0..2000 {
+        let mut any = |most: f64| rng.random_range(-most..most);
+        let (mut state, mut oracle) = (LawState::NEW, Oracle::new(p));
+        // Rates from a few samples; at the last one the oracle's are those of the sample.
+        let (y, theta, y_rate, theta_rate) = (any(0.5), any(0.02), any(0.5), any(0.1));
+        let mut sample = LaneSample::default();
+        for k in -30..=0 {
+            let t_s = f64::from(k) * 0.008;
+            sample = LaneSample {
+                e_y: Metres::from_m(y + y_rate * t_s),
+                e_theta: Radians::from_rad(theta + theta_rate * t_s),
+                at: Instant::from_us((1_000_000 + 8000 * k) as u32),
+            };
+            let _ = law.step(&mut state, sample.at, sample, &Since::NOTHING);
+            oracle.step(t_s, 0.0, sample.e_y.m(), sample.e_theta.rad());
+        }
+        let (turned, faster) = (any(0.03), any(0.2));
+        let (speed, near, age_s) = (20.0 + any(15.0), 6.0 + any(4.0), 0.05 + any(0.05));
+        let since = Since::new(
+            Radians::from_rad(turned),
+            TurningRate::from_rad_per_s(faster),
+            Speed::from_m_per_s(speed),
+            Metres::from_m(near),
+        );
+        let age = Micros::from_us((age_s * 1e6) as u32);
+        let age_s = f64::from(age.us()) * 1e-6;
+        let torque = law.step(&mut state, sample.at.after(age), sample, &since).nm();
+
+        let (y_rate, theta_rate) = oracle.rates;
+        let going = theta_rate * age_s;
+        let aside = near * turned + speed * turned * age_s / 3.0 - speed * going * age_s / 2.0;
+        let e_y = sample.e_y.m() + y_rate * age_s - aside;
+        let e_theta = sample.e_theta.rad() + going - turned;
+        let y_rate = y_rate - speed * (turned - going) - near * faster;
+        let theta_rate = theta_rate - faster;
+        let expected = p.k_1 * (p.a_1 * e_y + p.a_2 * y_rate + p.a_3 * e_theta + p.a_4 * theta_rate);
+        furthest = furthest.max((torque - expected).abs());
+    }
+    assert!(furthest < BOUND_NM, "{furthest}");
+}
+
+/// Rates are shared over 100 ms and not a microsecond more, and there are none with the first sample.
+#[test]
+fn two_samples_share_a_rate_over_100_ms() {
+    let p = Params::PAPER;
+    let tau = 1.0 / (2.0 * std::f64::consts::PI * p.rate_corner_hz);
+    let position = p.k_1 * p.a_1 * 0.5;
+    let torque = |samples: &[(u32, f64)]| {
+        let (law, mut state, mut last) = (Config::PAPER.law, LawState::NEW, 0.0);
+        for &(us, e_y) in samples {
+            let at = Instant::from_us(us);
+            let sample = LaneSample {
+                e_y: Metres::from_m(e_y),
+                e_theta: Radians::ZERO,
+                at,
+            };
+            last = law.step(&mut state, at, sample, &Since::NOTHING).nm();
+        }
+        last
+    };
+    let rated = position + p.k_1 * p.a_2 * 0.5 / (tau + 0.1);
+    for (samples, expected) in [
+        (&[(0, 0.0), (100_000, 0.5)][..], rated),
+        (&[(0, 0.0), (100_001, 0.5)][..], position),
+        // The clock starts from zero, and so does what there is of a last sample.
+        (&[(50_000, 0.5)][..], position),
+    ] {
+        let torque = torque(samples);
+        assert!(
+            (torque - expected).abs() < BOUND_NM,
+            "{samples:?}: {torque} {expected}"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! The transition table of the code against the table and the drawing in docs/safety.md, written by hand.
 
-use haptic_core::modes::{Event, Mode};
+use haptic_core::modes::{Event, Events, Mode};
 use std::collections::BTreeSet;
 
 const SAFETY: &str = include_str!("../../docs/safety.md");
@@ -88,4 +88,26 @@ fn torque_in_three_modes_only_and_codes_as_on_the_bus() {
     let codes: Vec<_> = (0..8).map(Mode::from_code).collect();
     assert_eq!(codes[..7], Mode::ALL.map(Some));
     assert_eq!(codes[7], None);
+}
+
+#[test]
+fn of_all_that_is_raised_the_most_urgent_change_decides() {
+    for from in Mode::ALL {
+        for set in 1_u32..1 << Event::ALL.len() {
+            let is_raised =
+                |event: Event| set >> Event::ALL.iter().position(|e| *e == event).unwrap() & 1 == 1;
+            let mut raised = Event::ALL.into_iter().filter(|event| is_raised(*event));
+            let first = raised.next().unwrap();
+            let mut events = Events::of(first);
+            for event in Event::ALL {
+                events.insert_if(is_raised(event), event);
+            }
+            let urgent = raised
+                .rev()
+                .chain([first])
+                .find(|event| from.after(*event) != from);
+            let expected = urgent.map_or(from, |event| from.after(event));
+            assert_eq!(from.after_all(events), expected, "{from:?} {set:07b}");
+        }
+    }
 }

@@ -315,6 +315,50 @@ fn rates_are_forgotten_in_a_gap() {
     assert_eq!(steps(40), 30);
     assert_eq!(steps(300), 20);
     assert_eq!(steps(361), 20);
+    // 8 m in 360 ms are worth 0.28 N.m; a millisecond later nothing is known of the rate.
+    let far = |gap_ms: u32| {
+        let torque = counts(500).0;
+        let mut bench = Bench::at(5.0, torque);
+        assert!(bench.show(Some(lane(-65_535, 0, 0)), None, guidance(torque, FADE), 1000));
+        for _ in 1..gap_ms {
+            assert!(bench.torque(torque, FADE));
+        }
+        assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 1000));
+        (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
+    };
+    assert_eq!(far(360), 30);
+    assert_eq!(far(361), 20);
+}
+
+/// Errors that passed zero at a constant rate with the last picture, and no picture since. From 40 ms of age on the
+/// position goes on at its rate, so a torque beyond the band of the last picture comes to be within it.
+#[test]
+fn an_old_sample_is_carried_at_its_rates() {
+    for sign in [1, -1] {
+        for (per_sample_y, per_sample_theta, at_once_mnm, per_ms) in [
+            // 8 m/s: 100 mN.m for the rate, and 500 mN.m per m.
+            (524, 0, 100, 4),
+            // 1 rad/s: 250 mN.m for the rate, and 10 mN.m per mrad.
+            (0, 524, 250, 10),
+        ] {
+            // Within the band 65 ms after the last picture; judged from an age of so many ms on.
+            let torque = sign * counts(300 + at_once_mnm + 25 * per_ms).0;
+            let permitted = |from_ms: i64| {
+                let mut bench = Bench::at(5.0, torque);
+                for k in -30..=0 {
+                    let sample = lane(sign * k * per_sample_y, sign * k * per_sample_theta, 0);
+                    assert!(bench.show(Some(sample), None, guidance(torque, FADE), 8000));
+                }
+                for _ in 1..from_ms {
+                    assert!(bench.torque(torque, FADE));
+                }
+                (0..60).take_while(|_| bench.torque(torque, ACTIVE)).count()
+            };
+            // Give or take 2 ms for the rounded counts and gains: 20 ms outside are allowed, 21 are not.
+            assert_eq!(permitted(65 - 18), 60, "{per_sample_y}");
+            assert_eq!(permitted(65 - 23), 20, "{per_sample_y}");
+        }
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Parameters out of range are named with their value and range; the edges of the range are in it.
 
-use haptic_core::config::Config;
+use haptic_core::config::{Config, Setup};
 use haptic_core::params::{PARAMETERS, Params};
 
 type Set = fn(&mut Params, f64);
@@ -68,6 +68,24 @@ fn a_probe_too_steep_for_the_wind_up_limit_is_refused() {
     let error = with(0.2, 2.8).unwrap_err();
     assert_eq!(error.name, "2 * pi * probe_amplitude_nm * probe_frequency_hz");
     assert!((error.value - 3.5186).abs() < 1e-4 && error.max == 3.5, "{error}");
+}
+
+#[test]
+fn a_law_that_the_monitor_cannot_follow_is_refused() {
+    // Each gain is within its range and so is its product with K_1, but noise of 1.5 mrad alone moves a law with so
+    // quick a filter by more than the 5 N.m that the monitor tolerates at most.
+    let with = |a_4, rate_corner_hz| {
+        let params = Params {
+            a_4,
+            rate_corner_hz,
+            ..Params::PAPER
+        };
+        Setup::new(&params).map(|_| ())
+    };
+    assert_eq!(with(1.0, 10.0), Ok(()));
+    let error = with(100.0, 60.0).unwrap_err();
+    assert!(error.name.contains("band"), "{error}");
+    assert!(error.value > error.max && error.max == 5.0, "{error}");
 }
 
 #[test]

@@ -97,7 +97,7 @@ fn drive_with(
 ) -> Drive {
     let config = Config::PAPER;
     let checks: &Plausibility = &config.plausibility;
-    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    let (mut state, mut past) = (PlausibilityState::NEW, Past::default());
     checks.motion(&mut state, Speed::from_m_per_s(speed), None);
     // beta, yaw rate, wheel and its rate; offset and heading against the line.
     let (mut beta, mut r, mut phi, mut phi_rate) = (0.0, 0.0, 0.0_f64, 0.0_f64);

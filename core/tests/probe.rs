@@ -318,6 +318,24 @@ fn nothing_is_kept_from_probe_to_probe() {
     assert!((estimate - 0.2).abs() < 0.005, "{estimate}");
 }
 
+/// An amplitude of zero is allowed, and there is nothing to read then, whatever the driver does.
+#[test]
+fn a_probe_of_zero_has_no_reading() {
+    let setup = Setup::new(&Params {
+        probe_amplitude_nm: 0.0,
+        ..Params::PAPER
+    })
+    .unwrap();
+    let mut rig = Rig::new(Some(&setup), Default::default());
+    rig.run(600);
+    (rig.engage, rig.probe) = (true, true);
+    STEERS.set(true);
+    drive(&mut rig, 0.6, &mut 0.0, 15_000);
+    STEERS.set(false);
+    assert_eq!(rig.tick().command.mode, Mode::Active);
+    assert_eq!(reading(&rig), None);
+}
+
 #[test]
 fn other_probes_are_read_as_well() {
     for (amplitude, frequency) in [(0.3, 1.8), (0.1, 5.0), (0.2, 2.75)] {

@@ -13,6 +13,12 @@ fn counts_become_quantities_and_saturate() {
 }
 
 #[test]
+fn quantities_are_shown_by_name_and_in_si() {
+    assert_eq!(format!("{:?}", Torque::from_nm(-0.25)), "Torque(-0.25)");
+    assert_eq!(format!("{:?}", Radians::from_rad(0.5)), "Radians(0.5)");
+}
+
+#[test]
 fn quantities_become_counts_toward_zero() {
     let count = Torque::from_nm(0.3);
     for (nm, counts) in [

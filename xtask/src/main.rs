@@ -61,17 +61,19 @@ enum Command {
         #[command(subcommand)]
         what: Option<Bench>,
     },
-    /// Line and region coverage of the core by its tests: all of it, or exit code 1.
+    /// Line, region and branch coverage of the core by its tests: all lines and branches, or exit code 1.
     Coverage,
-    /// A defect in every expression of what decides or guards a torque (needs cargo-mutants); prints
-    /// those that no test notices.
+    /// A defect in every expression of the core (needs cargo-mutants; an hour or more). One that no test notices is
+    /// printed, and is exit code 1; what cannot be noticed is listed in .cargo/mutants.toml with its reason.
     Mutants {
-        /// Only in lines that differ from this commit, branch or tag, for minutes instead of hours; then a survivor is an
-        /// error.
+        /// Only these files, such as ecu/receivers.rs
+        #[arg(value_name = "FILE")]
+        files: Vec<String>,
+        /// Only in lines that differ from this commit, branch or tag
         #[arg(long, value_name = "BASE")]
         in_diff: Option<String>,
         /// Instead, the defects made by hand of core/tests/mutants.toml: exit code 1 if one is not noticed.
-        #[arg(long, conflicts_with = "in_diff")]
+        #[arg(long, conflicts_with_all = ["in_diff", "files"])]
         by_hand: bool,
     },
     /// Every board: builds without a warning, no panic and no float in its torque path; flash, RAM, stack and
@@ -139,7 +141,7 @@ fn main() -> ExitCode {
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
         Command::Mutants { by_hand: true, .. } => by_hand::run(),
-        Command::Mutants { in_diff, .. } => evidence::mutants(in_diff.as_deref()),
+        Command::Mutants { files, in_diff, .. } => evidence::mutants(&files, in_diff.as_deref()),
         Command::Boards { bless } => boards::check(bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
