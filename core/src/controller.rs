@@ -209,8 +209,8 @@ impl Words for Small {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        self.word().is_inverse_of(&other.word())
+    fn agreement(&self, other: &Self) -> u32 {
+        self.word().agreement(&other.word())
     }
 }
 

@@ -86,11 +86,11 @@ impl<T: Words> Words for Slot<T> {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        self.head().is_inverse_of(&other.head())
-            & self.at.is_inverse_of(&other.at)
-            & self.period.is_inverse_of(&other.period)
-            & self.value.is_inverse_of(&other.value)
+    fn agreement(&self, other: &Self) -> u32 {
+        self.head().agreement(&other.head())
+            & self.at.agreement(&other.at)
+            & self.period.agreement(&other.period)
+            & self.value.agreement(&other.value)
     }
 }
 
@@ -183,9 +183,9 @@ impl Words for Refused {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
+    fn agreement(&self, other: &Self) -> u32 {
         let [mine, others] = [self, other].map(|refused| word([refused.is_there, refused.moved]));
-        mine.is_inverse_of(&others) & self.sample.is_inverse_of(&other.sample)
+        mine.agreement(&others) & self.sample.agreement(&other.sample)
     }
 }
 
@@ -278,9 +278,9 @@ impl Words for RequestWords {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
+    fn agreement(&self, other: &Self) -> u32 {
         let [mine, others] = [self, other].map(|request| word([request.engage, request.probe]));
-        mine.is_inverse_of(&others) & self.authority.is_inverse_of(&other.authority)
+        mine.agreement(&others) & self.authority.agreement(&other.authority)
     }
 }
 
