@@ -268,6 +268,9 @@ pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
     history: History,
     past: Past,
+    /// The lane sample in use has not gone through its check. Not kept twice: a flip costs one check, whose sums the
+    /// next one makes up for, or brings one more of the same sample, which changes nothing.
+    lane_is_due: bool,
 }
 
 impl ControllerState {
@@ -288,6 +291,7 @@ impl ControllerState {
             memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),
             past: Past::new(),
+            lane_is_due: false,
         }
     }
 
@@ -356,7 +360,7 @@ impl Controller {
         let Some(config) = self.config.get() else {
             return state.lose_memory(now);
         };
-        let (history, past) = (&mut state.history, &mut state.past);
+        let (history, past, lane_is_due) = (&mut state.history, &mut state.past, &mut state.lane_is_due);
         let command = state.memory.change(|memory| {
             let step = Step {
                 config,
@@ -367,7 +371,7 @@ impl Controller {
                 injection,
             };
             memory.last_step = now;
-            step.run(memory, history, past)
+            step.run(memory, history, past, lane_is_due)
         });
         let Some(command) = command else {
             return state.lose_memory(now);

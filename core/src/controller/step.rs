@@ -45,8 +45,14 @@ pub(super) struct Step<'a, I> {
 }
 
 impl<I: Injection> Step<'_, I> {
-    pub(super) fn run(&self, v: &mut Memory, history: &mut History, past: &mut Past) -> Command {
-        let lost = self.look(v, past);
+    pub(super) fn run(
+        &self,
+        v: &mut Memory,
+        history: &mut History,
+        past: &mut Past,
+        lane_is_due: &mut bool,
+    ) -> Command {
+        let lost = self.look(v, past, lane_is_due);
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
@@ -80,7 +86,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
-    fn look(&self, v: &mut Memory, past: &mut Past) -> FaultSet {
+    fn look(&self, v: &mut Memory, past: &mut Past, lane_is_due: &mut bool) -> FaultSet {
         let Inputs {
             lane,
             column,
@@ -127,21 +133,21 @@ impl<I: Injection> Step<'_, I> {
         }
         v.age.lane = self.age(lane, v.age.lane);
         match lane {
-            Input::New(sample) => {
-                if self.inputs.line_moved {
-                    v.plausibility.forget_lane();
-                    past.forget_line();
-                    v.law.relocate(*sample);
-                }
-                let plausible = checks.lane(&mut v.plausibility, past, self.now, *sample);
-                implausible.set(!plausible, Fault::LaneImplausible);
+            Input::New(sample) if self.inputs.line_moved => {
+                v.plausibility.forget_lane();
+                past.forget_line();
+                v.law.relocate(*sample);
             }
-            Input::Held(_) => {}
+            Input::New(_) | Input::Held(_) => {}
             Input::Lost => {
                 v.plausibility.forget_lane();
                 past.forget_line();
                 implausible.set(false, Fault::LaneImplausible);
             }
+        }
+        if let Some(sample) = Self::lane_to_check(lane, lane_is_due) {
+            let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
+            implausible.set(!plausible, Fault::LaneImplausible);
         }
         self.make_up_for_age(v, past);
         v.age.request = self.age(request, v.age.request);
@@ -160,6 +166,13 @@ impl<I: Injection> Step<'_, I> {
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
         v.implausible = implausible.bits();
         lost
+    }
+
+    /// The sample whose check has come: that of the step before. A step that takes a new sample has work enough; where
+    /// there is one in every step, every other one is checked, for as much time as both.
+    fn lane_to_check(lane: &Input<LaneSample>, is_due: &mut bool) -> Option<LaneSample> {
+        let was_due = core::mem::replace(is_due, matches!(lane, Input::New(_)) && !*is_due);
+        lane.value().filter(|_| was_due)
     }
 
     /// What the vehicle turned since the lane sample in use, if that was old when it came.
