@@ -21,7 +21,7 @@ use crate::injection::{Injection, NoInjection};
 use crate::modes::Mode;
 use crate::monitor::{Evidence, Monitor, MonitorState};
 use crate::quantity::{Instant, Torque};
-use crate::redundant::{Redundant, words};
+use crate::redundant::{Redundant, are_whole, words};
 use receivers::{Accepted, Receivers};
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -176,11 +176,22 @@ impl Ecu {
         }
         let mut whole = true;
         let mut inputs = self.receivers.take(now, &mut whole);
-        let memory = self.memory.get().filter(|_| whole);
-        let found = memory.map(|v| (v.applied, v.faults, v.last_step, v.steps));
+        let both = are_whole(&self.memory, &self.monitor);
+        let memory = if both {
+            Some(self.memory.value())
+        } else {
+            self.memory.get()
+        };
+        let found = memory
+            .filter(|_| whole)
+            .map(|v| (v.applied, v.faults, v.last_step, v.steps));
         let (applied, faults, last_step, steps) = found.unwrap_or_else(|| self.begin_anew(now, &mut inputs));
         // One whose limits are damaged permits nothing.
-        let monitor = self.monitor.get();
+        let monitor = if both {
+            Some(self.monitor.value())
+        } else {
+            self.monitor.get()
+        };
         let mut faults = FaultSet::from_bits(faults);
         let motor = self.receivers.actuator.judge(applied);
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);

@@ -40,8 +40,14 @@ words! {
         torque_mnm: i32,
         driver_mnm: i32,
         lane: Lane,
-        /// An older lane sample, for rates.
+        /// Since the lane sample was true.
+        age_us: i32,
+        /// An older lane sample, for rates, and how much older it is.
         before: Lane,
+        older_us: i32,
+        /// What its position asks for, and what its rates ask for beside.
+        position_mnm: i32,
+        rate_mnm: i32,
         /// For how long there may still be a probe.
         probe_left_us: i32,
         /// How many steps the torque was outside its band and not falling, since it was inside.
@@ -56,8 +62,6 @@ words! {
     struct Lane {
         e_y_mm: i32,
         e_theta_urad: i32,
-        /// Since it was true.
-        age_us: i32,
     }
 }
 
@@ -108,13 +112,15 @@ impl MonitorState {
         lane: Lane {
             e_y_mm: 0,
             e_theta_urad: 0,
-            age_us: 0,
         },
+        age_us: 0,
         before: Lane {
             e_y_mm: 0,
             e_theta_urad: 0,
-            age_us: 0,
         },
+        older_us: 0,
+        position_mnm: 0,
+        rate_mnm: 0,
         probe_left_us: 0,
         astray_ms: 0,
         withdrawn: 0,
@@ -129,7 +135,9 @@ impl Monitor {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        state.observe(evidence, elapsed_us);
+        if state.observe(evidence, elapsed_us) {
+            self.weigh(state);
+        }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
         let changes_sign = (torque ^ state.torque_mnm).is_negative();
@@ -184,49 +192,40 @@ impl Monitor {
         self.limit_mnm.saturating_sub(shrink).max(0)
     }
 
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "the span is at least a millisecond"
-    )]
+    /// What a new lane sample asks for.
+    fn weigh(&self, state: &mut MonitorState) {
+        let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
+        let (e_y_mmps, e_theta_urps) = state.rates();
+        let asked = |per_length: i32, length: i32, per_angle: i32, angle: i32| {
+            per_length
+                .saturating_mul(length)
+                .saturating_div(1000)
+                .saturating_add(per_angle.saturating_mul(angle / 100) / 10_000)
+        };
+        state.position_mnm = asked(per_m, state.lane.e_y_mm, per_rad, state.lane.e_theta_urad);
+        state.rate_mnm = asked(per_mps, e_y_mmps, per_radps, e_theta_urps);
+    }
+
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
-        if state.lane.age_us > OLDEST_LANE_US && torque != 0 {
+        if state.age_us > OLDEST_LANE_US && torque != 0 {
             return false;
         }
-        let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
-        let (lane, before) = (&state.lane, &state.before);
-        let span_ms = (before.age_us.saturating_sub(lane.age_us) / 1000).max(1);
-        let e_y_mmps = lane
-            .e_y_mm
-            .saturating_sub(before.e_y_mm)
-            .saturating_mul(1000)
-            .saturating_div(span_ms);
-        let e_theta_urps = lane
-            .e_theta_urad
-            .saturating_sub(before.e_theta_urad)
-            .saturating_div(span_ms)
-            .saturating_mul(1000);
-        let position = per_m
-            .saturating_mul(lane.e_y_mm)
-            .saturating_div(1000)
-            .saturating_add(per_rad.saturating_mul(lane.e_theta_urad / 100) / 10_000);
-        let rate = per_mps
-            .saturating_mul(e_y_mmps)
-            .saturating_div(1000)
-            .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
         // What an old sample has become since, at most: the errors went on at their rates.
-        let late_ms = lane.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
+        let late_ms = state.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
         let position = if late_ms == 0 {
-            position
+            state.position_mnm
         } else {
+            let [per_m, per_rad, ..] = self.gains_mnm;
+            let (e_y_mmps, e_theta_urps) = state.rates();
             let carried = per_m
                 .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
                 .saturating_div(1000)
                 .saturating_add(
                     per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
                 );
-            position.saturating_add(carried)
+            state.position_mnm.saturating_add(carried)
         };
-        let both = position.saturating_add(rate);
+        let both = position.saturating_add(state.rate_mnm);
         let probe = if state.probe_left_us > 0 {
             self.probe_mnm
         } else {
@@ -257,7 +256,7 @@ impl Monitor {
             1 => grown = torque,
             2 => mode = STANDBY,
             3 => state.driver_mnm = -20_000,
-            4 => state.lane.age_us = 1_000_000,
+            4 => state.age_us = 1_000_000,
             5 => (torque, grown) = (0, -400),
             _ => (torque, state.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
         }
@@ -274,24 +273,27 @@ impl Monitor {
 }
 
 impl MonitorState {
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) {
-        self.lane.age_us = self.lane.age_us.saturating_add(elapsed_us);
-        self.before.age_us = self.before.age_us.saturating_add(elapsed_us);
+    /// Takes what came; `true` for a new lane sample.
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
+        self.age_us = self.age_us.saturating_add(elapsed_us);
         if let Some(bytes) = evidence.lane {
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
-                age_us: (field(bytes, 46, 10) & 0x1FF)
-                    .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
-                    .saturating_mul(100),
             };
+            let age_us = (field(bytes, 46, 10) & 0x1FF)
+                .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
+                .saturating_mul(100);
+            let apart_us = self.age_us.saturating_sub(age_us);
             // After a gap there is no rate.
-            if self.lane.age_us > OLDEST_LANE_US {
-                self.before = new;
-            } else if self.before.age_us.saturating_sub(self.lane.age_us) > RATE_SPAN_US {
-                self.before = self.lane;
+            if self.age_us > OLDEST_LANE_US {
+                (self.before, self.older_us) = (new, 0);
+            } else if self.older_us > RATE_SPAN_US {
+                (self.before, self.older_us) = (self.lane, apart_us);
+            } else {
+                self.older_us = self.older_us.saturating_add(apart_us);
             }
-            self.lane = new;
+            (self.lane, self.age_us) = (new, age_us);
         }
         if let Some(bytes) = evidence.column {
             self.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
@@ -300,6 +302,28 @@ impl MonitorState {
         if evidence.demand.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
             self.probe_left_us = PROBE_END_US;
         }
+        evidence.lane.is_some()
+    }
+
+    /// How fast the lane errors move, mm/s and urad/s.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the span is at least a millisecond"
+    )]
+    fn rates(&self) -> (i32, i32) {
+        let (lane, before) = (&self.lane, &self.before);
+        let span_ms = (self.older_us / 1000).max(1);
+        let e_y_mmps = lane
+            .e_y_mm
+            .saturating_sub(before.e_y_mm)
+            .saturating_mul(1000)
+            .saturating_div(span_ms);
+        let e_theta_urps = lane
+            .e_theta_urad
+            .saturating_sub(before.e_theta_urad)
+            .saturating_div(span_ms)
+            .saturating_mul(1000);
+        (e_y_mmps, e_theta_urps)
     }
 }
 

@@ -60,6 +60,15 @@ impl<T: Words, const N: usize> Words for [T; N] {
     }
 }
 
+/// Bytes of a block.
+const BLOCK: usize = 24;
+
+/// Whether a field ends a block of words that are compared without a branch. A block fits into the registers of a
+/// 32-bit core, which then loads two words and more at once.
+pub(crate) const fn ends_block(offset: usize, size: usize) -> bool {
+    offset / BLOCK != offset.saturating_add(size) / BLOCK
+}
+
 /// The loads and stores of a struct stay together, so that a 32-bit core takes two words and more at once. No
 /// instruction itself.
 #[inline(always)]
@@ -87,7 +96,9 @@ macro_rules! words {
                 let mut all = u32::MAX;
                 $(
                     all &= $crate::redundant::Words::agreement(&self.$field, &other.$field);
-                    if size_of::<$type>() > 8 && all != u32::MAX {
+                    if $crate::redundant::ends_block(core::mem::offset_of!(Self, $field), size_of::<$type>())
+                        && all != u32::MAX
+                    {
                         return 0;
                     }
                 )*
@@ -107,6 +118,13 @@ macro_rules! words {
     };
 }
 pub(crate) use words;
+
+/// Whether two values are whole. A function of its own: else the words loaded here stay in use behind it, and most of
+/// them on the stack.
+#[inline(never)]
+pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
+    a.value.agreement(&a.inverted) == u32::MAX && b.value.agreement(&b.inverted) == u32::MAX
+}
 
 /// Bytes of a value that is compared and copied where it is used.
 pub(crate) const SMALL: usize = 32;
@@ -132,26 +150,10 @@ impl<T: Words> Redundant<T> {
     /// The value, if both copies still agree.
     #[must_use]
     pub fn get(&self) -> Option<&T> {
-        let whole = if size_of::<T>() > SMALL {
-            self.is_whole_apart()
-        } else {
-            self.is_whole()
-        };
-        whole.then_some(&self.value)
-    }
-
-    #[inline(always)]
-    fn is_whole(&self) -> bool {
         // Without the black box the compiler may prove, across the loop that owns this value, that the
         // copies always agree, and drop the comparison. Around the reference, it costs no copy.
         let Self { value, inverted } = black_box(self);
-        value.agreement(inverted) == u32::MAX
-    }
-
-    /// A function of its own: else the words loaded here stay in use behind it, and most of them on the stack.
-    #[inline(never)]
-    fn is_whole_apart(&self) -> bool {
-        self.is_whole()
+        (value.agreement(inverted) == u32::MAX).then_some(value)
     }
 
     /// The copy anew, likewise.
@@ -182,6 +184,23 @@ impl<T: Words> Redundant<T> {
         let result = change(&mut self.value);
         self.seal();
         result
+    }
+
+    /// The value, which was found whole in this step.
+    pub(crate) fn value(&self) -> &T {
+        &self.value
+    }
+
+    /// The value, which was found whole in this step; what is changed has to be sealed.
+    pub(crate) fn value_mut(&mut self) -> &mut T {
+        &mut self.value
+    }
+
+    /// Copies a part that was changed.
+    #[inline(always)]
+    pub(crate) fn seal_part<P: Words>(&mut self, part: impl Fn(&mut T) -> &mut P) {
+        *part(&mut self.inverted) = part(&mut self.value).complement();
+        keep_together();
     }
 
     /// Changes a part in both copies and leaves the rest as it is, what a flip made of it too.
