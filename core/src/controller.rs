@@ -210,6 +210,14 @@ impl Changed {
     }
 }
 
+/// The samples in use that have not gone through their checks. Not kept twice: a flip costs one check, whose sums the
+/// next one makes up for, or brings one more of the same sample, which changes nothing but how long it counts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Due {
+    lane: bool,
+    column: bool,
+}
+
 /// What is small shares a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C, align(4))]
@@ -301,9 +309,7 @@ pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
     history: History,
     past: Past,
-    /// The lane sample in use has not gone through its check. Not kept twice: a flip costs one check, whose sums the
-    /// next one makes up for, or brings one more of the same sample, which changes nothing.
-    lane_is_due: bool,
+    due: Due,
 }
 
 impl ControllerState {
@@ -324,7 +330,7 @@ impl ControllerState {
             memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),
             past: Past::new(),
-            lane_is_due: false,
+            due: Due::default(),
         }
     }
 
@@ -403,7 +409,7 @@ impl Controller {
         memory.hot.last_step = now;
         let mut changed = Changed::NOTHING;
         let (history, past) = (&mut state.history, &mut state.past);
-        let command = step.run(memory, &mut changed, history, past, &mut state.lane_is_due);
+        let command = step.run(memory, &mut changed, history, past, &mut state.due);
         seal(&mut state.memory, changed);
         state.history.push(now, without(command.torque, command.probe));
         command

@@ -101,6 +101,8 @@ words! {
         is_known: u32,
         at: Instant,
         wheel: Radians,
+        /// The wheel's angle at the last check.
+        checked: Radians,
         sum: AngularImpulse,
         /// The torque that the column lacks in the long run.
         bias: Torque,
@@ -132,6 +134,7 @@ impl PlausibilityState {
             is_known: 0,
             at: Instant::from_us(0),
             wheel: Radians::ZERO,
+            checked: Radians::ZERO,
             sum: AngularImpulse::ZERO,
             bias: Torque::ZERO,
         },
@@ -145,6 +148,11 @@ impl PlausibilityState {
         } else {
             TurningRate::from_wide(product(self.motion.turning_gain.bits(), self.column.wheel.bits()))
         }
+    }
+
+    /// Takes a wheel angle that is not checked yet.
+    pub(crate) fn steer(&mut self, wheel: Radians) {
+        self.column.wheel = wheel;
     }
 
     /// The speed in use.
@@ -283,7 +291,7 @@ impl Plausibility {
         wheel: Radians,
         applied: Torque,
     ) -> bool {
-        let moved = i64::from(wheel.bits()).saturating_sub(i64::from(state.column.wheel.bits()));
+        let moved = i64::from(wheel.bits()).saturating_sub(i64::from(state.column.checked.bits()));
         let dt = now.since(state.column.at);
         if state.column.is_known != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
@@ -318,7 +326,8 @@ impl Plausibility {
             );
             state.column.sum = AngularImpulse::from_wide(leak(state.column.sum.bits(), change, dt));
         }
-        (state.column.is_known, state.column.at, state.column.wheel) = (1, now, wheel);
+        (state.column.is_known, state.column.at) = (1, now);
+        (state.column.wheel, state.column.checked) = (wheel, wheel);
         i64::from(state.column.sum.bits()).abs() <= i64::from(self.column_margin.bits())
     }
 

@@ -1,7 +1,7 @@
 //! One step of the controller: the one place that sees the mode machine, the plausibility checks, the law, the
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
-use super::{Changed, Command, Input, Inputs, Memory, READY, Request};
+use super::{Changed, Command, Due, Input, Inputs, Memory, READY, Request};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
@@ -51,10 +51,10 @@ impl<I: Injection> Step<'_, I> {
         changed: &mut Changed,
         history: &mut History,
         past: &mut Past,
-        lane_is_due: &mut bool,
+        due: &mut Due,
     ) -> Command {
         let fast_enough = self.is_fast_enough();
-        let lost = self.look(v, changed, fast_enough, past, lane_is_due);
+        let lost = self.look(v, changed, fast_enough, past, due);
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
@@ -97,7 +97,7 @@ impl<I: Injection> Step<'_, I> {
         changed: &mut Changed,
         fast_enough: Option<bool>,
         past: &mut Past,
-        lane_is_due: &mut bool,
+        due: &mut Due,
     ) -> FaultSet {
         let Inputs {
             lane,
@@ -135,14 +135,7 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(Changed::HEARD);
                 changed.add(Changed::COLUMN);
                 v.hot.hands.feel(c.driver_torque);
-                let plausible = checks.column(
-                    &mut v.plausibility,
-                    self.now,
-                    c.driver_torque,
-                    c.wheel_angle,
-                    self.applied,
-                );
-                implausible.set(!plausible, Fault::ColumnImplausible);
+                v.plausibility.steer(c.wheel_angle);
             }
             Input::Held(_) => {}
             Input::Lost => {
@@ -171,7 +164,18 @@ impl<I: Injection> Step<'_, I> {
                 implausible.set(false, Fault::LaneImplausible);
             }
         }
-        if let Some(sample) = Self::lane_to_check(lane, lane_is_due) {
+        if let Some(c) = to_check(column, &mut due.column) {
+            changed.add(Changed::COLUMN);
+            let plausible = checks.column(
+                &mut v.plausibility,
+                self.now,
+                c.driver_torque,
+                c.wheel_angle,
+                self.applied,
+            );
+            implausible.set(!plausible, Fault::ColumnImplausible);
+        }
+        if let Some(sample) = to_check(lane, &mut due.lane) {
             changed.add(Changed::LANE);
             let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
             implausible.set(!plausible, Fault::LaneImplausible);
@@ -196,13 +200,6 @@ impl<I: Injection> Step<'_, I> {
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
         v.hot.implausible = implausible.bits();
         lost
-    }
-
-    /// The sample whose check has come: that of the step before. A step that takes a new sample has work enough; where
-    /// there is one in every step, every other one is checked, for as much time as both.
-    fn lane_to_check(lane: &Input<LaneSample>, is_due: &mut bool) -> Option<LaneSample> {
-        let was_due = core::mem::replace(is_due, matches!(lane, Input::New(_)) && !*is_due);
-        lane.value().filter(|_| was_due)
     }
 
     /// What the vehicle turned since the lane sample in use, if that was old when it came.
@@ -411,6 +408,13 @@ impl<I: Injection> Step<'_, I> {
         let share = saturate(product(authority.bits(), v.share.bits()));
         Torque::from_wide(product(share, asked.bits()))
     }
+}
+
+/// The value whose check has come: that of the step before. A step that takes a new value has work enough; where there is
+/// one in every step, every other one is checked, for as much time as both.
+fn to_check<T: Copy>(input: &Input<T>, is_due: &mut bool) -> Option<T> {
+    let was_due = core::mem::replace(is_due, matches!(input, Input::New(_)) && !*is_due);
+    input.value().filter(|_| was_due)
 }
 
 fn with(guidance: Torque, probe: Option<Torque>) -> Torque {
