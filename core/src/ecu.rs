@@ -54,24 +54,33 @@ pub struct Step {
 words! {
     /// What the ECU must not lose to a flipped bit, beside its receivers.
     struct Memory {
-        /// The torque applied since the last step.
+        step: LastStep,
+        monitor: MonitorState,
+    }
+}
+
+words! {
+    /// What every step changes.
+    struct LastStep {
+        /// The torque applied since.
         applied: Torque,
         /// [`Fault`] bits found outside the controller.
         faults: u32,
-        last_step: Instant,
+        at: Instant,
         /// Steps, which give the counters of the frames and their turns.
-        steps: u32,
-        monitor: MonitorState,
+        count: u32,
     }
 }
 
 impl Memory {
     fn new(faults: FaultSet, now: Instant) -> Self {
         Self {
-            applied: Torque::ZERO,
-            faults: faults.bits(),
-            last_step: now,
-            steps: 0,
+            step: LastStep {
+                applied: Torque::ZERO,
+                faults: faults.bits(),
+                at: now,
+                count: 0,
+            },
             monitor: MonitorState::NEW,
         }
     }
@@ -174,25 +183,23 @@ impl Ecu {
         if injection.lane_never_ages() {
             self.receivers.renew_lane(now);
         }
-        let mut whole = true;
-        let mut inputs = self.receivers.take(now, &mut whole);
         let both = are_whole(&self.memory, &self.monitor);
         let memory = if both {
             Some(self.memory.value())
         } else {
             self.memory.get()
         };
-        let found = memory
-            .filter(|_| whole)
-            .map(|v| (v.applied, v.faults, v.last_step, v.steps));
-        let (applied, faults, last_step, steps) = found.unwrap_or_else(|| self.begin_anew(now, &mut inputs));
+        let last = memory.filter(|_| self.receivers.is_whole()).map(|v| v.step);
+        let mut inputs = self.receivers.take(now);
+        let last = last.unwrap_or_else(|| self.begin_anew(now, &mut inputs));
+        let (applied, steps) = (last.applied, last.count);
         // One whose limits are damaged permits nothing.
         let monitor = if both {
             Some(self.monitor.value())
         } else {
             self.monitor.get()
         };
-        let mut faults = FaultSet::from_bits(faults);
+        let mut faults = FaultSet::from_bits(last.faults);
         let motor = self.receivers.actuator.judge(applied);
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
@@ -220,17 +227,22 @@ impl Ecu {
             column: accepted.column.as_ref(),
             demand: accepted.demand.as_ref(),
             guidance: guidance.bytes(),
-            elapsed_us: now.since(last_step).us(),
+            elapsed_us: now.since(last.at).us(),
         };
-        let permitted = self.memory.amend(|v| {
-            let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
-            faults.insert_if(!permitted, Fault::Monitor);
-            v.faults = faults.bits();
-            v.applied = if permitted { command.torque } else { Torque::ZERO };
-            v.last_step = now;
-            v.steps = steps.wrapping_add(1);
-            permitted
-        });
+        let v = self.memory.value_mut();
+        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
+        faults.insert_if(!permitted, Fault::Monitor);
+        v.step = LastStep {
+            applied: if permitted { command.torque } else { Torque::ZERO },
+            faults: faults.bits(),
+            at: now,
+            count: steps.wrapping_add(1),
+        };
+        self.memory.seal_part(|v| &mut v.step);
+        self.memory.seal_part(|v| &mut v.monitor.now);
+        if evidence.lane.is_some() {
+            self.memory.seal_part(|v| &mut v.monitor.picture);
+        }
         // The next frames are for the next step.
         self.receivers.accepted = Accepted::NONE;
         if !permitted {
@@ -274,7 +286,7 @@ impl Ecu {
     /// memory fault, which latches. Returns what a step takes from its memory.
     #[cold]
     #[inline(never)]
-    fn begin_anew(&mut self, now: Instant, inputs: &mut Inputs) -> (Torque, u32, Instant, u32) {
+    fn begin_anew(&mut self, now: Instant, inputs: &mut Inputs) -> LastStep {
         *inputs = Inputs::LOST;
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
@@ -282,7 +294,7 @@ impl Ecu {
         self.receivers = Receivers::new(ReceiverState::NEW, now);
         let v = Memory::new(faults, now);
         self.memory.set(v);
-        (v.applied, v.faults, v.last_step, v.steps)
+        v.step
     }
 
     #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]

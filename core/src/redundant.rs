@@ -91,7 +91,7 @@ macro_rules! words {
                 Self { $($field: $crate::redundant::Words::map_words(self.$field, change),)* }
             }
 
-            #[inline]
+            #[inline(always)]
             fn agreement(&self, other: &Self) -> u32 {
                 let mut all = u32::MAX;
                 $(
@@ -123,7 +123,7 @@ pub(crate) use words;
 /// them on the stack.
 #[inline(never)]
 pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
-    a.value.agreement(&a.inverted) == u32::MAX && b.value.agreement(&b.inverted) == u32::MAX
+    a.agrees() && b.agrees()
 }
 
 /// Bytes of a value that is compared and copied where it is used.
@@ -152,8 +152,14 @@ impl<T: Words> Redundant<T> {
     pub fn get(&self) -> Option<&T> {
         // Without the black box the compiler may prove, across the loop that owns this value, that the
         // copies always agree, and drop the comparison. Around the reference, it costs no copy.
-        let Self { value, inverted } = black_box(self);
-        (value.agreement(inverted) == u32::MAX).then_some(value)
+        let guarded = black_box(self);
+        guarded.agrees().then_some(&guarded.value)
+    }
+
+    /// Whether the copies agree; where the compiler cannot know that they do.
+    #[inline(always)]
+    pub(crate) fn agrees(&self) -> bool {
+        self.value.agreement(&self.inverted) == u32::MAX
     }
 
     /// The copy anew, likewise.
