@@ -34,15 +34,6 @@ pub enum Input<T> {
 }
 
 impl<T: Copy> Input<T> {
-    /// The same of another value.
-    pub(crate) fn map<U>(self, change: impl FnOnce(T) -> U) -> Input<U> {
-        match self {
-            Self::Lost => Input::Lost,
-            Self::Held(value) => Input::Held(change(value)),
-            Self::New(value) => Input::New(change(value)),
-        }
-    }
-
     /// The value, new or held.
     #[must_use]
     pub const fn value(&self) -> Option<T> {
@@ -124,15 +115,18 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Nothing heard.
-    pub(crate) const LOST: Self = Self {
-        lane: Input::Lost,
-        column: Input::Lost,
-        motion: Input::Lost,
-        request: Input::Lost,
-        line_moved: false,
-        faults: FaultSet::NONE,
-    };
+    /// Nothing heard. No constant, which a step would copy whole.
+    #[inline(always)]
+    pub(crate) fn lost() -> Self {
+        Self {
+            lane: Input::Lost,
+            column: Input::Lost,
+            motion: Input::Lost,
+            request: Input::Lost,
+            line_moved: false,
+            faults: FaultSet::NONE,
+        }
+    }
 }
 
 /// What the controller decides every millisecond.

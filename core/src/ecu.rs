@@ -184,22 +184,22 @@ impl Ecu {
             self.receivers.renew_lane(now);
         }
         let both = are_whole(&self.memory, &self.monitor);
-        let memory = if both {
-            Some(self.memory.value())
+        let mut inputs = Inputs::lost();
+        if (both || self.memory.get().is_some()) && self.receivers.is_whole() {
+            self.receivers.take(now, &mut inputs);
         } else {
-            self.memory.get()
-        };
-        let last = memory.filter(|_| self.receivers.is_whole()).map(|v| v.step);
-        let mut inputs = self.receivers.take(now);
-        let last = last.unwrap_or_else(|| self.begin_anew(now, &mut inputs));
+            self.begin_anew(now);
+        }
+        let last = &self.memory.value().step;
         let (applied, steps) = (last.applied, last.count);
+        let elapsed_us = now.since(last.at).us();
+        let mut faults = FaultSet::from_bits(last.faults);
         // One whose limits are damaged permits nothing.
         let monitor = if both {
             Some(self.monitor.value())
         } else {
             self.monitor.get()
         };
-        let mut faults = FaultSet::from_bits(last.faults);
         let motor = self.receivers.actuator.judge(applied);
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
@@ -227,7 +227,7 @@ impl Ecu {
             column: accepted.column.as_ref(),
             demand: accepted.demand.as_ref(),
             guidance: guidance.bytes(),
-            elapsed_us: now.since(last.at).us(),
+            elapsed_us,
         };
         let v = self.memory.value_mut();
         let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
@@ -283,18 +283,15 @@ impl Ecu {
     }
 
     /// The redundant state is damaged: nothing of it can be used. What comes in its place knows nothing but the
-    /// memory fault, which latches. Returns what a step takes from its memory.
+    /// memory fault, which latches.
     #[cold]
     #[inline(never)]
-    fn begin_anew(&mut self, now: Instant, inputs: &mut Inputs) -> LastStep {
-        *inputs = Inputs::LOST;
+    fn begin_anew(&mut self, now: Instant) {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         self.state = ControllerState::new(now);
         self.receivers = Receivers::new(ReceiverState::NEW, now);
-        let v = Memory::new(faults, now);
-        self.memory.set(v);
-        v.step
+        self.memory.set(Memory::new(faults, now));
     }
 
     #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]

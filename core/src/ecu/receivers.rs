@@ -11,7 +11,7 @@ use crate::bus::messages::{
 };
 use crate::bus::{Frame, Reject};
 use crate::controller::{Column, Input, Inputs, Motion, Request};
-use crate::faults::{Fault, FaultSet};
+use crate::faults::Fault;
 use crate::law::LaneSample;
 use crate::plausibility::{is_another_line, lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
@@ -145,19 +145,19 @@ impl<T: Words> Slot<T> {
 /// What a step sees of a slot that is whole. A stale value is dropped, so that no instant outlives a wrap of the clock, and
 /// its sender has to be trusted anew. Only what changes is written: in most steps nothing.
 #[inline(always)]
-fn take<T: Words>(guarded: &mut Redundant<Slot<T>>, now: Instant) -> Input<T> {
+fn take<T: Words, U: From<T>>(guarded: &mut Redundant<Slot<T>>, now: Instant, seen: &mut Input<U>) {
     let slot = guarded.value();
     let (state, value) = (slot.state, slot.value);
     if state == LOST {
-        Input::Lost
-    } else if now.since(slot.at) > slot.timeout() {
+        return;
+    }
+    if now.since(slot.at) > slot.timeout() {
         guarded.amend(|slot| (slot.state, slot.e2e) = (LOST, ReceiverState::NEW));
-        Input::Lost
     } else if state == HELD {
-        Input::Held(value)
+        *seen = Input::Held(value.into());
     } else {
         guarded.put(|slot| &mut slot.state, HELD);
-        Input::New(value)
+        *seen = Input::New(value.into());
     }
 }
 
@@ -428,38 +428,30 @@ impl Receivers {
             && self.request.agrees()
     }
 
-    /// What a step sees, if [`Receivers::is_whole`]; else any values.
+    /// What a step sees of receivers that are whole, into [`Inputs::lost`].
     #[inline(always)]
-    pub(super) fn take(&mut self, now: Instant) -> Inputs {
-        let lane = take(&mut self.lane, now);
-        let column = take(&mut self.column, now);
-        let motion = take(&mut self.motion, now);
-        let request = take(&mut self.request, now);
-        let line_moved = self.refused.value().moved != 0;
-        if line_moved {
+    pub(super) fn take(&mut self, now: Instant, inputs: &mut Inputs) {
+        take(&mut self.lane, now, &mut inputs.lane);
+        take(&mut self.column, now, &mut inputs.column);
+        take(&mut self.motion, now, &mut inputs.motion);
+        take(&mut self.request, now, &mut inputs.request);
+        if self.refused.value().moved != 0 {
             self.refused.put(|refused| &mut refused.moved, 0);
+            inputs.line_moved = true;
         }
-        let mut faults = FaultSet::NONE;
+        let faults = &mut inputs.faults;
         // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
-        if lane == Input::Lost {
+        if inputs.lane == Input::Lost {
             let doubt = self.lane.value().doubt;
             faults.insert_if(doubt == INVALID, Fault::LaneInvalid);
             faults.insert_if(doubt == STEP, Fault::LaneStep);
         }
-        if motion == Input::Lost {
+        if inputs.motion == Input::Lost {
             faults.insert_if(self.motion.value().doubt == STEP, Fault::SpeedStep);
         }
         if self.foreign > 0 {
             self.foreign = self.foreign.saturating_sub(1);
             faults.insert(Fault::OwnIdentifier);
-        }
-        Inputs {
-            lane,
-            column,
-            motion,
-            line_moved,
-            request: request.map(Request::from),
-            faults,
         }
     }
 }
