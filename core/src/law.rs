@@ -208,6 +208,7 @@ impl Law {
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two
     /// `i32` times 10^6 times 2^4 gives 2^57 too: the sum cannot overflow.
+    #[inline(always)]
     fn filter(&self, rate: i32, from: i32, to: i32, dt: Micros) -> i32 {
         let tau = i64::from(self.tau);
         // 2^8 for the format of tau, 2^-4 from the errors' 24 fractional bits to the rates' 20.

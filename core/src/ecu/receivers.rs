@@ -88,6 +88,7 @@ impl<T: Words> Words for Slot<T> {
         }
     }
 
+    #[inline(always)]
     fn agreement(&self, other: &Self) -> u32 {
         self.head().agreement(&other.head())
             & self.at.agreement(&other.at)
@@ -181,6 +182,7 @@ impl Words for Refused {
         }
     }
 
+    #[inline(always)]
     fn agreement(&self, other: &Self) -> u32 {
         let [mine, others] = [self, other].map(|refused| word([refused.is_there, refused.moved]));
         mine.agreement(&others) & self.sample.agreement(&other.sample)
@@ -276,6 +278,7 @@ impl Words for RequestWords {
         }
     }
 
+    #[inline(always)]
     fn agreement(&self, other: &Self) -> u32 {
         let [mine, others] = [self, other].map(|request| word([request.engage, request.probe]));
         mine.agreement(&others) & self.authority.agreement(&other.authority)
