@@ -17,7 +17,7 @@ use crate::plausibility::PlausibilityState;
 use crate::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use crate::ramp::{History, Ramp};
-use crate::redundant::{Redundant, Words, words};
+use crate::redundant::{Redundant, Words, are_whole, words};
 use step::{Step, without};
 
 /// Inputs must be valid for this long in Standby before a request can engage.
@@ -34,15 +34,6 @@ pub enum Input<T> {
 }
 
 impl<T: Copy> Input<T> {
-    /// The same of another value.
-    pub(crate) fn map<U>(self, change: impl FnOnce(T) -> U) -> Input<U> {
-        match self {
-            Self::Lost => Input::Lost,
-            Self::Held(value) => Input::Held(change(value)),
-            Self::New(value) => Input::New(change(value)),
-        }
-    }
-
     /// The value, new or held.
     #[must_use]
     pub const fn value(&self) -> Option<T> {
@@ -124,15 +115,18 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Nothing heard.
-    pub(crate) const LOST: Self = Self {
-        lane: Input::Lost,
-        column: Input::Lost,
-        motion: Input::Lost,
-        request: Input::Lost,
-        line_moved: false,
-        faults: FaultSet::NONE,
-    };
+    /// Nothing heard. No constant, which a step would copy whole.
+    #[inline(always)]
+    pub(crate) fn lost() -> Self {
+        Self {
+            lane: Input::Lost,
+            column: Input::Lost,
+            motion: Input::Lost,
+            request: Input::Lost,
+            line_moved: false,
+            faults: FaultSet::NONE,
+        }
+    }
 }
 
 /// What the controller decides every millisecond.
@@ -153,30 +147,69 @@ pub struct Command {
 }
 
 words! {
-    /// Everything that a flipped bit must not change unseen.
+    /// Everything that a flipped bit must not change unseen. What a step may leave as it is are parts of their own.
     pub(crate) struct Memory {
+        hot: Hot,
+        /// When each input was last new: how far back its loss reaches. Guidance ends before the clock wraps.
+        heard: Heard,
+        law: LawState,
+        plausibility: PlausibilityState,
+        /// The share of the law's torque that acts at the speed in use; 0 before there is one.
+        share: Ratio,
+        ramp: Ramp,
+    }
+}
+
+words! {
+    /// What most steps change.
+    struct Hot {
         small: Small,
+        last_step: Instant,
         /// How long the inputs have been valid in Standby.
         ready: Micros,
-        /// Time since each input was last new: how far back its loss reaches.
-        age: Ages,
         /// [`Fault`] bits of inputs that were implausible when last new.
         implausible: u32,
+        /// Class C faults stay until the next power-up.
+        latched: u32,
         /// The rate of turn when the last lane sample was true, and what the vehicle has turned since.
         rate_then: TurningRate,
         turned: Radians,
-        last_step: Instant,
-        /// Class C faults stay until the next power-up.
-        latched: u32,
-        law: LawState,
-        envelope: EnvelopeState,
-        plausibility: PlausibilityState,
-        hands: HandsState,
-        ramp: Ramp,
-        probe: ProbeState,
         /// The part of the torque applied that is the probe.
         probe_applied: Torque,
+        probe: ProbeState,
+        hands: HandsState,
+        envelope: EnvelopeState,
     }
+}
+
+/// The parts beside [`Hot`] that a step changed, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Changed(u32);
+
+impl Changed {
+    const NOTHING: Self = Self(0);
+    const HEARD: Self = Self(1);
+    const LAW: Self = Self(2);
+    const MOTION: Self = Self(4);
+    const LANE: Self = Self(8);
+    const COLUMN: Self = Self(16);
+    const RAMP: Self = Self(32);
+
+    const fn add(&mut self, part: Self) {
+        self.0 |= part.0;
+    }
+
+    const fn has(self, part: Self) -> bool {
+        self.0 & part.0 != 0
+    }
+}
+
+/// The samples in use that have not gone through their checks. Not kept twice: a flip costs one check, whose sums the
+/// next one makes up for, or brings one more of the same sample, which changes nothing but how long it counts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Due {
+    lane: bool,
+    column: bool,
 }
 
 /// What is small shares a word.
@@ -209,56 +242,58 @@ impl Words for Small {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        self.word().is_inverse_of(&other.word())
+    fn agreement(&self, other: &Self) -> u32 {
+        self.word().agreement(&other.word())
     }
 }
 
 words! {
-    struct Ages {
-        lane: Micros,
-        column: Micros,
-        speeds: Micros,
-        request: Micros,
+    struct Heard {
+        lane: Instant,
+        column: Instant,
+        motion: Instant,
+        request: Instant,
     }
 }
 
 impl Memory {
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     const fn new(mode: Mode, now: Instant) -> Self {
-        const NONE: Micros = Micros::from_us(0);
         Self {
-            small: Small {
-                mode: mode as u8,
-                // A request that is high from the start is no rising edge.
-                requested: 1,
-                late: 0,
-                early: 0,
+            hot: Hot {
+                small: Small {
+                    mode: mode as u8,
+                    // A request that is high from the start is no rising edge.
+                    requested: 1,
+                    late: 0,
+                    early: 0,
+                },
+                last_step: now,
+                ready: Micros::from_us(0),
+                implausible: 0,
+                latched: 0,
+                rate_then: TurningRate::ZERO,
+                turned: Radians::ZERO,
+                probe_applied: Torque::ZERO,
+                probe: ProbeState::SILENT,
+                hands: HandsState::NEW,
+                envelope: EnvelopeState::new(now),
             },
-            ready: NONE,
-            age: Ages {
-                lane: NONE,
-                column: NONE,
-                speeds: NONE,
-                request: NONE,
+            heard: Heard {
+                lane: now,
+                column: now,
+                motion: now,
+                request: now,
             },
-            implausible: 0,
-            rate_then: TurningRate::ZERO,
-            turned: Radians::ZERO,
-            last_step: now,
-            latched: 0,
             law: LawState::NEW,
-            envelope: EnvelopeState::new(now),
             plausibility: PlausibilityState::NEW,
-            hands: HandsState::NEW,
+            share: Ratio::ZERO,
             ramp: Ramp::NONE,
-            probe: ProbeState::SILENT,
-            probe_applied: Torque::ZERO,
         }
     }
 
     fn faults(&self) -> FaultSet {
-        FaultSet::from_bits(self.implausible | self.latched)
+        FaultSet::from_bits(self.hot.implausible | self.hot.latched)
     }
 }
 
@@ -268,6 +303,7 @@ pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
     history: History,
     past: Past,
+    due: Due,
 }
 
 impl ControllerState {
@@ -288,6 +324,7 @@ impl ControllerState {
             memory: Redundant::new(Memory::new(mode, now)),
             history: History::new(),
             past: Past::new(),
+            due: Due::default(),
         }
     }
 
@@ -295,10 +332,8 @@ impl ControllerState {
     fn lose_memory(&mut self, now: Instant) -> Command {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
-        let memory = Memory {
-            latched: faults.bits(),
-            ..Memory::new(Mode::Fault, now)
-        };
+        let mut memory = Memory::new(Mode::Fault, now);
+        memory.hot.latched = faults.bits();
         self.memory.set(memory);
         Command {
             torque: Torque::ZERO,
@@ -353,26 +388,49 @@ impl Controller {
         inputs: &Inputs,
         injection: &I,
     ) -> Command {
-        let Some(config) = self.config.get() else {
+        if !are_whole(&self.config, &state.memory) {
             return state.lose_memory(now);
+        }
+        let memory = state.memory.value_mut();
+        let step = Step {
+            config: self.config.value(),
+            now,
+            applied,
+            inputs,
+            elapsed: now.since(memory.hot.last_step),
+            injection,
         };
+        memory.hot.last_step = now;
+        let mut changed = Changed::NOTHING;
         let (history, past) = (&mut state.history, &mut state.past);
-        let command = state.memory.change(|memory| {
-            let step = Step {
-                config,
-                now,
-                applied,
-                inputs,
-                elapsed: now.since(memory.last_step),
-                injection,
-            };
-            memory.last_step = now;
-            step.run(memory, history, past)
-        });
-        let Some(command) = command else {
-            return state.lose_memory(now);
-        };
+        let command = step.run(memory, &mut changed, history, past, &mut state.due);
+        seal(&mut state.memory, changed);
         state.history.push(now, without(command.torque, command.probe));
         command
+    }
+}
+
+/// Copies what a step changed. A function of its own, as the comparison is.
+#[inline(never)]
+fn seal(memory: &mut Redundant<Memory>, changed: Changed) {
+    memory.seal_part(|v| &mut v.hot);
+    if changed.has(Changed::HEARD) {
+        memory.seal_part(|v| &mut v.heard);
+    }
+    if changed.has(Changed::LAW) {
+        memory.seal_part(|v| &mut v.law);
+    }
+    if changed.has(Changed::MOTION) {
+        memory.seal_part(|v| &mut v.plausibility.motion);
+        memory.seal_part(|v| &mut v.share);
+    }
+    if changed.has(Changed::LANE) {
+        memory.seal_part(|v| &mut v.plausibility.lane);
+    }
+    if changed.has(Changed::COLUMN) {
+        memory.seal_part(|v| &mut v.plausibility.column);
+    }
+    if changed.has(Changed::RAMP) {
+        memory.seal_part(|v| &mut v.ramp);
     }
 }

@@ -21,7 +21,7 @@ use crate::injection::{Injection, NoInjection};
 use crate::modes::Mode;
 use crate::monitor::{Evidence, Monitor, MonitorState};
 use crate::quantity::{Instant, Torque};
-use crate::redundant::{Redundant, words};
+use crate::redundant::{Redundant, are_whole, words};
 use receivers::{Accepted, Receivers};
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -54,24 +54,33 @@ pub struct Step {
 words! {
     /// What the ECU must not lose to a flipped bit, beside its receivers.
     struct Memory {
-        /// The torque applied since the last step.
+        step: LastStep,
+        monitor: MonitorState,
+    }
+}
+
+words! {
+    /// What every step changes.
+    struct LastStep {
+        /// The torque applied since.
         applied: Torque,
         /// [`Fault`] bits found outside the controller.
         faults: u32,
-        last_step: Instant,
+        at: Instant,
         /// Steps, which give the counters of the frames and their turns.
-        steps: u32,
-        monitor: MonitorState,
+        count: u32,
     }
 }
 
 impl Memory {
     fn new(faults: FaultSet, now: Instant) -> Self {
         Self {
-            applied: Torque::ZERO,
-            faults: faults.bits(),
-            last_step: now,
-            steps: 0,
+            step: LastStep {
+                applied: Torque::ZERO,
+                faults: faults.bits(),
+                at: now,
+                count: 0,
+            },
             monitor: MonitorState::NEW,
         }
     }
@@ -174,14 +183,23 @@ impl Ecu {
         if injection.lane_never_ages() {
             self.receivers.renew_lane(now);
         }
-        let mut whole = true;
-        let mut inputs = self.receivers.take(now, &mut whole);
-        let memory = self.memory.get().filter(|_| whole);
-        let found = memory.map(|v| (v.applied, v.faults, v.last_step, v.steps));
-        let (applied, faults, last_step, steps) = found.unwrap_or_else(|| self.begin_anew(now, &mut inputs));
+        let both = are_whole(&self.memory, &self.monitor);
+        let mut inputs = Inputs::lost();
+        if (both || self.memory.get().is_some()) && self.receivers.is_whole() {
+            self.receivers.take(now, &mut inputs);
+        } else {
+            self.begin_anew(now);
+        }
+        let last = &self.memory.value().step;
+        let (applied, steps) = (last.applied, last.count);
+        let elapsed_us = now.since(last.at).us();
+        let mut faults = FaultSet::from_bits(last.faults);
         // One whose limits are damaged permits nothing.
-        let monitor = self.monitor.get();
-        let mut faults = FaultSet::from_bits(faults);
+        let monitor = if both {
+            Some(self.monitor.value())
+        } else {
+            self.monitor.get()
+        };
         let motor = self.receivers.actuator.judge(applied);
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
@@ -209,17 +227,22 @@ impl Ecu {
             column: accepted.column.as_ref(),
             demand: accepted.demand.as_ref(),
             guidance: guidance.bytes(),
-            elapsed_us: now.since(last_step).us(),
+            elapsed_us,
         };
-        let permitted = self.memory.amend(|v| {
-            let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
-            faults.insert_if(!permitted, Fault::Monitor);
-            v.faults = faults.bits();
-            v.applied = if permitted { command.torque } else { Torque::ZERO };
-            v.last_step = now;
-            v.steps = steps.wrapping_add(1);
-            permitted
-        });
+        let v = self.memory.value_mut();
+        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
+        faults.insert_if(!permitted, Fault::Monitor);
+        v.step = LastStep {
+            applied: if permitted { command.torque } else { Torque::ZERO },
+            faults: faults.bits(),
+            at: now,
+            count: steps.wrapping_add(1),
+        };
+        self.memory.seal_part(|v| &mut v.step);
+        self.memory.seal_part(|v| &mut v.monitor.now);
+        if evidence.lane.is_some() {
+            self.memory.seal_part(|v| &mut v.monitor.picture);
+        }
         // The next frames are for the next step.
         self.receivers.accepted = Accepted::NONE;
         if !permitted {
@@ -260,18 +283,15 @@ impl Ecu {
     }
 
     /// The redundant state is damaged: nothing of it can be used. What comes in its place knows nothing but the
-    /// memory fault, which latches. Returns what a step takes from its memory.
+    /// memory fault, which latches.
     #[cold]
     #[inline(never)]
-    fn begin_anew(&mut self, now: Instant, inputs: &mut Inputs) -> (Torque, u32, Instant, u32) {
-        *inputs = Inputs::LOST;
+    fn begin_anew(&mut self, now: Instant) {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         self.state = ControllerState::new(now);
         self.receivers = Receivers::new(ReceiverState::NEW, now);
-        let v = Memory::new(faults, now);
-        self.memory.set(v);
-        (v.applied, v.faults, v.last_step, v.steps)
+        self.memory.set(Memory::new(faults, now));
     }
 
     #[expect(clippy::as_conversions, reason = "a counter is cut to its four bits")]

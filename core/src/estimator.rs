@@ -174,9 +174,31 @@ impl Estimator {
         if !state.spared {
             let [low, high] = state.band;
             state.band = [low.min(state.torque), high.max(state.torque)];
+            if state.ended.is_some() || !matches!(state.work, Work::Nothing) {
+                self.go_on(state);
+            }
         }
+        let Some(ended) = sample.and_then(|sample| self.add(state, sample)) else {
+            return;
+        };
+        let [low, high] = state.band;
+        let (quiet, before) = (high.saturating_sub(low) < QUIET, state.quiet);
+        (state.band, state.quiet) = (NO_BAND, quiet);
+        if quiet || before {
+            // A driver who relies on the guidance fully moves the wheel all the same; nobody's hands do not. What was
+            // read before is no evidence of who takes it next.
+            state.average = Average::new(self.amplitude_nm);
+            (state.reading, state.ended) = (None, None);
+            state.work = Work::Nothing;
+        } else if ended.whole {
+            state.ended = Some(ended);
+        }
+    }
+
+    /// The next piece of what a block that has ended leaves to do. Apart, so that a step without any is short.
+    #[inline(never)]
+    fn go_on(&self, state: &mut EstimatorState) {
         state.work = match state.work {
-            work if state.spared => work,
             Work::Nothing => {
                 let reading = state.ended.as_ref().and_then(|block| self.reading(block));
                 state.ended = None;
@@ -196,24 +218,10 @@ impl Estimator {
                 Work::Nothing
             }
         };
-        let Some(ended) = sample.and_then(|sample| self.add(state, sample)) else {
-            return;
-        };
-        let [low, high] = state.band;
-        let (quiet, before) = (high.saturating_sub(low) < QUIET, state.quiet);
-        (state.band, state.quiet) = (NO_BAND, quiet);
-        if quiet || before {
-            // A driver who relies on the guidance fully moves the wheel all the same; nobody's hands do not. What was
-            // read before is no evidence of who takes it next.
-            state.average = Average::new(self.amplitude_nm);
-            (state.reading, state.ended) = (None, None);
-            state.work = Work::Nothing;
-        } else if ended.whole {
-            state.ended = Some(ended);
-        }
     }
 
-    /// Adds a sample to both blocks; returns the one that ended before it, whole or not.
+    /// Adds a sample to both blocks; returns the one that ended before it, whole or not. Apart, as [`Self::go_on`].
+    #[inline(never)]
     fn add(&self, state: &mut EstimatorState, sample: &Sample) -> Option<Block> {
         // 2^32 us are a whole number of turns, so that the clock's wrap is none of the phase.
         let phase = self.phase_per_us.wrapping_mul(sample.at.us());

@@ -147,6 +147,11 @@ impl LawState {
         late
     }
 
+    /// Whether the sample is the one taken last.
+    pub(crate) fn knows(&self, sample: &LaneSample) -> bool {
+        self.has_last != 0 && self.last == *sample
+    }
+
     /// The line is another one from this sample on: it goes on at the rates of the old one.
     pub fn relocate(&mut self, sample: LaneSample) {
         self.last = sample;
@@ -169,6 +174,14 @@ impl Law {
     /// sample that its rates do not say.
     #[must_use]
     pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, since: &Since) -> Torque {
+        if !state.knows(&sample) {
+            self.take(state, sample);
+        }
+        self.asked(state, now, since)
+    }
+
+    /// Takes a sample: the rates of the errors.
+    pub(crate) fn take(&self, state: &mut LawState, sample: LaneSample) {
         let dt = sample.at.since(state.last.at);
         if state.has_last == 0 || dt > GAP {
             *state = LawState::NEW;
@@ -182,15 +195,20 @@ impl Law {
             );
         }
         (state.has_last, state.last) = (1, sample);
+    }
+
+    /// The torque now, from the sample taken last.
+    pub(crate) fn asked(&self, state: &LawState, now: Instant, since: &Since) -> Torque {
+        let age = now.since(state.last.at);
         if *since == Since::NOTHING {
-            return self.torque(state, now.since(sample.at));
+            return self.torque(state, age);
         }
-        let late = state.moved_on(now.since(sample.at), since);
-        self.torque(&late, now.since(sample.at))
+        self.torque(&state.moved_on(age, since), age)
     }
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two
     /// `i32` times 10^6 times 2^4 gives 2^57 too: the sum cannot overflow.
+    #[inline(always)]
     fn filter(&self, rate: i32, from: i32, to: i32, dt: Micros) -> i32 {
         let tau = i64::from(self.tau);
         // 2^8 for the format of tau, 2^-4 from the errors' 24 fractional bits to the rates' 20.

@@ -35,13 +35,20 @@ words! {
 }
 
 words! {
-    /// What the monitor remembers.
+    /// What the monitor remembers: what changes in most steps, and what a picture changes.
     pub struct MonitorState {
+        pub(crate) now: Now,
+        pub(crate) picture: Picture,
+    }
+}
+
+words! {
+    /// What most steps change.
+    pub(crate) struct Now {
         torque_mnm: i32,
         driver_mnm: i32,
-        lane: Lane,
-        /// An older lane sample, for rates.
-        before: Lane,
+        /// Since the lane sample was true.
+        age_us: i32,
         /// For how long there may still be a probe.
         probe_left_us: i32,
         /// How many steps the torque was outside its band and not falling, since it was inside.
@@ -52,12 +59,23 @@ words! {
 }
 
 words! {
+    /// What a new lane sample changes.
+    pub(crate) struct Picture {
+        lane: Lane,
+        /// An older lane sample, for rates, and how much older it is.
+        before: Lane,
+        older_us: i32,
+        /// What its position asks for, and what its rates ask for beside.
+        position_mnm: i32,
+        rate_mnm: i32,
+    }
+}
+
+words! {
     /// Lane errors as the monitor reads them.
     struct Lane {
         e_y_mm: i32,
         e_theta_urad: i32,
-        /// Since it was true.
-        age_us: i32,
     }
 }
 
@@ -103,21 +121,27 @@ const RATE_SPAN_US: i32 = 50_000;
 impl MonitorState {
     /// Nothing seen, permission granted.
     pub const NEW: Self = Self {
-        torque_mnm: 0,
-        driver_mnm: 0,
-        lane: Lane {
-            e_y_mm: 0,
-            e_theta_urad: 0,
+        now: Now {
+            torque_mnm: 0,
+            driver_mnm: 0,
             age_us: 0,
+            probe_left_us: 0,
+            astray_ms: 0,
+            withdrawn: 0,
         },
-        before: Lane {
-            e_y_mm: 0,
-            e_theta_urad: 0,
-            age_us: 0,
+        picture: Picture {
+            lane: Lane {
+                e_y_mm: 0,
+                e_theta_urad: 0,
+            },
+            before: Lane {
+                e_y_mm: 0,
+                e_theta_urad: 0,
+            },
+            older_us: 0,
+            position_mnm: 0,
+            rate_mnm: 0,
         },
-        probe_left_us: 0,
-        astray_ms: 0,
-        withdrawn: 0,
     };
 }
 
@@ -129,11 +153,13 @@ impl Monitor {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        state.observe(evidence, elapsed_us);
+        if state.observe(evidence, elapsed_us) {
+            self.weigh(state);
+        }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
-        let changes_sign = (torque ^ state.torque_mnm).is_negative();
-        let old = if changes_sign { 0 } else { state.torque_mnm };
+        let changes_sign = (torque ^ state.now.torque_mnm).is_negative();
+        let old = if changes_sign { 0 } else { state.now.torque_mnm };
         let grown = torque.saturating_abs().saturating_sub(old.saturating_abs());
         let within = |per_ms: i32| {
             let so_long = if elapsed_us <= 1000 {
@@ -149,19 +175,20 @@ impl Monitor {
             0
         };
         let left = if changes_sign { 0 } else { torque.saturating_abs() };
-        let fallen = state.torque_mnm.saturating_abs().saturating_sub(left);
+        let fallen = state.now.torque_mnm.saturating_abs().saturating_sub(left);
         let may_fall = fallen <= within(self.fall_mnm_per_ms)
             || mode > LAST_WITH_TORQUE
-            || left.saturating_add(OVERRIDE_SLACK_MNM) >= self.bound(state.torque_mnm, state.driver_mnm);
+            || left.saturating_add(OVERRIDE_SLACK_MNM)
+                >= self.bound(state.now.torque_mnm, state.now.driver_mnm);
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed
             && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
-            && self.leaves_the_driver_in_charge(torque, state.driver_mnm)
+            && self.leaves_the_driver_in_charge(torque, state.now.driver_mnm)
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
-        state.torque_mnm = torque;
-        state.withdrawn |= i32::from(!agrees);
-        state.withdrawn == 0
+        state.now.torque_mnm = torque;
+        state.now.withdrawn |= i32::from(!agrees);
+        state.now.withdrawn == 0
     }
 
     /// `abs(T) <= L + 3*(0.8 - opposing)`.
@@ -184,50 +211,46 @@ impl Monitor {
         self.limit_mnm.saturating_sub(shrink).max(0)
     }
 
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "the span is at least a millisecond"
-    )]
+    /// What a new lane sample asks for.
+    fn weigh(&self, state: &mut MonitorState) {
+        let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
+        let (e_y_mmps, e_theta_urps) = state.rates();
+        let asked = |per_length: i32, length: i32, per_angle: i32, angle: i32| {
+            per_length
+                .saturating_mul(length)
+                .saturating_div(1000)
+                .saturating_add(per_angle.saturating_mul(angle / 100) / 10_000)
+        };
+        state.picture.position_mnm = asked(
+            per_m,
+            state.picture.lane.e_y_mm,
+            per_rad,
+            state.picture.lane.e_theta_urad,
+        );
+        state.picture.rate_mnm = asked(per_mps, e_y_mmps, per_radps, e_theta_urps);
+    }
+
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
-        if state.lane.age_us > OLDEST_LANE_US && torque != 0 {
+        if state.now.age_us > OLDEST_LANE_US && torque != 0 {
             return false;
         }
-        let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
-        let (lane, before) = (&state.lane, &state.before);
-        let span_ms = (before.age_us.saturating_sub(lane.age_us) / 1000).max(1);
-        let e_y_mmps = lane
-            .e_y_mm
-            .saturating_sub(before.e_y_mm)
-            .saturating_mul(1000)
-            .saturating_div(span_ms);
-        let e_theta_urps = lane
-            .e_theta_urad
-            .saturating_sub(before.e_theta_urad)
-            .saturating_div(span_ms)
-            .saturating_mul(1000);
-        let position = per_m
-            .saturating_mul(lane.e_y_mm)
-            .saturating_div(1000)
-            .saturating_add(per_rad.saturating_mul(lane.e_theta_urad / 100) / 10_000);
-        let rate = per_mps
-            .saturating_mul(e_y_mmps)
-            .saturating_div(1000)
-            .saturating_add(per_radps.saturating_mul(e_theta_urps / 100) / 10_000);
         // What an old sample has become since, at most: the errors went on at their rates.
-        let late_ms = lane.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
+        let late_ms = state.now.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
         let position = if late_ms == 0 {
-            position
+            state.picture.position_mnm
         } else {
+            let [per_m, per_rad, ..] = self.gains_mnm;
+            let (e_y_mmps, e_theta_urps) = state.rates();
             let carried = per_m
                 .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
                 .saturating_div(1000)
                 .saturating_add(
                     per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
                 );
-            position.saturating_add(carried)
+            state.picture.position_mnm.saturating_add(carried)
         };
-        let both = position.saturating_add(rate);
-        let probe = if state.probe_left_us > 0 {
+        let both = position.saturating_add(state.picture.rate_mnm);
+        let probe = if state.now.probe_left_us > 0 {
             self.probe_mnm
         } else {
             0
@@ -236,13 +259,13 @@ impl Monitor {
         // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
         let high = position.max(both).max(0).saturating_add(band);
         let low = position.min(both).min(0).saturating_sub(band);
-        let falling = torque.saturating_abs() < state.torque_mnm.saturating_abs();
+        let falling = torque.saturating_abs() < state.now.torque_mnm.saturating_abs();
         if (low..=high).contains(&torque) {
-            state.astray_ms = 0;
+            state.now.astray_ms = 0;
         } else if !falling {
-            state.astray_ms = state.astray_ms.saturating_add(1);
+            state.now.astray_ms = state.now.astray_ms.saturating_add(1);
         }
-        state.astray_ms <= ASTRAY_MS
+        state.now.astray_ms <= ASTRAY_MS
     }
 
     /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
@@ -256,12 +279,12 @@ impl Monitor {
             0 => (torque, mode) = (self.limit_mnm.saturating_add(20), FADE),
             1 => grown = torque,
             2 => mode = STANDBY,
-            3 => state.driver_mnm = -20_000,
-            4 => state.lane.age_us = 1_000_000,
+            3 => state.now.driver_mnm = -20_000,
+            4 => state.now.age_us = 1_000_000,
             5 => (torque, grown) = (0, -400),
-            _ => (torque, state.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
+            _ => (torque, state.now.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
         }
-        state.torque_mnm = torque.saturating_sub(grown);
+        state.now.torque_mnm = torque.saturating_sub(grown);
         // The least count that is cut to so many mN.m again.
         let count = torque
             .saturating_mul(4096)
@@ -274,32 +297,57 @@ impl Monitor {
 }
 
 impl MonitorState {
-    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) {
-        self.lane.age_us = self.lane.age_us.saturating_add(elapsed_us);
-        self.before.age_us = self.before.age_us.saturating_add(elapsed_us);
+    /// Takes what came; `true` for a new lane sample.
+    fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
+        self.now.age_us = self.now.age_us.saturating_add(elapsed_us);
         if let Some(bytes) = evidence.lane {
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
-                age_us: (field(bytes, 46, 10) & 0x1FF)
-                    .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
-                    .saturating_mul(100),
             };
+            let age_us = (field(bytes, 46, 10) & 0x1FF)
+                .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
+                .saturating_mul(100);
+            let apart_us = self.now.age_us.saturating_sub(age_us);
             // After a gap there is no rate.
-            if self.lane.age_us > OLDEST_LANE_US {
-                self.before = new;
-            } else if self.before.age_us.saturating_sub(self.lane.age_us) > RATE_SPAN_US {
-                self.before = self.lane;
+            if self.now.age_us > OLDEST_LANE_US {
+                (self.picture.before, self.picture.older_us) = (new, 0);
+            } else if self.picture.older_us > RATE_SPAN_US {
+                (self.picture.before, self.picture.older_us) = (self.picture.lane, apart_us);
+            } else {
+                self.picture.older_us = self.picture.older_us.saturating_add(apart_us);
             }
-            self.lane = new;
+            (self.picture.lane, self.now.age_us) = (new, age_us);
         }
         if let Some(bytes) = evidence.column {
-            self.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
+            self.now.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
         }
-        self.probe_left_us = self.probe_left_us.saturating_sub(elapsed_us).max(0);
+        self.now.probe_left_us = self.now.probe_left_us.saturating_sub(elapsed_us).max(0);
         if evidence.demand.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
-            self.probe_left_us = PROBE_END_US;
+            self.now.probe_left_us = PROBE_END_US;
         }
+        evidence.lane.is_some()
+    }
+
+    /// How fast the lane errors move, mm/s and urad/s.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the span is at least a millisecond"
+    )]
+    fn rates(&self) -> (i32, i32) {
+        let (lane, before) = (&self.picture.lane, &self.picture.before);
+        let span_ms = (self.picture.older_us / 1000).max(1);
+        let e_y_mmps = lane
+            .e_y_mm
+            .saturating_sub(before.e_y_mm)
+            .saturating_mul(1000)
+            .saturating_div(span_ms);
+        let e_theta_urps = lane
+            .e_theta_urad
+            .saturating_sub(before.e_theta_urad)
+            .saturating_div(span_ms)
+            .saturating_mul(1000);
+        (e_y_mmps, e_theta_urps)
     }
 }
 

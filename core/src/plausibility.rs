@@ -61,10 +61,18 @@ words! {
 }
 
 words! {
-    /// Sums and last samples.
+    /// Sums and last samples. What changes with one message is a part, so that no other is copied with it.
     pub struct PlausibilityState {
+        pub(crate) motion: MotionState,
+        pub(crate) lane: LaneState,
+        pub(crate) column: ColumnState,
+    }
+}
+
+words! {
+    /// What a message of the vehicle changes.
+    pub(crate) struct MotionState {
         speed: Speed,
-        wheel: Radians,
         /// Rate of the direction of movement per wheel angle at this speed, 1/s.
         turning_gain: TurningRatePerAngle,
         /// The measured yaw rate, if there is one.
@@ -72,73 +80,104 @@ words! {
         has_yaw_rate: u32,
         /// Messages in a row whose speeds were apart.
         apart: u32,
-        has_lane: u32,
-        lane: LaneSample,
-        lane_predicted: Metres,
-        lane_seen: Metres,
+    }
+}
+
+words! {
+    /// What a check of the lane changes.
+    pub(crate) struct LaneState {
+        is_known: u32,
+        last: LaneSample,
+        predicted: Metres,
+        seen: Metres,
         /// What the prediction is wrong by in the long run.
-        lane_bias: Speed,
-        has_column: u32,
-        column_at: Instant,
-        column_sum: AngularImpulse,
+        bias: Speed,
+    }
+}
+
+words! {
+    /// What a message of the column changes.
+    pub(crate) struct ColumnState {
+        is_known: u32,
+        at: Instant,
+        wheel: Radians,
+        /// The wheel's angle at the last check.
+        checked: Radians,
+        sum: AngularImpulse,
         /// The torque that the column lacks in the long run.
-        column_bias: Torque,
+        bias: Torque,
     }
 }
 
 impl PlausibilityState {
     /// Nothing heard yet.
     pub const NEW: Self = Self {
-        speed: Speed::ZERO,
-        wheel: Radians::ZERO,
-        turning_gain: TurningRatePerAngle::ZERO,
-        yaw_rate: TurningRate::ZERO,
-        has_yaw_rate: 0,
-        apart: 0,
-        has_lane: 0,
-        lane: LaneSample {
-            e_y: Metres::ZERO,
-            e_theta: Radians::ZERO,
-            at: Instant::from_us(0),
+        motion: MotionState {
+            speed: Speed::ZERO,
+            turning_gain: TurningRatePerAngle::ZERO,
+            yaw_rate: TurningRate::ZERO,
+            has_yaw_rate: 0,
+            apart: 0,
         },
-        lane_predicted: Metres::ZERO,
-        lane_seen: Metres::ZERO,
-        lane_bias: Speed::ZERO,
-        has_column: 0,
-        column_at: Instant::from_us(0),
-        column_sum: AngularImpulse::ZERO,
-        column_bias: Torque::ZERO,
+        lane: LaneState {
+            is_known: 0,
+            last: LaneSample {
+                e_y: Metres::ZERO,
+                e_theta: Radians::ZERO,
+                at: Instant::from_us(0),
+            },
+            predicted: Metres::ZERO,
+            seen: Metres::ZERO,
+            bias: Speed::ZERO,
+        },
+        column: ColumnState {
+            is_known: 0,
+            at: Instant::from_us(0),
+            wheel: Radians::ZERO,
+            checked: Radians::ZERO,
+            sum: AngularImpulse::ZERO,
+            bias: Torque::ZERO,
+        },
     };
 
     /// The rate of turn: measured, or else that of the direction of movement by wheel angle and speed.
     #[must_use]
     pub fn turning(&self) -> TurningRate {
-        if self.has_yaw_rate != 0 {
-            self.yaw_rate
+        if self.motion.has_yaw_rate != 0 {
+            self.motion.yaw_rate
         } else {
-            TurningRate::from_wide(product(self.turning_gain.bits(), self.wheel.bits()))
+            TurningRate::from_wide(product(self.motion.turning_gain.bits(), self.column.wheel.bits()))
         }
+    }
+
+    /// Takes a wheel angle that is not checked yet.
+    pub(crate) fn steer(&mut self, wheel: Radians) {
+        self.column.wheel = wheel;
     }
 
     /// The speed in use.
     #[must_use]
     pub const fn speed(&self) -> Speed {
-        self.speed
+        self.motion.speed
     }
 
     /// Takes two speeds; `false` when they have been too far apart in three messages in a row.
     #[must_use]
     pub fn speeds_agree(&mut self, [a, b]: [Speed; 2]) -> (bool, bool) {
         let agree = speeds_agree(a, b);
-        self.apart = if agree { 0 } else { self.apart.saturating_add(1) };
-        (agree, self.apart < SPEEDS_PATIENCE)
+        self.motion.apart = if agree {
+            0
+        } else {
+            self.motion.apart.saturating_add(1)
+        };
+        (agree, self.motion.apart < SPEEDS_PATIENCE)
     }
 
     /// The movement predicted, and what of it was not seen, positive in its direction; negative where more was seen than was
     /// predicted. 2^-24 m.
     fn missing(&self) -> (i64, i64) {
-        let predicted = i64::from(self.lane_predicted.bits());
-        let missing = predicted.saturating_sub(i64::from(self.lane_seen.bits()));
+        let predicted = i64::from(self.lane.predicted.bits());
+        let missing = predicted.saturating_sub(i64::from(self.lane.seen.bits()));
         let missing = if predicted.is_negative() {
             missing.saturating_neg()
         } else {
@@ -149,12 +188,12 @@ impl PlausibilityState {
 
     /// The lane was lost: what comes next has no past.
     pub fn forget_lane(&mut self) {
-        (self.has_lane, self.lane_predicted, self.lane_seen) = (0, Metres::ZERO, Metres::ZERO);
+        (self.lane.is_known, self.lane.predicted, self.lane.seen) = (0, Metres::ZERO, Metres::ZERO);
     }
 
     /// The column was lost.
     pub fn forget_column(&mut self) {
-        (self.has_column, self.column_sum) = (0, AngularImpulse::ZERO);
+        (self.column.is_known, self.column.sum) = (0, AngularImpulse::ZERO);
     }
 }
 
@@ -225,10 +264,10 @@ impl Plausibility {
     /// Takes the speed in use and the measured yaw rate; returns nothing, for neither has a counterpart here. How fast
     /// the vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle model.
     pub fn motion(&self, state: &mut PlausibilityState, speed: Speed, yaw_rate: Option<TurningRate>) {
-        let is_known = speed == state.speed && state.has_yaw_rate == 0;
-        state.has_yaw_rate = u32::from(yaw_rate.is_some());
-        state.yaw_rate = yaw_rate.unwrap_or(TurningRate::ZERO);
-        state.speed = speed;
+        let is_known = speed == state.motion.speed && state.motion.has_yaw_rate == 0;
+        state.motion.has_yaw_rate = u32::from(yaw_rate.is_some());
+        state.motion.yaw_rate = yaw_rate.unwrap_or(TurningRate::ZERO);
+        state.motion.speed = speed;
         // Nobody asks for the gain while the rate is measured.
         if is_known || yaw_rate.is_some() {
             return;
@@ -238,7 +277,7 @@ impl Plausibility {
         // 82 at most: at 90 m/s with the largest factor.
         let divisor = u32::try_from(slip.saturating_add(1 << FRAC_BITS)).unwrap_or(0);
         let gain = i64::from(self.curvature_gain.bits()).saturating_mul(i64::from(v));
-        state.turning_gain = TurningRatePerAngle::from_bits(signed_quotient(gain, divisor));
+        state.motion.turning_gain = TurningRatePerAngle::from_bits(signed_quotient(gain, divisor));
     }
 
     /// Takes driver torque, wheel angle and the guidance torque applied; `false` when they cannot belong
@@ -252,11 +291,11 @@ impl Plausibility {
         wheel: Radians,
         applied: Torque,
     ) -> bool {
-        let moved = i64::from(wheel.bits()).saturating_sub(i64::from(state.wheel.bits()));
-        let dt = now.since(state.column_at);
-        if state.has_column != 0 {
+        let moved = i64::from(wheel.bits()).saturating_sub(i64::from(state.column.checked.bits()));
+        let dt = now.since(state.column.at);
+        if state.column.is_known != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
-            let lateral = product(state.speed.bits(), state.turning().bits());
+            let lateral = product(state.motion.speed.bits(), state.turning().bits());
             let aligning = wide_product(lateral, self.aligning_gain.bits()) >> FRAC_BITS;
             let lacking = i64::from(applied.bits()).saturating_sub(aligning);
             // What driver and assist may give together.
@@ -271,10 +310,10 @@ impl Plausibility {
                 impulse(least).saturating_sub(damped),
                 impulse(most).saturating_sub(damped),
             );
-            let learnt = impulse(i64::from(state.column_bias.bits()));
+            let learnt = impulse(i64::from(state.column.bias.bits()));
             let change = beyond(least, most, 0).saturating_sub(learnt) >> BIAS_SHIFT;
-            let bias = i64::from(state.column_bias.bits()).saturating_add(change);
-            state.column_bias = Torque::from_wide(bias)
+            let bias = i64::from(state.column.bias.bits()).saturating_add(change);
+            state.column.bias = Torque::from_wide(bias)
                 .min(COLUMN_BIAS)
                 .max(COLUMN_BIAS.opposite());
             // 77/256: 30 % of the aligning torque.
@@ -285,10 +324,11 @@ impl Plausibility {
                 most.saturating_sub(learnt),
                 tolerance,
             );
-            state.column_sum = AngularImpulse::from_wide(leak(state.column_sum.bits(), change, dt));
+            state.column.sum = AngularImpulse::from_wide(leak(state.column.sum.bits(), change, dt));
         }
-        (state.has_column, state.column_at, state.wheel) = (1, now, wheel);
-        i64::from(state.column_sum.bits()).abs() <= i64::from(self.column_margin.bits())
+        (state.column.is_known, state.column.at) = (1, now);
+        (state.column.wheel, state.column.checked) = (wheel, wheel);
+        i64::from(state.column.sum.bits()).abs() <= i64::from(self.column_margin.bits())
     }
 
     /// Takes a new lane sample that came now; `false` when its error did not move as it must have.
@@ -301,38 +341,38 @@ impl Plausibility {
         sample: LaneSample,
     ) -> bool {
         past.see(now, sample.at, sample.e_theta);
-        let dt = sample.at.since(state.lane.at);
-        if state.has_lane != 0 && dt.us() != 0 {
-            let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.e_y.bits()));
-            let measured = state.has_yaw_rate != 0;
+        let dt = sample.at.since(state.lane.last.at);
+        if state.lane.is_known != 0 && dt.us() != 0 {
+            let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.last.e_y.bits()));
+            let measured = state.motion.has_yaw_rate != 0;
             let rate = if measured {
-                self.line_rate(state, past, now, state.lane.at)
+                self.line_rate(state, past, now, state.lane.last.at)
             } else {
-                let heading = product(state.speed.bits(), state.lane.e_theta.bits());
-                let far = product(self.far_time.bits(), state.speed.bits());
+                let heading = product(state.motion.speed.bits(), state.lane.last.e_theta.bits());
+                let far = product(self.far_time.bits(), state.motion.speed.bits());
                 let turned = wide_product(far, state.turning().bits()) >> FRAC_BITS;
                 Some(heading.saturating_sub(turned))
             };
             // Where the line is not known for long enough, nothing is predicted.
             let predicted = rate.map_or(seen, |rate| per_second_times(rate, dt));
-            let bias = i64::from(state.lane_bias.bits());
+            let bias = i64::from(state.lane.bias.bits());
             let predicted = predicted.saturating_add(per_second_times(bias, dt));
             if measured {
                 let learnt = bias.saturating_add(seen.saturating_sub(predicted) >> BIAS_SHIFT);
-                state.lane_bias = Speed::from_wide(learnt)
+                state.lane.bias = Speed::from_wide(learnt)
                     .min(LANE_BIAS)
                     .max(Speed::from_wide(i64::from(LANE_BIAS.bits()).saturating_neg()));
             }
-            state.lane_predicted = Metres::from_wide(leak(state.lane_predicted.bits(), predicted, dt));
-            state.lane_seen = Metres::from_wide(leak(state.lane_seen.bits(), seen, dt));
+            state.lane.predicted = Metres::from_wide(leak(state.lane.predicted.bits(), predicted, dt));
+            state.lane.seen = Metres::from_wide(leak(state.lane.seen.bits(), seen, dt));
         }
-        (state.has_lane, state.lane) = (1, sample);
+        (state.lane.is_known, state.lane.last) = (1, sample);
         let (predicted, missing) = state.missing();
         let margin = i64::from(self.lane_margin.bits());
         // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. Where the yaw
         // rate is measured, a large one is: no vehicle goes there.
         let is_missing = missing > margin && predicted.abs() > margin >> 1;
-        let is_unreal = missing.abs() > UNREAL && state.has_yaw_rate != 0;
+        let is_unreal = missing.abs() > UNREAL && state.motion.has_yaw_rate != 0;
         !is_missing && !is_unreal
     }
 
@@ -340,8 +380,8 @@ impl Plausibility {
     fn line_rate(&self, state: &PlausibilityState, past: &Past, now: Instant, at: Instant) -> Option<i64> {
         let near = past.line(now, at, self.between)?;
         let turning = past.heading(now, at).rate;
-        let along = product(state.speed.bits(), near.bits());
-        let reach = product(self.near_time.bits(), state.speed.bits());
+        let along = product(state.motion.speed.bits(), near.bits());
+        let reach = product(self.near_time.bits(), state.motion.speed.bits());
         let across = wide_product(reach, turning.bits()) >> FRAC_BITS;
         Some(along.saturating_sub(across))
     }
@@ -349,7 +389,7 @@ impl Plausibility {
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
     pub fn used(state: &PlausibilityState) -> (Metres, AngularImpulse) {
-        (Metres::from_wide(state.missing().1), state.column_sum)
+        (Metres::from_wide(state.missing().1), state.column.sum)
     }
 }
 

@@ -94,8 +94,8 @@ macro_rules! quantity {
                 Self::from_bits(self.bits().map_words(change))
             }
 
-            fn is_inverse_of(&self, other: &Self) -> bool {
-                self.bits().is_inverse_of(&other.bits())
+            fn agreement(&self, other: &Self) -> u32 {
+                self.bits().agreement(&other.bits())
             }
         }
     };
@@ -234,8 +234,8 @@ impl Words for Micros {
         Self(change(self.0))
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        self.0.is_inverse_of(&other.0)
+    fn agreement(&self, other: &Self) -> u32 {
+        self.0.agreement(&other.0)
     }
 }
 
@@ -283,8 +283,8 @@ impl Words for Instant {
         Self(change(self.0))
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        self.0.is_inverse_of(&other.0)
+    fn agreement(&self, other: &Self) -> u32 {
+        self.0.agreement(&other.0)
     }
 }
 

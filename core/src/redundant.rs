@@ -5,6 +5,7 @@
 
 use core::hint::black_box;
 use core::ops::Not;
+use core::sync::atomic::{Ordering, compiler_fence};
 
 /// A value made of 32-bit words, each of which may hold any bits.
 pub trait Words: Copy + PartialEq {
@@ -12,14 +13,19 @@ pub trait Words: Copy + PartialEq {
     #[must_use]
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self;
 
-    /// Whether every bit of `other` is the inverse of this value's. Looks at all words without a branch: a copy or a
-    /// comparison call for each is what a step would mostly do.
-    fn is_inverse_of(&self, other: &Self) -> bool;
+    /// The bits of all words in which `other` is the inverse of this value: all of them if it is. Looks at all words
+    /// without a branch: a copy or a comparison call for each is what a step would mostly do.
+    fn agreement(&self, other: &Self) -> u32;
 
     /// The value with every bit inverted.
     #[must_use]
     fn complement(self) -> Self {
         self.map_words(&mut |word| !word)
+    }
+
+    /// The same into a place.
+    fn complement_into(&self, other: &mut Self) {
+        *other = self.complement();
     }
 }
 
@@ -28,8 +34,8 @@ impl Words for u32 {
         change(self)
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        *self == !*other
+    fn agreement(&self, other: &Self) -> u32 {
+        *self ^ *other
     }
 }
 
@@ -38,8 +44,8 @@ impl Words for i32 {
         change(self.cast_unsigned()).cast_signed()
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        *self == !*other
+    fn agreement(&self, other: &Self) -> u32 {
+        self.cast_unsigned() ^ other.cast_unsigned()
     }
 }
 
@@ -48,9 +54,27 @@ impl<T: Words, const N: usize> Words for [T; N] {
         self.map(|item| item.map_words(change))
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
+    fn agreement(&self, other: &Self) -> u32 {
         let pairs = self.iter().zip(other);
-        pairs.fold(true, |all, (item, other)| all & item.is_inverse_of(other))
+        pairs.fold(u32::MAX, |all, (item, other)| all & item.agreement(other))
+    }
+}
+
+/// Bytes of a block.
+const BLOCK: usize = 24;
+
+/// Whether a field ends a block of words that are compared without a branch. A block fits into the registers of a
+/// 32-bit core, which then loads two words and more at once.
+pub(crate) const fn ends_block(offset: usize, size: usize) -> bool {
+    offset / BLOCK != offset.saturating_add(size) / BLOCK
+}
+
+/// The loads and stores of a struct stay together, so that a 32-bit core takes two words and more at once. No
+/// instruction itself.
+#[inline(always)]
+pub(crate) fn keep_together() {
+    if cfg!(target_pointer_width = "32") {
+        compiler_fence(Ordering::SeqCst);
     }
 }
 
@@ -67,14 +91,43 @@ macro_rules! words {
                 Self { $($field: $crate::redundant::Words::map_words(self.$field, change),)* }
             }
 
+            #[inline(always)]
+            fn agreement(&self, other: &Self) -> u32 {
+                let mut all = u32::MAX;
+                $(
+                    all &= $crate::redundant::Words::agreement(&self.$field, &other.$field);
+                    if $crate::redundant::ends_block(core::mem::offset_of!(Self, $field), size_of::<$type>())
+                        && all != u32::MAX
+                    {
+                        return 0;
+                    }
+                )*
+                all
+            }
+
             #[inline]
-            fn is_inverse_of(&self, other: &Self) -> bool {
-                true $(& $crate::redundant::Words::is_inverse_of(&self.$field, &other.$field))*
+            fn complement_into(&self, other: &mut Self) {
+                if size_of::<Self>() > $crate::redundant::SMALL {
+                    $($crate::redundant::Words::complement_into(&self.$field, &mut other.$field);)*
+                } else {
+                    *other = $crate::redundant::Words::complement(*self);
+                }
+                $crate::redundant::keep_together();
             }
         }
     };
 }
 pub(crate) use words;
+
+/// Whether two values are whole. A function of its own: else the words loaded here stay in use behind it, and most of
+/// them on the stack.
+#[inline(never)]
+pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
+    a.agrees() && b.agrees()
+}
+
+/// Bytes of a value that is compared and copied where it is used.
+pub(crate) const SMALL: usize = 32;
 
 /// A value and its inverted copy.
 #[derive(Debug, Clone, Copy)]
@@ -99,23 +152,61 @@ impl<T: Words> Redundant<T> {
     pub fn get(&self) -> Option<&T> {
         // Without the black box the compiler may prove, across the loop that owns this value, that the
         // copies always agree, and drop the comparison. Around the reference, it costs no copy.
-        let Self { value, inverted } = black_box(self);
-        value.is_inverse_of(inverted).then_some(value)
+        let guarded = black_box(self);
+        guarded.agrees().then_some(&guarded.value)
+    }
+
+    /// Whether the copies agree; where the compiler cannot know that they do.
+    #[inline(always)]
+    pub(crate) fn agrees(&self) -> bool {
+        self.value.agreement(&self.inverted) == u32::MAX
+    }
+
+    /// The copy anew, likewise.
+    #[inline(always)]
+    fn seal(&mut self) {
+        if size_of::<T>() > SMALL {
+            self.seal_apart();
+        } else {
+            self.inverted = self.value.complement();
+        }
+    }
+
+    #[inline(never)]
+    fn seal_apart(&mut self) {
+        self.value.complement_into(&mut self.inverted);
     }
 
     /// Changes the value in place, if both copies still agree.
     pub fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
         self.get()?;
         let result = change(&mut self.value);
-        self.inverted = self.value.complement();
+        self.seal();
         Some(result)
     }
 
     /// Changes the value in place, which [`Redundant::get`] has found whole in this step.
     pub(crate) fn amend<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> R {
         let result = change(&mut self.value);
-        self.inverted = self.value.complement();
+        self.seal();
         result
+    }
+
+    /// The value, which was found whole in this step.
+    pub(crate) fn value(&self) -> &T {
+        &self.value
+    }
+
+    /// The value, which was found whole in this step; what is changed has to be sealed.
+    pub(crate) fn value_mut(&mut self) -> &mut T {
+        &mut self.value
+    }
+
+    /// Copies a part that was changed.
+    #[inline(always)]
+    pub(crate) fn seal_part<P: Words>(&mut self, part: impl Fn(&mut T) -> &mut P) {
+        *part(&mut self.inverted) = part(&mut self.value).complement();
+        keep_together();
     }
 
     /// Changes a part in both copies and leaves the rest as it is, what a flip made of it too.

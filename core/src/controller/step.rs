@@ -1,7 +1,7 @@
 //! One step of the controller: the one place that sees the mode machine, the plausibility checks, the law, the
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
-use super::{Command, Input, Inputs, Memory, READY, Request};
+use super::{Changed, Command, Due, Input, Inputs, Memory, READY, Request};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
@@ -45,28 +45,39 @@ pub(super) struct Step<'a, I> {
 }
 
 impl<I: Injection> Step<'_, I> {
-    pub(super) fn run(&self, v: &mut Memory, history: &mut History, past: &mut Past) -> Command {
-        let lost = self.look(v, past);
+    pub(super) fn run(
+        &self,
+        v: &mut Memory,
+        changed: &mut Changed,
+        history: &mut History,
+        past: &mut Past,
+        due: &mut Due,
+    ) -> Command {
+        let fast_enough = self.is_fast_enough();
+        let lost = self.look(v, changed, fast_enough, past, due);
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
-        v.latched |= faults.common(FaultSet::CRITICAL).bits();
+        v.hot.latched |= faults.common(FaultSet::CRITICAL).bits();
 
-        let before = Mode::from_code(v.small.mode.into()).unwrap_or(Mode::Fault);
+        let before = Mode::from_code(v.hot.small.mode.into()).unwrap_or(Mode::Fault);
         if before == Mode::Active {
-            v.hands
-                .guided(without(self.applied, Some(v.probe_applied)), self.elapsed);
+            v.hot
+                .hands
+                .guided(without(self.applied, Some(v.hot.probe_applied)), self.elapsed);
         }
         faults.insert_if(
-            matches!(before, Mode::Active | Mode::Fade) && v.hands.without() >= WARN,
+            matches!(before, Mode::Active | Mode::Fade) && v.hot.hands.without() >= WARN,
             Fault::HandsOff,
         );
-        let mode = self.next_mode(v, before, faults);
+        let mode = self.next_mode(v, before, faults, fast_enough);
         if mode != before {
+            changed.add(Changed::LAW);
+            changed.add(Changed::RAMP);
             self.enter(v, mode, faults, history);
         }
-        let (torque, probe, limit) = self.torque(v, mode, faults);
-        v.probe_applied = probe.unwrap_or(Torque::ZERO);
+        let (torque, probe, limit) = self.torque(v, changed, mode, faults);
+        v.hot.probe_applied = probe.unwrap_or(Torque::ZERO);
         let warning =
             matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked) || faults.contains(Fault::HandsOff);
         Command {
@@ -80,7 +91,14 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
-    fn look(&self, v: &mut Memory, past: &mut Past) -> FaultSet {
+    fn look(
+        &self,
+        v: &mut Memory,
+        changed: &mut Changed,
+        fast_enough: Option<bool>,
+        past: &mut Past,
+        due: &mut Due,
+    ) -> FaultSet {
         let Inputs {
             lane,
             column,
@@ -90,61 +108,83 @@ impl<I: Injection> Step<'_, I> {
         } = self.inputs;
         let checks = &self.config.plausibility;
         let mut lost = FaultSet::NONE;
-        let mut implausible = FaultSet::from_bits(v.implausible);
+        let mut implausible = FaultSet::from_bits(v.hot.implausible);
 
-        v.age.speeds = self.age(motion, v.age.speeds);
         if let Input::New(motion) = motion {
+            v.heard.motion = self.now;
+            changed.add(Changed::HEARD);
+            changed.add(Changed::MOTION);
             let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds);
             implausible.set(!plausible, Fault::SpeedImplausible);
             if agree {
                 checks.motion(&mut v.plausibility, motion.speeds[0], motion.yaw_rate());
             }
+            v.share = self.config.schedule.share(v.plausibility.speed());
             past.turn(self.now, v.plausibility.turning());
         }
-        if !self.is_fast_enough().unwrap_or(false) {
+        if fast_enough != Some(true) {
+            changed.add(Changed::LANE);
+            changed.add(Changed::COLUMN);
             // Neither model holds at a walking pace, let alone at an unknown one.
             v.plausibility.forget_lane();
             v.plausibility.forget_column();
         }
-        v.age.column = self.age(column, v.age.column);
         match column {
             Input::New(c) => {
-                v.hands.feel(c.driver_torque);
-                let plausible = checks.column(
-                    &mut v.plausibility,
-                    self.now,
-                    c.driver_torque,
-                    c.wheel_angle,
-                    self.applied,
-                );
-                implausible.set(!plausible, Fault::ColumnImplausible);
+                v.heard.column = self.now;
+                changed.add(Changed::HEARD);
+                changed.add(Changed::COLUMN);
+                v.hot.hands.feel(c.driver_torque);
+                v.plausibility.steer(c.wheel_angle);
             }
             Input::Held(_) => {}
             Input::Lost => {
+                changed.add(Changed::COLUMN);
                 v.plausibility.forget_column();
                 implausible.set(false, Fault::ColumnImplausible);
             }
         }
-        v.age.lane = self.age(lane, v.age.lane);
         match lane {
             Input::New(sample) => {
+                v.heard.lane = self.now;
+                changed.add(Changed::HEARD);
                 if self.inputs.line_moved {
+                    changed.add(Changed::LANE);
+                    changed.add(Changed::LAW);
                     v.plausibility.forget_lane();
                     past.forget_line();
                     v.law.relocate(*sample);
                 }
-                let plausible = checks.lane(&mut v.plausibility, past, self.now, *sample);
-                implausible.set(!plausible, Fault::LaneImplausible);
             }
             Input::Held(_) => {}
             Input::Lost => {
+                changed.add(Changed::LANE);
                 v.plausibility.forget_lane();
                 past.forget_line();
                 implausible.set(false, Fault::LaneImplausible);
             }
         }
+        if let Some(c) = to_check(column, &mut due.column) {
+            changed.add(Changed::COLUMN);
+            let plausible = checks.column(
+                &mut v.plausibility,
+                self.now,
+                c.driver_torque,
+                c.wheel_angle,
+                self.applied,
+            );
+            implausible.set(!plausible, Fault::ColumnImplausible);
+        }
+        if let Some(sample) = to_check(lane, &mut due.lane) {
+            changed.add(Changed::LANE);
+            let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
+            implausible.set(!plausible, Fault::LaneImplausible);
+        }
         self.make_up_for_age(v, past);
-        v.age.request = self.age(request, v.age.request);
+        if let Input::New(_) = request {
+            v.heard.request = self.now;
+            changed.add(Changed::HEARD);
+        }
 
         // A frame that arrives and is refused is no time-out: the fault that says so came with the inputs.
         let refused = |fault| self.inputs.faults.contains(fault);
@@ -158,7 +198,7 @@ impl<I: Injection> Step<'_, I> {
             Fault::SpeedTimeout,
         );
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
-        v.implausible = implausible.bits();
+        v.hot.implausible = implausible.bits();
         lost
     }
 
@@ -168,25 +208,26 @@ impl<I: Injection> Step<'_, I> {
             return;
         };
         let age = self.now.since(sample.at);
-        if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
-            (v.turned, v.rate_then) = (Radians::ZERO, TurningRate::ZERO);
+        if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
+            (v.hot.turned, v.hot.rate_then) = (Radians::ZERO, TurningRate::ZERO);
         } else if let Input::New(_) = self.inputs.lane {
-            (v.turned, v.rate_then) = past.turned(self.now, sample.at);
+            (v.hot.turned, v.hot.rate_then) = past.turned(self.now, sample.at);
         } else {
             let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
-            v.turned = Radians::from_bits(v.turned.bits().saturating_add(turned));
+            v.hot.turned = Radians::from_bits(v.hot.turned.bits().saturating_add(turned));
         }
     }
 
     /// How its motion since then differs from going on as it did.
     fn since(&self, v: &Memory, sample: LaneSample) -> Since {
         let age = self.now.since(sample.at);
-        if age.us().saturating_sub(v.age.lane.us()) <= PROMPT.us() {
+        if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
             return Since::NOTHING;
         }
-        let went_on = per_second(v.rate_then.bits(), age);
-        let turned = i64::from(v.turned.bits()).saturating_sub(i64::from(went_on));
-        let faster = i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.rate_then.bits()));
+        let went_on = per_second(v.hot.rate_then.bits(), age);
+        let turned = i64::from(v.hot.turned.bits()).saturating_sub(i64::from(went_on));
+        let faster =
+            i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.hot.rate_then.bits()));
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.bits(), speed.bits());
         Since::new(
@@ -195,13 +236,6 @@ impl<I: Injection> Step<'_, I> {
             speed,
             Metres::from_wide(near),
         )
-    }
-
-    fn age<T>(&self, input: &Input<T>, so_far: Micros) -> Micros {
-        match input {
-            Input::New(_) => Micros::from_us(0),
-            _ => Micros::from_us(so_far.us().saturating_add(self.elapsed.us())),
-        }
     }
 
     /// Whether both speeds reach the slowest that is guided, if they are known.
@@ -215,38 +249,37 @@ impl<I: Injection> Step<'_, I> {
 
     /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
     fn keep_time(&self, v: &mut Memory) -> (u8, u8) {
-        v.small.late = match self.elapsed {
+        v.hot.small.late = match self.elapsed {
             e if e > LOST_TIME => LATE_STEPS.saturating_add(1),
-            e if e > LATE => v.small.late.saturating_add(1),
+            e if e > LATE => v.hot.small.late.saturating_add(1),
             _ => 0,
         };
-        v.small.early = if self.elapsed < EARLY {
-            v.small.early.saturating_add(1)
+        v.hot.small.early = if self.elapsed < EARLY {
+            v.hot.small.early.saturating_add(1)
         } else {
             0
         };
-        (v.small.late, v.small.early)
+        (v.hot.small.late, v.hot.small.early)
     }
 
     /// The most urgent event that changes the mode decides.
-    fn next_mode(&self, v: &mut Memory, mode: Mode, faults: FaultSet) -> Mode {
+    fn next_mode(&self, v: &mut Memory, mode: Mode, faults: FaultSet, fast_enough: Option<bool>) -> Mode {
         let inputs_ok = !faults.intersects(FaultSet::INPUT);
         let request = self.inputs.request.value().map(|r| r.engage);
-        let fast_enough = self.is_fast_enough();
-        let rising = request == Some(true) && v.small.requested == 0;
+        let rising = request == Some(true) && v.hot.small.requested == 0;
         if let Some(high) = request {
-            v.small.requested = u8::from(high);
+            v.hot.small.requested = u8::from(high);
         }
-        v.ready = if mode == Mode::Standby && inputs_ok && fast_enough == Some(true) {
-            Micros::from_us(v.ready.us().saturating_add(self.elapsed.us())).min(READY)
+        v.hot.ready = if mode == Mode::Standby && inputs_ok && fast_enough == Some(true) {
+            Micros::from_us(v.hot.ready.us().saturating_add(self.elapsed.us())).min(READY)
         } else {
             Micros::from_us(0)
         };
         let mut raised = Events::of(Event::BootPassed);
-        raised.insert_if(rising && v.ready >= READY, Event::Engage);
+        raised.insert_if(rising && v.hot.ready >= READY, Event::Engage);
         // Late steps carry the ramp further than the reduction limit lets the torque follow.
         raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
-        let no_hand = v.hands.without() >= END;
+        let no_hand = v.hot.hands.without() >= END;
         let is_over = request == Some(false) || fast_enough == Some(false) || no_hand;
         raised.insert_if(is_over, Event::Disengage);
         raised.insert_if(!inputs_ok, Event::InputLost);
@@ -257,13 +290,13 @@ impl<I: Injection> Step<'_, I> {
 
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
-        v.small.mode = mode as u8;
-        v.probe = ProbeState::SILENT;
+        v.hot.small.mode = mode as u8;
+        v.hot.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.
             Mode::Active => {
-                (v.law, v.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
-                v.hands.begin();
+                (v.law, v.hot.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
+                v.hot.hands.begin();
             }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
@@ -271,7 +304,7 @@ impl<I: Injection> Step<'_, I> {
                 // Half a wave of the probe must not stand in the wheel for two seconds, and what the other half
                 // took away does not come back.
                 let applied =
-                    smaller_of_same_sign(self.applied, without(self.applied, Some(v.probe_applied)));
+                    smaller_of_same_sign(self.applied, without(self.applied, Some(v.hot.probe_applied)));
                 v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), HANDOVER);
             }
             _ => {}
@@ -280,29 +313,35 @@ impl<I: Injection> Step<'_, I> {
 
     /// How long ago the earliest sample came that must not be trusted.
     fn suspect_since(&self, v: &Memory, faults: FaultSet) -> Micros {
-        let lost_for = |fault, age| {
+        let lost_for = |fault, heard| {
             if faults.contains(fault) {
-                age
+                self.now.since(heard)
             } else {
                 Micros::from_us(0)
             }
         };
         faults
             .unseen()
-            .max(lost_for(Fault::LaneTimeout, v.age.lane))
-            .max(lost_for(Fault::LaneInvalid, v.age.lane))
-            .max(lost_for(Fault::LaneStep, v.age.lane))
-            .max(lost_for(Fault::SpeedStep, v.age.speeds))
-            .max(lost_for(Fault::ColumnTimeout, v.age.column))
-            .max(lost_for(Fault::SpeedTimeout, v.age.speeds))
-            .max(lost_for(Fault::CommandTimeout, v.age.request))
+            .max(lost_for(Fault::LaneTimeout, v.heard.lane))
+            .max(lost_for(Fault::LaneInvalid, v.heard.lane))
+            .max(lost_for(Fault::LaneStep, v.heard.lane))
+            .max(lost_for(Fault::SpeedStep, v.heard.motion))
+            .max(lost_for(Fault::ColumnTimeout, v.heard.column))
+            .max(lost_for(Fault::SpeedTimeout, v.heard.motion))
+            .max(lost_for(Fault::CommandTimeout, v.heard.request))
     }
 
     /// The torque, the part of it that is the probe, and what limited it.
-    fn torque(&self, v: &mut Memory, mode: Mode, faults: FaultSet) -> (Torque, Option<Torque>, LimitReason) {
+    fn torque(
+        &self,
+        v: &mut Memory,
+        changed: &mut Changed,
+        mode: Mode,
+        faults: FaultSet,
+    ) -> (Torque, Option<Torque>, LimitReason) {
         let (wanted, probe) = match mode {
             Mode::Active => {
-                let guidance = self.guidance(v);
+                let guidance = self.guidance(v, changed);
                 let probe = self.probe(v);
                 (with(guidance, probe), probe)
             }
@@ -316,6 +355,7 @@ impl<I: Injection> Step<'_, I> {
                     1
                 };
                 let passed = Micros::from_us(self.elapsed.us().saturating_mul(pace));
+                changed.add(Changed::RAMP);
                 (smaller_of_same_sign(v.ramp.step(passed), self.applied), None)
             }
             // At once: what is behind these modes must not move the wheel for another tick.
@@ -337,7 +377,7 @@ impl<I: Injection> Step<'_, I> {
         let (torque, limit) = self
             .config
             .envelope
-            .step(&mut v.envelope, self.now, wanted, &situation);
+            .step(&mut v.hot.envelope, self.now, wanted, &situation);
         match limit {
             LimitReason::None if mode != Mode::Active => (torque, probe, LimitReason::Mode),
             LimitReason::None => (torque, probe, limit),
@@ -349,23 +389,32 @@ impl<I: Injection> Step<'_, I> {
     /// The probe's torque, while it is wanted or on its way out.
     fn probe(&self, v: &mut Memory) -> Option<Torque> {
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe);
-        self.config.probe.step(&mut v.probe, self.elapsed, wanted)
+        self.config.probe.step(&mut v.hot.probe, self.elapsed, wanted)
     }
 
     /// The law's torque, scaled by the authority.
-    fn guidance(&self, v: &mut Memory) -> Torque {
+    fn guidance(&self, v: &mut Memory, changed: &mut Changed) -> Torque {
         let asked = self.inputs.lane.value().map_or(Torque::ZERO, |sample| {
-            let since = self.since(v, sample);
-            self.config.law.step(&mut v.law, self.now, sample, &since)
+            if !v.law.knows(&sample) {
+                changed.add(Changed::LAW);
+                self.config.law.take(&mut v.law, sample);
+            }
+            self.config.law.asked(&v.law, self.now, &self.since(v, sample))
         });
         let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ZERO, share);
-        let scheduled = self.config.schedule.share(v.plausibility.speed());
-        let share = saturate(product(authority.bits(), scheduled.bits()));
+        let share = saturate(product(authority.bits(), v.share.bits()));
         Torque::from_wide(product(share, asked.bits()))
     }
+}
+
+/// The value whose check has come: that of the step before. A step that takes a new value has work enough; where there is
+/// one in every step, every other one is checked, for as much time as both.
+fn to_check<T: Copy>(input: &Input<T>, is_due: &mut bool) -> Option<T> {
+    let was_due = core::mem::replace(is_due, matches!(input, Input::New(_)) && !*is_due);
+    input.value().filter(|_| was_due)
 }
 
 fn with(guidance: Torque, probe: Option<Torque>) -> Torque {

@@ -11,7 +11,7 @@ use crate::bus::messages::{
 };
 use crate::bus::{Frame, Reject};
 use crate::controller::{Column, Input, Inputs, Motion, Request};
-use crate::faults::{Fault, FaultSet};
+use crate::faults::Fault;
 use crate::law::LaneSample;
 use crate::plausibility::{is_another_line, lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
@@ -35,7 +35,7 @@ pub(super) struct Slot<T> {
     doubt: u8,
     /// When it was heard.
     at: Instant,
-    /// How far apart its sender's messages come.
+    /// How far apart its sender's messages come, or [`LEAST_PERIOD`].
     period: Micros,
     value: T,
 }
@@ -48,6 +48,8 @@ const MOTION_PERIOD: Micros = Micros::from_ms(25);
 const REQUEST_PERIOD: Micros = Micros::from_ms(25);
 /// A sender's period is forgotten within 2^6 of its messages: half a second of a camera of 120 Hz.
 const PERIOD_SHIFT: u32 = 6;
+/// A sender whose messages come closer is waited for as long as one of this: [`TIMEOUT`].
+const LEAST_PERIOD: Micros = Micros::from_us(TIMEOUT.us() / 3);
 /// A lane sample that is older than this when it comes is none.
 const OLDEST_SAMPLE: Micros = Micros::from_ms(150);
 
@@ -86,11 +88,12 @@ impl<T: Words> Words for Slot<T> {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
-        self.head().is_inverse_of(&other.head())
-            & self.at.is_inverse_of(&other.at)
-            & self.period.is_inverse_of(&other.period)
-            & self.value.is_inverse_of(&other.value)
+    #[inline(always)]
+    fn agreement(&self, other: &Self) -> u32 {
+        self.head().agreement(&other.head())
+            & self.at.agreement(&other.at)
+            & self.period.agreement(&other.period)
+            & self.value.agreement(&other.value)
     }
 }
 
@@ -125,14 +128,14 @@ impl<T: Words> Slot<T> {
         } else {
             period.saturating_sub(period.saturating_sub(apart) >> PERIOD_SHIFT)
         };
-        self.period = Micros::from_us(period);
+        self.period = Micros::from_us(period).max(LEAST_PERIOD);
         (self.state, self.value, self.at) = (NEW, value, now);
     }
 
     /// For how long the value may be used.
     fn timeout(&self) -> Micros {
         // No period is longer than the slowest sender's.
-        Micros::from_us(self.period.us().wrapping_mul(3)).max(TIMEOUT)
+        Micros::from_us(self.period.us().wrapping_mul(3))
     }
 
     fn last(&self) -> Option<T> {
@@ -140,27 +143,23 @@ impl<T: Words> Slot<T> {
     }
 }
 
-/// What a step sees, and the doubt about the last frame. A stale value is dropped, so that no instant outlives a wrap of
-/// the clock, and its sender has to be trusted anew. Only what changes is written: in most steps nothing. `whole` becomes
-/// false if the slot is damaged.
-fn take<T: Words>(guarded: &mut Redundant<Slot<T>>, now: Instant, whole: &mut bool) -> (Input<T>, u8) {
-    let Some(slot) = guarded.get() else {
-        *whole = false;
-        return (Input::Lost, 0);
-    };
-    let (state, doubt, value) = (slot.state, slot.doubt, slot.value);
-    let seen = if state == LOST {
-        Input::Lost
-    } else if now.since(slot.at) > slot.timeout() {
+/// What a step sees of a slot that is whole. A stale value is dropped, so that no instant outlives a wrap of the clock, and
+/// its sender has to be trusted anew. Only what changes is written: in most steps nothing.
+#[inline(always)]
+fn take<T: Words, U: From<T>>(guarded: &mut Redundant<Slot<T>>, now: Instant, seen: &mut Input<U>) {
+    let slot = guarded.value();
+    let (state, value) = (slot.state, slot.value);
+    if state == LOST {
+        return;
+    }
+    if now.since(slot.at) > slot.timeout() {
         guarded.amend(|slot| (slot.state, slot.e2e) = (LOST, ReceiverState::NEW));
-        Input::Lost
     } else if state == HELD {
-        Input::Held(value)
+        *seen = Input::Held(value.into());
     } else {
         guarded.put(|slot| &mut slot.state, HELD);
-        Input::New(value)
-    };
-    (seen, doubt)
+        *seen = Input::New(value.into());
+    }
 }
 
 /// A lane sample that was too far from the last one used, and whether there is one.
@@ -183,9 +182,10 @@ impl Words for Refused {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
+    #[inline(always)]
+    fn agreement(&self, other: &Self) -> u32 {
         let [mine, others] = [self, other].map(|refused| word([refused.is_there, refused.moved]));
-        mine.is_inverse_of(&others) & self.sample.is_inverse_of(&other.sample)
+        mine.agreement(&others) & self.sample.agreement(&other.sample)
     }
 }
 
@@ -278,9 +278,10 @@ impl Words for RequestWords {
         }
     }
 
-    fn is_inverse_of(&self, other: &Self) -> bool {
+    #[inline(always)]
+    fn agreement(&self, other: &Self) -> u32 {
         let [mine, others] = [self, other].map(|request| word([request.engage, request.probe]));
-        mine.is_inverse_of(&others) & self.authority.is_inverse_of(&other.authority)
+        mine.agreement(&others) & self.authority.agreement(&other.authority)
     }
 }
 
@@ -418,36 +419,42 @@ impl Receivers {
         let _ = self.lane.change(|slot| (slot.at, slot.value.at) = (now, now));
     }
 
-    /// What a step sees; `whole` becomes false if a receiver is damaged.
-    pub(super) fn take(&mut self, now: Instant, whole: &mut bool) -> Inputs {
-        let (lane, lane_doubt) = take(&mut self.lane, now, whole);
-        let (column, _) = take(&mut self.column, now, whole);
-        let (motion, speeds_doubt) = take(&mut self.motion, now, whole);
-        let (request, _) = take(&mut self.request, now, whole);
-        let refused = self.refused.get();
-        *whole &= refused.is_some();
-        let line_moved = refused.is_some_and(|refused| refused.moved != 0);
-        if line_moved {
+    /// Whether no receiver is damaged. A function of its own, as [`are_whole`].
+    ///
+    /// [`are_whole`]: crate::redundant::are_whole
+    #[inline(never)]
+    pub(super) fn is_whole(&self) -> bool {
+        self.lane.agrees()
+            && self.refused.agrees()
+            && self.column.agrees()
+            && self.motion.agrees()
+            && self.request.agrees()
+    }
+
+    /// What a step sees of receivers that are whole, into [`Inputs::lost`].
+    #[inline(always)]
+    pub(super) fn take(&mut self, now: Instant, inputs: &mut Inputs) {
+        take(&mut self.lane, now, &mut inputs.lane);
+        take(&mut self.column, now, &mut inputs.column);
+        take(&mut self.motion, now, &mut inputs.motion);
+        take(&mut self.request, now, &mut inputs.request);
+        if self.refused.value().moved != 0 {
             self.refused.put(|refused| &mut refused.moved, 0);
+            inputs.line_moved = true;
         }
-        let mut faults = FaultSet::NONE;
+        let faults = &mut inputs.faults;
         // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
-        if lane == Input::Lost {
-            faults.insert_if(lane_doubt == INVALID, Fault::LaneInvalid);
-            faults.insert_if(lane_doubt == STEP, Fault::LaneStep);
+        if inputs.lane == Input::Lost {
+            let doubt = self.lane.value().doubt;
+            faults.insert_if(doubt == INVALID, Fault::LaneInvalid);
+            faults.insert_if(doubt == STEP, Fault::LaneStep);
         }
-        faults.insert_if(motion == Input::Lost && speeds_doubt == STEP, Fault::SpeedStep);
+        if inputs.motion == Input::Lost {
+            faults.insert_if(self.motion.value().doubt == STEP, Fault::SpeedStep);
+        }
         if self.foreign > 0 {
             self.foreign = self.foreign.saturating_sub(1);
             faults.insert(Fault::OwnIdentifier);
-        }
-        Inputs {
-            lane,
-            column,
-            motion,
-            line_moved,
-            request: request.map(Request::from),
-            faults,
         }
     }
 }

@@ -17,7 +17,7 @@ pub use service::{
 
 use super::e2e::{Protection, ReceiverState, Reject};
 use super::frame::Frame;
-use crate::quantity::{Micros, shift_round};
+use crate::quantity::Micros;
 
 /// Version of the bus: of identifiers, layouts and data IDs. `core/haptic.dbc` carries the same.
 pub const VERSION: &str = "2.3.0";
@@ -191,7 +191,9 @@ const fn mask(bits: u32) -> u64 {
 
 /// `bits` of 2^-24 as a count of 2^-`lsb`, rounded, saturated to +-`max`.
 fn to_lsb(bits: i32, lsb: u32, max: i64) -> i64 {
-    shift_round(i64::from(bits), 24_u32.wrapping_sub(lsb)).clamp(max.wrapping_neg(), max)
+    // Half a count more and one bit less: in 32 bits, as the sum of both has no room for more.
+    let halves = bits.wrapping_shr(23_u32.wrapping_sub(lsb));
+    i64::from(halves.wrapping_add(1) >> 1).clamp(max.wrapping_neg(), max)
 }
 
 /// The other way, exact.
