@@ -9,6 +9,7 @@ fn drive(world: &str, hours: f64) -> haptic_batch::availability::Availability {
         roads: ROADS.iter().collect(),
         hours,
         seed: 1,
+        only: Vec::new(),
     };
     study(&plan, &[], |_| Ok(())).unwrap()
 }

@@ -146,8 +146,13 @@ impl PlausibilityState {
         if self.motion.has_yaw_rate != 0 {
             self.motion.yaw_rate
         } else {
-            TurningRate::from_wide(product(self.motion.turning_gain.bits(), self.column.wheel.bits()))
+            self.turning_by_wheel()
         }
+    }
+
+    /// How fast the wheel angle lets the vehicle turn where nothing pushes it.
+    fn turning_by_wheel(&self) -> TurningRate {
+        TurningRate::from_wide(product(self.motion.turning_gain.bits(), self.column.wheel.bits()))
     }
 
     /// Takes a wheel angle that is not checked yet.
@@ -254,6 +259,11 @@ const UNREAL: i64 = Metres::from_m(0.8).bits() as i64;
 pub const ASSIST: i64 = 5;
 /// Friction of the column, and what else holds it without a sign.
 const FRICTION: Torque = Torque::from_nm(0.5);
+/// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank, 2^-24 N.m.
+#[expect(clippy::as_conversions, reason = "widened at compile time")]
+const PUSHED: i64 = Torque::from_nm(0.3).bits() as i64;
+/// Inertia of column and wheel: 2^-3 kg.m2, a little more than the 0.11 of table 9.
+const INERTIA_SHIFT: u32 = 3;
 /// Bounds of what is learnt slowly: a bank of 5 %, or a pull; 5 mrad of camera and yaw rate at 30 m/s.
 const COLUMN_BIAS: Torque = Torque::from_nm(0.5);
 const LANE_BIAS: Speed = Speed::from_m_per_s(0.15);
@@ -264,12 +274,11 @@ impl Plausibility {
     /// Takes the speed in use and the measured yaw rate; returns nothing, for neither has a counterpart here. How fast
     /// the vehicle turns at this speed, `chi_dot/phi = v*K_t / (l*(1 + A*v^2))`, is the steady state of the bicycle model.
     pub fn motion(&self, state: &mut PlausibilityState, speed: Speed, yaw_rate: Option<TurningRate>) {
-        let is_known = speed == state.motion.speed && state.motion.has_yaw_rate == 0;
+        let is_known = speed == state.motion.speed;
         state.motion.has_yaw_rate = u32::from(yaw_rate.is_some());
         state.motion.yaw_rate = yaw_rate.unwrap_or(TurningRate::ZERO);
         state.motion.speed = speed;
-        // Nobody asks for the gain while the rate is measured.
-        if is_known || yaw_rate.is_some() {
+        if is_known {
             return;
         }
         let v = speed.bits();
@@ -295,14 +304,24 @@ impl Plausibility {
         let dt = now.since(state.column.at);
         if state.column.is_known != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
-            let lateral = product(state.motion.speed.bits(), state.turning().bits());
-            let aligning = wide_product(lateral, self.aligning_gain.bits()) >> FRAC_BITS;
-            let lacking = i64::from(applied.bits()).saturating_sub(aligning);
+            let aligning_at = |turning: TurningRate| {
+                let lateral = product(state.motion.speed.bits(), turning.bits());
+                wide_product(lateral, self.aligning_gain.bits()) >> FRAC_BITS
+            };
+            let aligning = aligning_at(state.turning());
+            let by_wheel = aligning_at(state.turning_by_wheel())
+                .max(aligning.saturating_sub(PUSHED))
+                .min(aligning.saturating_add(PUSHED));
+            let applied = i64::from(applied.bits());
             // What driver and assist may give together.
             let driver = i64::from(driver.bits());
             let assisted = driver.saturating_mul(ASSIST);
-            let least = lacking.saturating_add(driver.min(assisted));
-            let most = lacking.saturating_add(driver.max(assisted));
+            let least = applied
+                .saturating_add(driver.min(assisted))
+                .saturating_sub(aligning.max(by_wheel));
+            let most = applied
+                .saturating_add(driver.max(assisted))
+                .saturating_sub(aligning.min(by_wheel));
             let damped = wide_product(moved, self.column_damping.bits()) >> FRAC_BITS;
             // All times dt, for the wheel's movement is that of dt.
             let impulse = |torque: i64| per_second_times(torque, dt);
@@ -328,7 +347,15 @@ impl Plausibility {
         }
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
-        i64::from(state.column.sum.bits()).abs() <= i64::from(self.column_margin.bits())
+        let sum = i64::from(state.column.sum.bits());
+        let above = sum.abs().saturating_sub(i64::from(self.column_margin.bits()));
+        // Inertia times way over time is the wheel's momentum, in the direction of the sum.
+        let along = if sum.is_negative() {
+            moved.saturating_neg()
+        } else {
+            moved
+        };
+        above <= 0 || per_second_times(above, dt) <= along >> INERTIA_SHIFT
     }
 
     /// Takes a new lane sample that came now; `false` when its error did not move as it must have.

@@ -49,6 +49,10 @@ const COLUMN_BIAS_NM: f64 = 0.5;
 const FRICTION_NM: f64 = 0.5;
 const ALIGNING_SHARE: f64 = 77.0 / 256.0;
 const ASSIST: f64 = 5.0;
+/// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank.
+const PUSHED_NM: f64 = 0.3;
+/// Inertia of column and wheel.
+const INERTIA_KG_M2: f64 = 0.125;
 
 /// Whether errors are further from the last than a vehicle can go.
 fn is_a_step(last: [f64; 2], new: [f64; 2]) -> bool {
@@ -91,10 +95,13 @@ impl Seen {
 #[derive(Debug, Clone)]
 pub(super) struct Residual {
     aligning_gain_nm_s2_per_m: f64,
+    curvature_gain_per_m: f64,
+    stability_factor_s2_per_m2: f64,
     damping_nm_s: f64,
     speeds_m_per_s: [f64; 2],
     yaw_rate_rad_per_s: f64,
     wheel_rad: f64,
+    wheel_rate_rad_per_s: f64,
     lane: Option<(f64, f64, f64)>,
     /// When, the heading, and the rate of turn since.
     headings: VecDeque<[f64; 3]>,
@@ -125,16 +132,21 @@ impl Residual {
             l_f,
             l_r,
             k_f,
+            k_r,
+            k_t,
             b_s,
             ..
         } = *vehicle;
         let l = l_f + l_r;
         Self {
             aligning_gain_nm_s2_per_m: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
+            curvature_gain_per_m: k_t / l,
+            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
             damping_nm_s: b_s,
             speeds_m_per_s: [v_m_per_s; 2],
             yaw_rate_rad_per_s: 0.0,
             wheel_rad: 0.0,
+            wheel_rate_rad_per_s: 0.0,
             lane: None,
             headings: VecDeque::new(),
             lines: VecDeque::new(),
@@ -182,9 +194,21 @@ impl Residual {
     pub(super) fn column(&mut self, time_s: f64, driver_nm: f64, wheel_rad: f64, applied_nm: f64) {
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
-            let aligning = self.aligning_gain_nm_s2_per_m * self.speeds_m_per_s[0] * self.yaw_rate_rad_per_s;
-            let lacking = applied_nm - aligning - self.damping_nm_s * (wheel_rad - self.wheel_rad) / dt;
-            let ends = [driver_nm, ASSIST * driver_nm].map(|t| lacking + t);
+            let v = self.speeds_m_per_s[0];
+            let aligning_at = |turning: f64| self.aligning_gain_nm_s2_per_m * v * turning;
+            let aligning = aligning_at(self.yaw_rate_rad_per_s);
+            // As the wheel angle would let the vehicle turn if nothing pushed it.
+            let by_wheel = aligning_at(
+                v * self.curvature_gain_per_m * self.wheel_rad
+                    / (1.0 + self.stability_factor_s2_per_m2 * v * v),
+            );
+            let by_wheel = by_wheel.clamp(aligning - PUSHED_NM, aligning + PUSHED_NM);
+            self.wheel_rate_rad_per_s = (wheel_rad - self.wheel_rad) / dt;
+            let moving = applied_nm - self.damping_nm_s * self.wheel_rate_rad_per_s;
+            let ends = [
+                moving + driver_nm.min(ASSIST * driver_nm) - aligning.max(by_wheel),
+                moving + driver_nm.max(ASSIST * driver_nm) - aligning.min(by_wheel),
+            ];
             let beyond = |bias: f64, tolerance: f64| {
                 let [low, high] = ends.map(|end| end - bias);
                 (low.min(high) - tolerance).max(0.0) + (low.max(high) + tolerance).min(0.0)
@@ -284,7 +308,9 @@ impl Residual {
 
     /// Share of the column's margin that is used.
     pub(super) fn column_used(&self) -> f64 {
-        self.momentum_nm_s.abs() / COLUMN_MARGIN_NM_S
+        // The wheel's own momentum, in the direction of the sum, is allowed beside the margin.
+        let turning = INERTIA_KG_M2 * self.wheel_rate_rad_per_s * self.momentum_nm_s.signum();
+        self.momentum_nm_s.abs() / (COLUMN_MARGIN_NM_S + turning.max(0.0))
     }
 
     /// Share of a margin that is used; at 1 a fault can be seen.

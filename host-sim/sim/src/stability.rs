@@ -45,6 +45,17 @@ fn state(index: usize) -> Sum {
     sum
 }
 
+/// The share of the law's torque at a speed: two lines through all of it at 60 km/h, to those of the parameters at 20 and
+/// 130 km/h.
+pub fn share(law: &Params, v_m_per_s: f64) -> f64 {
+    let kmh = (v_m_per_s * 3.6).clamp(20.0, 130.0);
+    if kmh < 60.0 {
+        1.0 - (1.0 - law.low_speed_share) * (60.0 - kmh) / 40.0
+    } else {
+        1.0 - (1.0 - law.high_speed_share) * (kmh - 60.0) / 70.0
+    }
+}
+
 /// The growth of the slowest motion, 1/s: below zero the loop is stable.
 pub fn growth_per_s(
     v_m_per_s: f64,
@@ -95,10 +106,11 @@ pub fn growth_per_s(
     if let Some(Guided { law, t_n }) = guided {
         let corner = std::f64::consts::TAU * law.rate_corner_hz;
         let errors = [near(t_n), -&direction];
+        let k_1 = law.k_1 * share(law, v);
         let gains = [[law.a_1, law.a_2], [law.a_3, law.a_4]];
         for (n, (error, [on_error, on_rate])) in errors.iter().zip(gains).enumerate() {
             let filtered = corner * (error - state(RATES + n));
-            torque += law.k_1 * (on_error * error + on_rate * &filtered);
+            torque += k_1 * (on_error * error + on_rate * &filtered);
             row(RATES + n, filtered);
         }
     } else {
@@ -124,11 +136,11 @@ pub fn growth_per_s(
 mod tests {
     use super::*;
     use crate::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
-    use crate::scenario::{Condition, Sensors};
+    use crate::scenario::{Condition, GuidanceParameters, Sensors};
     use crate::{Action, Scenario, Simulation};
 
     /// Growth of the lateral error between 20 and 40 s after a push at the wheel, from the simulation itself.
-    fn simulated(kmh: f64, t_p: f64, condition: Condition) -> f64 {
+    fn simulated(kmh: f64, t_p: f64, condition: Condition, law: Params) -> f64 {
         let course = Course::new(
             "straight",
             DEFAULT_LANE_WIDTH_M,
@@ -143,6 +155,10 @@ mod tests {
             .speed_kmh(kmh)
             .driver(driver)
             .condition(condition)
+            .guidance(GuidanceParameters {
+                controller: law,
+                ..GuidanceParameters::default()
+            })
             .sensors(Sensors::Exact);
         let mut simulation = Simulation::new(&scenario.build().unwrap());
         let mut peaks = [0.0_f64; 2];
@@ -173,33 +189,57 @@ mod tests {
         for kmh in [40.0, 80.0, 120.0] {
             for t_p in [0.1, 0.5] {
                 for condition in [Condition::Manual, Condition::Mid] {
-                    let driver = DriverParameters {
-                        t_p,
-                        ..DriverParameters::default()
-                    };
-                    let guided = Guided {
-                        law: &Params::PAPER,
-                        t_n: 0.3,
-                    };
-                    let growth = growth_per_s(
-                        kmh / 3.6,
-                        &VehicleParameters::default(),
-                        &driver,
-                        condition.gains(),
-                        (condition != Condition::Manual).then_some(guided),
-                    );
-                    let seen = simulated(kmh, t_p, condition);
-                    let what =
-                        format!("{kmh} km/h, t_p {t_p}, {condition}: {growth:.3}, simulated {seen:.3}");
-                    // A fast decay ends in the sensors' rounding and in the integral's slow way back.
-                    if growth.abs() < 0.3 && seen.is_finite() {
-                        assert!((growth - seen).abs() < 0.03 + 0.15 * growth.abs(), "{what}");
-                    }
-                    assert_eq!(growth > 0.0, seen > 0.0, "{what}");
+                    let growth = agreed(kmh, t_p, condition, Params::PAPER);
                     signs[usize::from(growth > 0.0)] += 1;
                 }
             }
         }
         assert!(signs.iter().all(|n| *n > 0), "both kinds: {signs:?}");
+    }
+
+    /// A schedule that leaves little of the guidance leaves a driver nearly alone; the simulated ECU has it too.
+    #[test]
+    fn a_schedule_counts() {
+        let law = Params {
+            low_speed_share: 0.25,
+            high_speed_share: 0.1,
+            ..Params::PAPER
+        };
+        for (kmh, expected) in [
+            (20.0, 0.25),
+            (40.0, 0.625),
+            (60.0, 1.0),
+            (95.0, 0.55),
+            (130.0, 0.1),
+            (200.0, 0.1),
+        ] {
+            assert!((share(&law, kmh / 3.6) - expected).abs() < 1e-12, "{kmh}");
+        }
+        let [whole, little] = [Params::PAPER, law].map(|law| agreed(120.0, 0.4, Condition::Mid, law));
+        assert!(whole < -0.05 && little > 0.0, "{whole} {little}");
+    }
+
+    /// The growth, which the simulation has to show too.
+    fn agreed(kmh: f64, t_p: f64, condition: Condition, law: Params) -> f64 {
+        let driver = DriverParameters {
+            t_p,
+            ..DriverParameters::default()
+        };
+        let guided = Guided { law: &law, t_n: 0.3 };
+        let growth = growth_per_s(
+            kmh / 3.6,
+            &VehicleParameters::default(),
+            &driver,
+            condition.gains(),
+            (condition != Condition::Manual).then_some(guided),
+        );
+        let seen = simulated(kmh, t_p, condition, law);
+        let what = format!("{kmh} km/h, t_p {t_p}, {condition}: {growth:.3}, simulated {seen:.3}");
+        // A fast decay ends in the sensors' rounding and in the integral's slow way back.
+        if growth.abs() < 0.3 && seen.is_finite() {
+            assert!((growth - seen).abs() < 0.03 + 0.15 * growth.abs(), "{what}");
+        }
+        assert_eq!(growth > 0.0, seen > 0.0, "{what}");
+        growth
     }
 }

@@ -19,6 +19,9 @@ pub(super) struct Arguments {
     /// Hours in each world on each road, in drives of five minutes
     #[arg(long, value_name = "H", default_value_t = 0.25)]
     hours: f64,
+    /// These drives alone, by number, separated by commas, in place of hours of them
+    #[arg(long, value_delimiter = ',', value_name = "N,...", conflicts_with = "hours", value_parser = clap::value_parser!(u32).range(0..=1_199_999))]
+    drives: Vec<u32>,
     /// Worlds, by name, separated by commas; default: all (--list shows them)
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     worlds: Vec<String>,
@@ -93,7 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         results
             .cells
             .iter()
-            .any(|cell| cell.judged && cell.declarations.upper_95 > most)
+            .any(|cell| cell.judged && !(cell.declarations.upper_95 <= most))
     };
     Ok(if arguments.most_per_hour.is_some_and(too_many) {
         Outcome::Failed
@@ -119,6 +122,7 @@ fn plan(arguments: &Arguments) -> Result<Plan, BadInput> {
         roads,
         hours: arguments.hours,
         seed: arguments.seed,
+        only: arguments.drives.clone(),
     })
 }
 
@@ -175,6 +179,7 @@ fn readable(results: &Balance) -> String {
         }
     };
     add(files::causes(&results.availability));
+    add(files::drives(&results.availability));
     if let Some(faults) = &results.detection {
         add(files::detection_table(faults));
     }

@@ -3,14 +3,20 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::stability::{PLACES, map};
+use haptic_batch::stability::{PLACES, map, shares};
 use haptic_report::studies::stability::{self as files, Map};
 
 use super::output::Output;
 use super::{BadInput, Outcome, print, print_json, progress};
+use haptic_sim::Scenario;
+use haptic_sim::input::InputError;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
+    /// Scenario file whose guidance with its schedule, driver, vehicle and world are mapped; speed, delay, arm and road are
+    /// the map's; default: the paper's
+    #[arg(value_name = "SCENARIO.toml")]
+    scenario: Option<PathBuf>,
     /// Directory for figures, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -20,10 +26,18 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let (name, base) = match &arguments.scenario {
+        None => ("the paper's scenario".into(), Scenario::default()),
+        Some(path) => (
+            path.display().to_string(),
+            haptic_batch::files::load_scenario(path)?,
+        ),
+    };
     let output = arguments.out.as_deref().map(Output::begin).transpose()?;
     let bar = progress::bar(PLACES as u64, "places");
     let map = Map {
-        places: map(|| bar.inc(1))?,
+        places: map(&base, || bar.inc(1)).map_err(|e| InputError::new(&name, e))?,
+        shares: shares(&base).map_err(|e| InputError::new(&name, e))?,
     };
     bar.finish_and_clear();
     if let Some(output) = output {
@@ -34,8 +48,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         let table = files::table(&map).to_text();
         print(&format!(
-            "{}\n\n{table}\n{}",
+            "{}\n\n{table}\n{}\n{}",
             files::SUMMARY,
+            files::shares(&map).to_text(),
             files::judgement(&map)
         ))?;
     }

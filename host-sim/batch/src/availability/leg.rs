@@ -4,7 +4,7 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_sim::guidance::OverBus;
+use haptic_sim::guidance::{NoGuidance, OverBus};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::seeds::Stream;
 use haptic_sim::simulation::Ending;
@@ -60,6 +60,18 @@ pub struct Leg {
     pub ended: Ended,
     /// What took guidance away.
     pub declarations: Vec<Declaration>,
+    /// The same drive without guidance.
+    pub by_hand: ByHand,
+}
+
+/// A drive by hand: the same driver, car, road, wind and noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ByHand {
+    /// How it ended.
+    pub ended: Ended,
+    /// Largest lateral error, m.
+    pub largest_error_m: f64,
 }
 
 /// How a leg ended.
@@ -87,6 +99,16 @@ pub struct Declaration {
 }
 
 impl Leg {
+    /// Whether this driver leaves the road with this car by hand too: then the drive says nothing of guidance.
+    pub fn is_lost_by_hand(&self) -> bool {
+        self.by_hand.ended == Ended::Diverged
+    }
+
+    /// Whether the ECU left, or the vehicle left the road, with guidance or by hand.
+    pub(super) fn shows_something(&self) -> bool {
+        !self.declarations.is_empty() || self.ended != Ended::Whole || self.is_lost_by_hand()
+    }
+
     /// Whether it is the leg of that number.
     pub fn is(&self, number: &LegNumber) -> bool {
         self.number == number.number && self.world == number.world.name && self.road == number.road.name
@@ -115,7 +137,7 @@ impl LegNumber {
         let noise = rng.random::<u64>() >> 11;
         let lateral = world.lateral_m_per_s2().unwrap_or(road.lateral_m_per_s2);
         let course = road.course(speed_kmh / 3.6, lateral, world.surface(), &mut rng);
-        let car = (root << 16).wrapping_add((number % CARS).into()) >> 1;
+        let car = (root << 16).wrapping_add((number % CARS).into());
         let scenario = Scenario::builder()
             .course(course)
             .speed_kmh(speed_kmh)
@@ -168,7 +190,29 @@ impl LegNumber {
             largest_error_m: watch.largest_m,
             ended,
             declarations: watch.declarations,
+            by_hand: by_hand(&scenario),
         })
+    }
+}
+
+fn by_hand(scenario: &Scenario) -> ByHand {
+    let mut simulation = Simulation::with(scenario, NoGuidance);
+    let mut largest_error_m = 0.0_f64;
+    while simulation.steps() < (LEG_S * 1e3) as u32 {
+        let Some(outcome) = simulation.step(&Action::default()) else {
+            break;
+        };
+        if let Some(sample) = outcome.sample {
+            largest_error_m = largest_error_m.max(sample.lateral_error_m.abs());
+        }
+    }
+    let ended = match simulation.ending() {
+        Some(Ending::Diverged { .. }) => Ended::Diverged,
+        _ => Ended::Whole,
+    };
+    ByHand {
+        ended,
+        largest_error_m,
     }
 }
 

@@ -5,6 +5,10 @@
 //! leg ends where the ECU latches a fault: only a standstill would end that. A *declaration* is what took guidance away; as
 //! nothing is wrong in any leg, each is a false one. A *world* says what is real (`haptic_sim::worlds`).
 //!
+//! A driver who leaves the road with the same car by hand too is one whom no guidance keeps on it: what the ECU makes of a
+//! vehicle that leaves the road is no false declaration. So every leg is driven a second time without guidance, whatever
+//! the first time showed, and a leg that is *lost by hand* is counted apart, with its hours.
+//!
 //! Legs of one number and road share course, driver, car and noise in every world, so that worlds can be
 //! compared. A leg depends on the seed and on its own number alone: in whatever order and in however many sittings legs
 //! are driven, the results are the same.
@@ -19,7 +23,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-pub use leg::{Declaration, Ended, Leg, LegNumber};
+pub use leg::{ByHand, Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
 
 /// Length of a leg, s.
@@ -38,18 +42,32 @@ pub struct Plan {
     pub hours: f64,
     /// Root of all random numbers.
     pub seed: u64,
+    /// These legs in place of hours of them; none: the hours.
+    pub only: Vec<u32>,
 }
 
 impl Plan {
     /// Every leg, in order.
     pub fn legs(&self) -> Vec<LegNumber> {
         let legs = (self.hours * 3600.0 / LEG_S - 1e-9).ceil().max(1.0) as u32;
+        let numbers = if self.only.is_empty() {
+            (0..legs).collect()
+        } else {
+            self.only.clone()
+        };
         let cells = self
             .worlds
             .iter()
             .flat_map(|world| self.roads.iter().map(move |road| (*world, *road)));
         cells
-            .flat_map(|(world, road)| (0..legs).map(move |number| LegNumber { world, road, number }))
+            .flat_map(|(world, road)| {
+                let leg = move |number: &u32| LegNumber {
+                    world,
+                    road,
+                    number: *number,
+                };
+                numbers.iter().map(leg)
+            })
             .collect()
     }
 
@@ -84,7 +102,8 @@ impl Rate {
         } else {
             quantile(0.025, 2 * count)
         };
-        let per = |events: f64| events / hours;
+        // In no time nothing is known.
+        let per = |events: f64| if hours > 0.0 { events / hours } else { f64::NAN };
         Self {
             count,
             per_hour: per(count as f64),
@@ -120,7 +139,7 @@ pub struct Cell {
     pub road: &'static str,
     /// Whether no declaration is to be expected: nothing in it is beyond what roads and cars are.
     pub judged: bool,
-    /// Hours driven.
+    /// Hours driven, without those lost by hand.
     pub hours: f64,
     /// Share of them with guidance.
     pub available: f64,
@@ -134,12 +153,25 @@ pub struct Cell {
     pub cars_with: usize,
     /// Legs that ended in a latched fault.
     pub latched: usize,
-    /// Legs in which the vehicle left the road.
+    /// Legs in which the vehicle left the road, and by hand does not.
     pub diverged: usize,
+    /// Legs in which it leaves the road by hand too: nothing above counts them.
+    pub lost_by_hand: Lost,
     /// Standard deviation of the lateral position (SDLP), m: mean over the legs.
     pub sdlp_m: f64,
     /// Largest lateral error, m.
     pub largest_error_m: f64,
+}
+
+/// Legs that say nothing of guidance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lost {
+    /// How many.
+    pub legs: usize,
+    /// How long they were driven with guidance at hand, h.
+    pub hours: f64,
+    /// What the ECU declared in them.
+    pub declarations: usize,
 }
 
 /// Declarations of one cause.
@@ -160,6 +192,8 @@ pub struct Availability {
     pub hours: f64,
     /// By world and road.
     pub cells: Vec<Cell>,
+    /// Legs of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
+    pub legs: Vec<Leg>,
 }
 
 /// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
@@ -201,14 +235,28 @@ fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
             cell(world, road, &of_cell)
         })
     });
+    let cells = cells.collect();
+    let numbers = plan.legs();
+    let happened = numbers.iter().filter_map(|number| {
+        let mut of_number = legs.iter().filter(|leg| leg.is(number));
+        let leg = of_number.next().copied()?;
+        (number.world.judged && leg.shows_something()).then(|| leg.clone())
+    });
     Availability {
         seed: plan.seed,
         hours: plan.hours,
-        cells: cells.collect(),
+        cells,
+        legs: happened.collect(),
     }
 }
 
 fn cell(world: &WorldKind, road: &Road, legs: &[&Leg]) -> Cell {
+    let (lost, legs): (Vec<&Leg>, Vec<&Leg>) = legs.iter().copied().partition(|leg| leg.is_lost_by_hand());
+    let lost_by_hand = Lost {
+        legs: lost.len(),
+        hours: lost.iter().map(|leg| leg.driven_s).sum::<f64>() / 3600.0,
+        declarations: lost.iter().map(|leg| leg.declarations.len()).sum(),
+    };
     let sum = |of: fn(&Leg) -> f64| legs.iter().map(|leg| of(leg)).sum::<f64>();
     let hours = sum(|leg| leg.driven_s) / 3600.0;
     let declared = || legs.iter().flat_map(|leg| &leg.declarations);
@@ -241,6 +289,7 @@ fn cell(world: &WorldKind, road: &Road, legs: &[&Leg]) -> Cell {
         cars_with: cars(true),
         latched: legs.iter().filter(|leg| leg.ended == Ended::Latched).count(),
         diverged: legs.iter().filter(|leg| leg.ended == Ended::Diverged).count(),
+        lost_by_hand,
         sdlp_m: sum(|leg| leg.sdlp_m) / legs.len() as f64,
         largest_error_m: legs.iter().map(|leg| leg.largest_error_m).fold(0.0, f64::max),
     }

@@ -29,6 +29,7 @@ fn plan(hours: f64) -> Plan {
         roads: vec![&ROADS[1]],
         hours,
         seed: 1,
+        only: Vec::new(),
     }
 }
 
@@ -124,4 +125,75 @@ fn an_interrupted_study_goes_on_where_it_was() {
     }
     // On paper nothing is declared.
     assert_eq!(whole.cells[0].declarations.count, 0, "{:?}", whole.cells[0]);
+}
+
+/// Three drives made up: a whole one, one that is lost with guidance and by hand, one that is lost with guidance alone.
+#[test]
+fn a_drive_that_is_lost_by_hand_is_counted_apart() {
+    let plan = Plan {
+        worlds: vec![WORLDS.iter().find(|world| world.name == "everything").unwrap()],
+        ..plan(0.25)
+    };
+    let drive = |number: u32, [ended, by_hand]: [Ended; 2]| Leg {
+        world: "everything".into(),
+        road: "country".into(),
+        number,
+        car: number.into(),
+        speed_kmh: 90.0,
+        driven_s: 72.0,
+        active_s: 36.0,
+        sdlp_m: 0.3,
+        largest_error_m: 1.0,
+        ended,
+        declarations: (ended == Ended::Diverged)
+            .then(|| Declaration {
+                time_s: 60.0,
+                faults: "LaneImplausible".into(),
+                lateral_m_per_s2: 0.5,
+            })
+            .into_iter()
+            .collect(),
+        by_hand: ByHand {
+            ended: by_hand,
+            largest_error_m: 2.0,
+        },
+    };
+    let (whole, lost) = (Ended::Whole, Ended::Diverged);
+    let legs = [
+        drive(0, [whole, whole]),
+        drive(1, [lost, lost]),
+        drive(2, [lost, whole]),
+    ];
+    let found = summary(&plan, &legs.iter().collect::<Vec<_>>());
+    let cell = &found.cells[0];
+    assert_eq!((cell.declarations.count, cell.diverged, cell.cars), (1, 1, 2));
+    assert!((cell.hours - 0.04).abs() < 1e-12 && (cell.available - 0.5).abs() < 1e-12);
+    let apart = &cell.lost_by_hand;
+    assert_eq!((apart.legs, apart.declarations), (1, 1));
+    assert!((apart.hours - 0.02).abs() < 1e-12);
+    // What can be driven alone is named, the whole drive is not.
+    assert_eq!(
+        found.legs.iter().map(|leg| leg.number).collect::<Vec<_>>(),
+        [1, 2]
+    );
+    // Nothing is known of a rate where every drive is lost by hand.
+    let none = summary(&plan, &[&legs[1]]);
+    assert!(none.cells[0].declarations.upper_95.is_nan() && none.cells[0].hours == 0.0);
+}
+
+/// A population is of thirty cars, and drives can be asked for by number.
+#[test]
+fn thirty_cars_drive() {
+    let mut all = plan(5.0);
+    let cars = |plan: &Plan| {
+        let scenarios = plan.legs().into_iter().map(|leg| leg.scenario(1).unwrap());
+        let cars = scenarios.filter_map(|scenario| scenario.tolerances().car);
+        cars.collect::<std::collections::BTreeSet<_>>()
+    };
+    assert_eq!(cars(&all).len(), 30);
+    all.only = vec![7, 31];
+    assert_eq!(
+        all.legs().iter().map(|leg| leg.number).collect::<Vec<_>>(),
+        [7, 31, 7, 31]
+    );
 }

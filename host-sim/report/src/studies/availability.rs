@@ -6,14 +6,15 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::availability::{Availability, Cell as Row, Rate};
+use haptic_batch::availability::{Availability, Cell as Row, Ended, Leg, Rate};
 use haptic_campaign::campaign::CaseResult;
 use haptic_sim::worlds::{WORLDS, WorldKind};
 use serde::Serialize;
 
 /// What the study is about.
 pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
-                           The interval is the exact 95 % interval of a Poisson rate.";
+                           The interval is the exact 95 % interval of a Poisson rate. Every drive is driven a second time \
+                           by hand; one that leaves the road then too is lost by hand, and counted there alone.";
 
 /// What is given up for what: false declarations, and faults noticed in the same world.
 #[derive(Debug, Serialize)]
@@ -133,6 +134,7 @@ pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
         Block::Figure { figure, caption },
         Block::Table(table(results)),
         Block::Table(causes(results)),
+        Block::Table(drives(results)),
         Block::Table(worlds()),
     ];
     let mut sections = vec![Section {
@@ -187,6 +189,7 @@ pub fn table(results: &Availability) -> Table {
             Cell::number(100.0 * (1.0 - row.available), 2),
             Cell::number(row.latched as f64, 0),
             Cell::number(row.diverged as f64, 0),
+            Cell::number(row.lost_by_hand.legs as f64, 0),
             Cell::number(row.sdlp_m, 2),
             Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
         ]
@@ -204,6 +207,7 @@ pub fn table(results: &Availability) -> Table {
             "Time without guidance (%)",
             "Latched",
             "Off the road",
+            "Lost by hand",
             "SDLP (m)",
             "",
         ]
@@ -240,6 +244,51 @@ pub fn causes(results: &Availability) -> Table {
         .map(String::from)
         .to_vec(),
         rows: rows.collect(),
+    }
+}
+
+/// The drives of judged worlds in which something happened, each with the number that drives it alone (`--drives`).
+pub fn drives(results: &Availability) -> Table {
+    let off = |ended: Ended| match ended {
+        Ended::Whole => "",
+        Ended::Latched => "latched",
+        Ended::Diverged => "off the road",
+    };
+    let row = |leg: &Leg| {
+        let declared = leg.declarations.iter().map(|declaration| {
+            format!(
+                "{} at {:.1} s, {:.2} m/s2",
+                declaration.faults, declaration.time_s, declaration.lateral_m_per_s2
+            )
+        });
+        vec![
+            Cell::Text(leg.world.clone()),
+            Cell::Text(leg.road.clone()),
+            Cell::number(f64::from(leg.number), 0),
+            Cell::Text(leg.car.to_string()),
+            Cell::number(leg.speed_kmh, 1),
+            Cell::Text(declared.collect::<Vec<_>>().join("; ")),
+            Cell::Text(off(leg.ended).into()),
+            Cell::Text(off(leg.by_hand.ended).into()),
+            Cell::number(leg.by_hand.largest_error_m, 2),
+        ]
+    };
+    Table {
+        caption: "Drives in which something happened".into(),
+        columns: [
+            "World",
+            "Road",
+            "Drive",
+            "Car",
+            "Speed (km/h)",
+            "Declared, at a lateral acceleration of the road",
+            "Ended",
+            "By hand",
+            "Largest error by hand (m)",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: results.legs.iter().map(row).collect(),
     }
 }
 

@@ -6,7 +6,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_batch::stability::{DELAYS_S, Drive, Place, SPEEDS_KMH};
+use haptic_batch::stability::{DELAYS_S, Drive, Place, SHARES, SPEEDS_KMH, Shares};
 use haptic_sim::scenario::Condition;
 use serde::Serialize;
 
@@ -19,6 +19,8 @@ pub const SUMMARY: &str = "Growth: the largest real part of the loop's eigenvalu
 pub struct Map {
     /// By speed and delay.
     pub places: Vec<Place>,
+    /// What any schedule could do at each speed.
+    pub shares: Vec<Shares>,
 }
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
@@ -43,6 +45,7 @@ pub fn write(map: &Map, directory: &Path) -> Result<(), OutputError> {
             caption: "A line that ends: the vehicle left the road.".into(),
         },
         Block::Table(table(map)),
+        Block::Table(shares(map)),
     ];
     write_report(
         directory,
@@ -119,6 +122,29 @@ pub fn table(map: &Map) -> Table {
         caption: String::new(),
         columns,
         rows: map.places.iter().map(row).collect(),
+    }
+}
+
+/// Which share of the guidance at a speed makes the least stable driver most stable.
+pub fn shares(map: &Map) -> Table {
+    let row = |row: &Shares| {
+        let mut cells = vec![Cell::number(row.speed_kmh, 0)];
+        cells.extend(row.growth_per_s.map(|value| Cell::Number { value, decimals: 3 }));
+        cells.push(Cell::Number {
+            value: row.best(),
+            decimals: 2,
+        });
+        cells
+    };
+    let mut columns = vec!["Speed (km/h)".into()];
+    columns.extend(SHARES.map(|share| format!("Share {share}")));
+    columns.push("Best share".into());
+    Table {
+        caption: "Largest growth (1/s) of all guided drives where the manual one is stable, by the share of the guidance that a \
+                  schedule leaves at the speed (guidance.low_speed_share, guidance.high_speed_share)"
+            .into(),
+        columns,
+        rows: map.shares.iter().map(row).collect(),
     }
 }
 
