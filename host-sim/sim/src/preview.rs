@@ -40,6 +40,7 @@ impl PreviewPoints {
 }
 
 /// An angle in (-pi, pi].
+#[inline]
 pub(crate) fn wrapped(angle: f64) -> f64 {
     if angle > -PI && angle <= PI {
         return angle;

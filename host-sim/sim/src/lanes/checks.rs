@@ -129,7 +129,7 @@ impl<const N: usize> Checks<N> {
     #[inline(always)]
     pub(super) fn vehicle(&mut self, yaw_rate: &[f64; N], matters: &[i32; N], suspect: &mut [i32; N]) {
         for l in 0..N {
-            suspect[l] |= flag(yaw_rate[l].abs() > LARGEST_YAW_RATE) & matters[l];
+            suspect[l] |= !flag(yaw_rate[l].abs() <= LARGEST_YAW_RATE) & matters[l];
             self.heading[l] += self.yaw_rate[l] * VEHICLE_S;
             self.yaw_rate[l] = (yaw_rate[l] * YAW_RATE_COUNTS).round() * (1.0 / YAW_RATE_COUNTS);
             self.aligning[l] = self.speed[l] * self.yaw_rate[l] * self.aligning_gain[l];
@@ -165,8 +165,8 @@ impl<const N: usize> Checks<N> {
             let sum = self.column_sum[l];
             let sum = sum - sum * dt + beyond(least - learnt, most - learnt, tolerance);
             self.column_sum[l] = sum;
-            let is_off = (sum.abs() > COLUMN_MARGIN) | (wheel[l].abs() > LARGEST_WHEEL);
-            suspect[l] |= flag(is_off) & matters[l];
+            let is_sound = (sum.abs() <= COLUMN_MARGIN) & (wheel[l].abs() <= LARGEST_WHEEL);
+            suspect[l] |= !flag(is_sound) & matters[l];
         }
     }
 

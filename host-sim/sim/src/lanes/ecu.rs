@@ -116,6 +116,22 @@ pub(super) fn bits(si: f64) -> i32 {
     (if scaled >= 0.0 { scaled + 0.5 } else { scaled - 0.5 }) as i32
 }
 
+/// The same of a value that is no larger than 100, in steps that every machine has for several lanes at once: a conversion
+/// that saturates is made one by one.
+#[inline(always)]
+fn small_bits(si: f64) -> i32 {
+    let scaled = si * ONE;
+    whole(scaled + 0.5_f64.copysign(scaled))
+}
+
+/// Toward zero; of less than 2^31.
+#[inline(always)]
+fn whole(value: f64) -> i32 {
+    // 1.5 * 2^52: what is added to it stands in its lowest bits.
+    const AT_THE_END: f64 = 6_755_399_441_055_744.0;
+    (value.trunc() + AT_THE_END).to_bits() as i32
+}
+
 #[inline(always)]
 fn per_second(bits: i32, share: i64) -> i32 {
     (i64::from(bits).wrapping_mul(share).wrapping_add(1 << 31) >> 32) as i32
@@ -258,8 +274,10 @@ impl<const N: usize> Ecus<N> {
     pub(super) fn column(&mut self, torque_nm: &[f64; N]) {
         for l in 0..N {
             let sensed = (torque_nm[l] / TORQUE_RESOLUTION_NM).round() * TORQUE_RESOLUTION_NM;
-            let driver = on_the_bus(bits(sensed), 12);
-            self.suspect[l] |= flag(sensed.abs() > LARGEST_DRIVER_NM) & self.matters[l];
+            let driver = on_the_bus(small_bits(sensed), 12);
+            // What is no number is too large too.
+            let is_small = sensed.abs() <= LARGEST_DRIVER_NM;
+            self.suspect[l] |= !flag(is_small) & self.matters[l];
             self.driver[l] = driver;
             let is_felt =
                 (driver.wrapping_abs() > HELD) | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT);
@@ -280,14 +298,14 @@ impl<const N: usize> Ecus<N> {
         let mut seen = [[0.0; N]; 2];
         for l in 0..N {
             let (e_y, e_theta) = (
-                on_the_bus(bits(e_y_m[l]), 11),
-                on_the_bus(bits(e_theta_rad[l]), 8),
+                on_the_bus(small_bits(e_y_m[l]), 11),
+                on_the_bus(small_bits(e_theta_rad[l]), 8),
             );
-            let is_far = (e_y_m[l].abs() > LARGEST_E_Y) | (e_theta_rad[l].abs() > LARGEST_E_THETA);
+            let is_near = (e_y_m[l].abs() <= LARGEST_E_Y) & (e_theta_rad[l].abs() <= LARGEST_E_THETA);
             let moved = e_y.wrapping_sub(self.e_y[l]).wrapping_abs();
             let turned = e_theta.wrapping_sub(self.e_theta[l]).wrapping_abs();
             let jumps = flag((moved > LANE_STEP) | (turned > YAW_STEP)) & !self.first[l];
-            self.suspect[l] |= (flag(is_far) | jumps) & self.matters[l] & self.hears[l];
+            self.suspect[l] |= (!flag(is_near) | jumps) & self.matters[l] & self.hears[l];
             seen[0][l] = f64::from(e_y) * (1.0 / ONE);
             seen[1][l] = f64::from(e_theta) * (1.0 / ONE);
         }
@@ -295,7 +313,7 @@ impl<const N: usize> Ecus<N> {
             if self.hears[l] == 0 {
                 continue;
             }
-            let (e_y, e_theta) = ((seen[0][l] * ONE) as i32, (seen[1][l] * ONE) as i32);
+            let (e_y, e_theta) = (whole(seen[0][l] * ONE), whole(seen[1][l] * ONE));
             if self.first[l] == 0 {
                 let (tau, dt_us) = (self.tau[l], dt_ms * 1000);
                 self.e_y_rate[l] = filtered(tau, self.e_y_rate[l], self.e_y[l], e_y, dt_us);
@@ -453,6 +471,7 @@ impl<const N: usize> Ecus<N> {
     }
 
     /// Whether a limit held the torque of this step.
+    #[inline(always)]
     pub(super) fn is_limited(&self, lane: usize) -> bool {
         self.limited[lane] != 0
     }
@@ -552,8 +571,8 @@ impl<const N: usize> Band<N> {
             let both = position + rate;
             let high = position.max(both).max(0.0) + self.half[l];
             let low = position.min(both).min(0.0) - self.half[l];
-            self.high[l] = high.min(1e6) as i32;
-            self.low[l] = low.max(-1e6) as i32;
+            self.high[l] = whole(high.min(1e6));
+            self.low[l] = whole(low.max(-1e6));
         }
     }
 

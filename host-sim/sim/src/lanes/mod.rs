@@ -357,7 +357,7 @@ impl<const N: usize> Lanes<N> {
     }
 
     /// A sample of each run.
-    #[inline(never)]
+    #[inline(always)]
     fn record(&mut self, driver_nm: &[f64; N], torque_nm: &[f64; N]) {
         let chi = self.worlds.direction_rad();
         let Worlds {

@@ -36,7 +36,13 @@ pub(super) struct Tracked<const N: usize> {
     pub(super) found_heading: [f64; N],
     pub(super) found_curvature: [f64; N],
     cell: [usize; N],
+    /// The most bent of the cells that the points are in.
+    shape: u8,
 }
+
+const STRAIGHT: u8 = 0;
+const ARC: u8 = 1;
+const CLOTHOID: u8 = 2;
 
 impl<const N: usize> Tracked<N> {
     pub(super) fn new() -> Self {
@@ -60,10 +66,12 @@ impl<const N: usize> Tracked<N> {
             found_heading: [0.0; N],
             found_curvature: [0.0; N],
             cell: [0; N],
+            shape: STRAIGHT,
         }
     }
 
     /// Arc lengths found.
+    #[inline(always)]
     pub(super) fn s(&self) -> &[f64; N] {
         &self.s
     }
@@ -88,6 +96,13 @@ impl<const N: usize> Tracked<N> {
         self.curvature[lane] = cell.curvature_1pm + 0.0;
         self.slope[lane] = cell.curvature_slope_1pm2 + 0.0;
         [self.square_over_6[lane], self.cube[lane]] = cell.curvature_powers;
+        self.shape = if self.slope.iter().any(|slope| *slope != 0.0) {
+            CLOTHOID
+        } else if self.curvature.iter().any(|curvature| *curvature != 0.0) {
+            ARC
+        } else {
+            STRAIGHT
+        };
     }
 
     /// Walks to the cells that the searches are in now.
@@ -135,30 +150,57 @@ impl<const N: usize> Tracked<N> {
             if outside != 0 {
                 self.walk(roads, &at, &open);
             }
-            if self.search(px, py, &mut at, &mut open) == 0 {
+            let left = match self.shape {
+                STRAIGHT => self.search::<STRAIGHT>(px, py, &mut at, &mut open),
+                ARC => self.search::<ARC>(px, py, &mut at, &mut open),
+                _ => self.search::<CLOTHOID>(px, py, &mut at, &mut open),
+            };
+            if left == 0 {
                 break;
             }
         }
         open
     }
 
-    /// One step of every search that is open; returns whether any still is.
+    /// One step of every search that is open; returns whether any still is. A shape's formula is that of the next one
+    /// without the terms that vanish, to the same bits.
     #[inline(always)]
-    fn search(&mut self, px: &[f64; N], py: &[f64; N], at: &mut [f64; N], open: &mut [u64; N]) -> u64 {
+    fn search<const SHAPE: u8>(
+        &mut self,
+        px: &[f64; N],
+        py: &[f64; N],
+        at: &mut [f64; N],
+        open: &mut [u64; N],
+    ) -> u64 {
         let mut left = 0;
         for l in 0..N {
-            // The general formula of a cell; on straights and arcs its terms vanish.
             let sigma = at[l] - self.middle[l];
             let (k0, k1) = (self.curvature[l], self.slope[l]);
             let (tx, ty) = (self.tangent_x[l], self.tangent_y[l]);
             let (dx, dy) = (px[l] - self.x[l], py[l] - self.y[l]);
             let sigma2 = sigma * sigma;
-            let along = sigma
-                - sigma2 * sigma * (self.square_over_6[l] + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0));
-            let across = sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - self.cube[l] * sigma2 / 24.0);
-            let theta = sigma * (k0 + 0.5 * k1 * sigma);
-            let curvature = k0 + k1 * sigma;
-            let (cos, sin) = (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0);
+            let (theta, along, across, curvature) = match SHAPE {
+                STRAIGHT => (sigma * 0.0, sigma, 0.0, 0.0),
+                ARC => (
+                    sigma * k0,
+                    sigma - sigma2 * sigma * self.square_over_6[l],
+                    sigma2 * (0.5 * k0 - self.cube[l] * sigma2 / 24.0),
+                    k0,
+                ),
+                _ => (
+                    sigma * (k0 + 0.5 * k1 * sigma),
+                    sigma
+                        - sigma2
+                            * sigma
+                            * (self.square_over_6[l] + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0)),
+                    sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - self.cube[l] * sigma2 / 24.0),
+                    k0 + k1 * sigma,
+                ),
+            };
+            let (cos, sin) = match SHAPE {
+                STRAIGHT => (1.0, 0.0),
+                _ => (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0),
+            };
             let (ahead, left_of) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
             let distance = ahead * cos + left_of * sin;
             let offset = left_of * cos - ahead * sin;
@@ -166,18 +208,14 @@ impl<const N: usize> Tracked<N> {
             let step = distance / determinant;
             let s = at[l] + step;
             let is_sound = (determinant >= MIN_DETERMINANT) & (s >= -OVERRUN_M) & (s <= self.end[l]);
-            let take = if is_sound & (step.abs() < CONVERGED_M) {
-                open[l]
-            } else {
-                0
-            };
-            let taken = take != 0;
-            self.advance[l] = if taken { s - self.s[l] } else { self.advance[l] };
-            self.s[l] = if taken { s } else { self.s[l] };
-            self.offset[l] = if taken { offset } else { self.offset[l] };
+            let is_found = is_sound & (step.abs() < CONVERGED_M);
+            let take = if is_found { open[l] } else { 0 };
             let heading = self.heading[l] + theta + curvature * step;
-            self.found_heading[l] = if taken { heading } else { self.found_heading[l] };
-            self.found_curvature[l] = if taken { curvature } else { self.found_curvature[l] };
+            self.advance[l] = either(take, s - self.s[l], self.advance[l]);
+            self.s[l] = either(take, s, self.s[l]);
+            self.offset[l] = either(take, offset, self.offset[l]);
+            self.found_heading[l] = either(take, heading, self.found_heading[l]);
+            self.found_curvature[l] = either(take, curvature, self.found_curvature[l]);
             // What is not sound stays open for ever.
             at[l] = if is_sound { s } else { f64::NAN };
             open[l] &= !take;
@@ -185,4 +223,11 @@ impl<const N: usize> Tracked<N> {
         }
         left
     }
+}
+
+/// The first where all bits of the mask are set, the second where none is: as a choice the compiler makes a masked store
+/// of it, which some processors take long for.
+#[inline(always)]
+fn either(mask: u64, a: f64, b: f64) -> f64 {
+    f64::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
 }
