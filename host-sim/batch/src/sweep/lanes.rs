@@ -100,3 +100,34 @@ impl Sweep {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::sweep::tests::with_road;
+
+    /// Lanes drive side by side what the shipping ECU drives alone, and hand back what they cannot: the bytes are the same.
+    #[test]
+    fn the_table_does_not_depend_on_lanes() {
+        let sweep = with_road(
+            "samples = 12\nmetrics = [\"time_to_recover_s\", \"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
+            "[vary]\nfailure.kind = [\"none\", \"torque\", \"input\"]\nsensors = [\"paper\", \"exact\"]\n\
+             \"failure.time\" = { uniform = [1.5, 9] }\nspeed = { uniform = [40, 90] }\n\
+             \"driver.t_p\" = { uniform = [0.05, 0.5] }\n\"driver.K_hg\" = { uniform = [0, 1] }\n\
+             \"driver.remnant_sd\" = [0, 0.1]\n",
+        );
+        let (mut in_lanes, mut out) = (0, 0);
+        for chunk in 0..sweep.chunks() {
+            let side_by_side = sweep.run_chunk(chunk).unwrap();
+            let alone = sweep.run_chunk_one_by_one(chunk).unwrap();
+            assert_eq!(side_by_side.to_bytes(1), alone.to_bytes(1), "chunk {chunk}");
+            for drive in sweep.drives_of(chunk) {
+                let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
+                match haptic_sim::lanes::why_not(&scenario) {
+                    None => in_lanes += 1,
+                    Some(_) => out += 1,
+                }
+            }
+        }
+        assert!(in_lanes > 40 && out > 40, "{in_lanes} in lanes, {out} not");
+    }
+}

@@ -6,9 +6,8 @@
 //! 0.005 N.m.s, and less than 0.001 m. The margins here are smaller by several times as much, so that whoever stays within
 //! them stays within core's. The other way a run is driven anew without need.
 
+use super::counts::{flag, speed_on_the_bus};
 use crate::scenario::Scenario;
-
-use super::ecu::speed_on_the_bus;
 
 /// Of core's 0.6 N.m.s.
 const COLUMN_MARGIN: f64 = 0.58;
@@ -65,11 +64,6 @@ pub(super) struct Checks<const N: usize> {
 #[inline(always)]
 fn beyond(least: f64, most: f64, tolerance: f64) -> f64 {
     (least - tolerance).max(0.0) + (most + tolerance).min(0.0)
-}
-
-#[inline(always)]
-fn flag(holds: bool) -> i32 {
-    if holds { -1 } else { 0 }
 }
 
 impl<const N: usize> Checks<N> {

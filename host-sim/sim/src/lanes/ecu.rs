@@ -7,35 +7,34 @@
 
 use haptic_core::params::Params;
 
+use super::band::Band;
+use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, whole};
 use crate::models::sensors::TORQUE_RESOLUTION_NM;
 use crate::scenario::{Condition, Scenario};
 
 /// Who decides the torque.
-const GUIDED: i32 = 0;
+pub(super) const GUIDED: i32 = 0;
 const HANDOVER: i32 = 1;
 const OFF: i32 = 2;
 
-const ONE: f64 = (1 << 24) as f64;
-/// A millisecond as a share of a second in 2^-32, as core has it.
-const MS: i64 = 1000 * 4295;
 /// An LSB of a torque on the bus.
-const TORQUE_LSB: i32 = 1 << 12;
-const WINDOW_GROWTH: i32 = 20_132_659;
+pub(super) const TORQUE_LSB: i32 = 1 << 12;
+pub(super) const WINDOW_GROWTH: i32 = 20_132_659;
 const WINDOW_STEPS: i32 = 250;
-const OVERRIDE_FROM: i32 = 13_421_773;
+pub(super) const OVERRIDE_FROM: i32 = 13_421_773;
 const OVERRIDE_SLOPE: i32 = 3;
 const MAX_RATE: u64 = 1000 << 20;
 /// The largest honest step of a lane sample, 0.3 m and 0.1 rad.
-const LANE_STEP: i32 = 5_033_165;
-const YAW_STEP: i32 = 1_677_722;
+pub(super) const LANE_STEP: i32 = 5_033_165;
+pub(super) const YAW_STEP: i32 = 1_677_722;
 /// Ends of a lane sample on the bus, 4 m and 0.5 rad, and a bit less.
 const LARGEST_E_Y: f64 = 3.99;
 const LARGEST_E_THETA: f64 = 0.499;
 /// Hands: a change that is felt, a torque that is held, a guidance that acts, and the patience in ms until
 /// guidance ends.
-const FELT: i32 = 1_342_177;
-const HELD: i32 = 5_872_026;
-const ACTS: i32 = 838_861;
+pub(super) const FELT: i32 = 1_342_177;
+pub(super) const HELD: i32 = 5_872_026;
+pub(super) const ACTS: i32 = 838_861;
 const HANDS_MS: i32 = 30_000;
 /// Far inside what a column frame carries, N.m.
 const LARGEST_DRIVER_NM: f64 = 10.0;
@@ -44,12 +43,6 @@ pub(super) const TIMEOUT_MS: u32 = 31;
 const HANDOVER_MS: i32 = 2000;
 /// Torques kept for a handover, one every 5 ms.
 const PAST: usize = 16;
-/// Half the band of the monitor at least, mN.m, and for how many steps a torque may be beyond it.
-const BAND_MNM: f64 = 300.0;
-const ASTRAY_MS: i32 = 20;
-/// The monitor takes rates over at least this, ms.
-const RATE_SPAN_MS: i32 = 50;
-
 /// The ECUs.
 #[repr(C, align(64))]
 pub(super) struct Ecus<const N: usize> {
@@ -92,60 +85,6 @@ pub(super) struct Ecus<const N: usize> {
     ramp_done: [i32; N],
     past: [[i32; N]; PAST],
     band: Band<N>,
-}
-
-/// What the monitor compares the torque with.
-struct Band<const N: usize> {
-    /// mN.m per m, per rad, per m/s, per rad/s; the last is what its coarse arithmetic may be off by, mN.m.
-    gains: [[f64; N]; 4],
-    half: [f64; N],
-    before: [[f64; N]; 2],
-    last: [[f64; N]; 2],
-    before_ms: [i32; N],
-    last_ms: [i32; N],
-    low: [i32; N],
-    high: [i32; N],
-    torque: [i32; N],
-    astray: [i32; N],
-}
-
-/// As core turns SI values into bits; saturates.
-#[inline(always)]
-pub(super) fn bits(si: f64) -> i32 {
-    let scaled = si * ONE;
-    (if scaled >= 0.0 { scaled + 0.5 } else { scaled - 0.5 }) as i32
-}
-
-/// The same of a value that is no larger than 100, in steps that every machine has for several lanes at once: a conversion
-/// that saturates is made one by one.
-#[inline(always)]
-fn small_bits(si: f64) -> i32 {
-    let scaled = si * ONE;
-    whole(scaled + 0.5_f64.copysign(scaled))
-}
-
-/// Toward zero; of less than 2^31.
-#[inline(always)]
-fn whole(value: f64) -> i32 {
-    // 1.5 * 2^52: what is added to it stands in its lowest bits.
-    const AT_THE_END: f64 = 6_755_399_441_055_744.0;
-    (value.trunc() + AT_THE_END).to_bits() as i32
-}
-
-#[inline(always)]
-fn per_second(bits: i32, share: i64) -> i32 {
-    (i64::from(bits).wrapping_mul(share).wrapping_add(1 << 31) >> 32) as i32
-}
-
-/// Rounded to a count of 2^-(24 - `cut`), in 2^-24.
-#[inline(always)]
-fn on_the_bus(bits: i32, cut: u32) -> i32 {
-    (bits.wrapping_add(1 << (cut - 1)) >> cut) << cut
-}
-
-#[inline(always)]
-fn flag(holds: bool) -> i32 {
-    if holds { -1 } else { 0 }
 }
 
 /// One update of a filtered rate.
@@ -191,18 +130,7 @@ impl<const N: usize> Ecus<N> {
             ramp_from: zero(),
             ramp_done: zero(),
             past: [zero(); PAST],
-            band: Band {
-                gains: [[0.0; N]; 4],
-                half: [0.0; N],
-                before: [[0.0; N]; 2],
-                last: [[0.0; N]; 2],
-                before_ms: zero(),
-                last_ms: zero(),
-                low: zero(),
-                high: zero(),
-                torque: zero(),
-                astray: zero(),
-            },
+            band: Band::new(),
         }
     }
 
@@ -513,126 +441,5 @@ fn smaller_of_same_sign(a: i32, b: i32) -> i32 {
         a
     } else {
         b
-    }
-}
-
-impl<const N: usize> Band<N> {
-    fn begin(&mut self, lane: usize, [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate]: [f64; 4]) {
-        let gains = [on_e_y, on_e_theta, on_e_y_rate, on_e_theta_rate].map(|gain| gain * 1e3);
-        for (all, gain) in self.gains.iter_mut().zip(gains) {
-            all[lane] = gain;
-        }
-        // Errors are cut to 1 mm and 0.1 mrad there, rates to 40 mm/s and 2 mrad/s; gains are whole numbers.
-        let [e_y, e_theta, e_y_rate, e_theta_rate] = gains;
-        let coarse = 8.0 + 2e-3 * e_y + 3e-4 * e_theta + 0.1 * e_y_rate + 4e-3 * e_theta_rate;
-        self.half[lane] = BAND_MNM - coarse;
-        for errors in self.before.iter_mut().chain(&mut self.last) {
-            errors[lane] = 0.0;
-        }
-        for state in [
-            &mut self.before_ms,
-            &mut self.last_ms,
-            &mut self.low,
-            &mut self.high,
-            &mut self.torque,
-            &mut self.astray,
-        ] {
-            state[lane] = 0;
-        }
-    }
-
-    /// What the lane errors ask for: proportional part, and with rates.
-    #[inline(always)]
-    fn picture(&mut self, seen: &[[f64; N]; 2], own: &[i32; N], hears: &[i32; N]) {
-        let [per_m, per_rad, per_mps, per_radps] = &self.gains;
-        for l in 0..N {
-            let hears = hears[l] != 0;
-            let is_old = (self.last_ms[l].wrapping_sub(self.before_ms[l]) > RATE_SPAN_MS) & hears;
-            for i in 0..2 {
-                self.before[i][l] = if is_old {
-                    self.last[i][l]
-                } else {
-                    self.before[i][l]
-                };
-                self.last[i][l] = if hears { seen[i][l] } else { self.last[i][l] };
-            }
-            self.before_ms[l] = if is_old {
-                self.last_ms[l]
-            } else {
-                self.before_ms[l]
-            };
-            self.last_ms[l] = if hears { own[l] } else { self.last_ms[l] };
-            let span_ms = self.last_ms[l].wrapping_sub(self.before_ms[l]).max(1);
-            let per_s = 1e3 / f64::from(span_ms);
-            let [e_y, e_theta] = [self.last[0][l], self.last[1][l]];
-            let position = per_m[l] * e_y + per_rad[l] * e_theta;
-            let rate = per_mps[l] * (e_y - self.before[0][l]) * per_s
-                + per_radps[l] * (e_theta - self.before[1][l]) * per_s;
-            let both = position + rate;
-            let high = position.max(both).max(0.0) + self.half[l];
-            let low = position.min(both).min(0.0) - self.half[l];
-            self.high[l] = whole(high.min(1e6));
-            self.low[l] = whole(low.max(-1e6));
-        }
-    }
-
-    /// Counts the steps in which the torque is away from that.
-    #[inline(always)]
-    fn judge(&mut self, applied: &[i32; N], mode: &[i32; N], matters: &[i32; N], suspect: &mut [i32; N]) {
-        for l in 0..N {
-            let torque = (applied[l] >> 12).wrapping_mul(1000) / 4096;
-            let is_within = (torque >= self.low[l]) & (torque <= self.high[l]);
-            let is_falling = torque.wrapping_abs() < self.torque[l].wrapping_abs();
-            let longer = self.astray[l].wrapping_add(if is_falling { 0 } else { 1 });
-            self.astray[l] = if is_within { 0 } else { longer };
-            suspect[l] |= flag((self.astray[l] > ASTRAY_MS) & (mode[l] == GUIDED)) & matters[l];
-            self.torque[l] = torque;
-        }
-    }
-}
-
-/// The speed as the bus carries it, m/s.
-pub(super) fn speed_on_the_bus(speed_m_per_s: f64) -> f64 {
-    f64::from(on_the_bus(bits(speed_m_per_s), 16)) * (1.0 / ONE)
-}
-
-#[cfg(test)]
-mod tests {
-    use haptic_core::quantity::{Speed, Torque};
-
-    use super::*;
-
-    #[test]
-    fn constants_are_the_bits_of_what_core_writes_in_si() {
-        let of = |nm: f64| (Torque::from_nm(nm).nm() * ONE) as i32;
-        for (nm, count) in [
-            (1.2, WINDOW_GROWTH),
-            (0.8, OVERRIDE_FROM),
-            (0.3, LANE_STEP),
-            (0.1, YAW_STEP),
-            (0.08, FELT),
-            (0.35, HELD),
-            (0.05, ACTS),
-            (1.0 / 4096.0, TORQUE_LSB),
-        ] {
-            assert_eq!(of(nm), count, "{nm}");
-        }
-        for nm in [
-            0.0,
-            1e-9,
-            3.3e-8,
-            -3.3e-8,
-            1.2345,
-            -4.321,
-            127.9,
-            -200.0,
-            f64::NAN,
-        ] {
-            assert_eq!(bits(nm), of(nm), "{nm}");
-        }
-        assert_eq!(
-            speed_on_the_bus(16.667),
-            Speed::from_m_per_s(16.667).m_per_s().mul_add(256.0, 0.5).floor() / 256.0
-        );
     }
 }

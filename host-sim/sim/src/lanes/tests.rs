@@ -6,8 +6,9 @@ use rand::{RngExt, SeedableRng};
 use super::*;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::road::Course;
-use crate::scenario::{Condition, DriverChange, Failure, Sensors};
+use crate::scenario::{Condition, DriverChange, Failure, FailureKind, Sensors};
 use crate::simulation::simulate;
+use haptic_log::trace::Sample;
 
 /// Every field of every sample, signs of zeros included.
 fn bits(run: &Run) -> Vec<u64> {
