@@ -340,6 +340,7 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/experiment.rs", "one report, section by section"),
     ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
+    ("host-sim/sim/src/lanes/ecu.rs", "one step of the lean ECU, read from top to bottom"),
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
     ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),

@@ -31,13 +31,18 @@ pub(crate) fn count() -> Result<Counts> {
 
 /// Builds `bench/closed_loop.rs` and returns the program.
 pub(crate) fn build_closed_loop() -> Result<String> {
+    build("closed_loop")
+}
+
+/// Builds a program of `bench/` and returns it.
+pub(crate) fn build(example: &str) -> Result<String> {
     let elf = crate::image::elf_of(tool::cargo().args([
         "build",
         "--release",
         "-p",
         "haptic-guidance",
         "--example",
-        "closed_loop",
+        example,
         "--message-format=json-render-diagnostics",
     ]))?;
     Ok(elf.to_string_lossy().into_owned())

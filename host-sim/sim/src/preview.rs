@@ -9,10 +9,10 @@ use crate::models::road::{Centreline, Tracker};
 /// A near and a far point along the direction of movement.
 #[derive(Debug, Clone)]
 pub(crate) struct PreviewPoints {
-    near_m: f64,
-    far_m: f64,
-    near: Tracker,
-    far: Tracker,
+    pub(crate) near_m: f64,
+    pub(crate) far_m: f64,
+    pub(crate) near: Tracker,
+    pub(crate) far: Tracker,
 }
 
 impl PreviewPoints {
@@ -40,6 +40,7 @@ impl PreviewPoints {
 }
 
 /// An angle in (-pi, pi].
+#[inline]
 pub(crate) fn wrapped(angle: f64) -> f64 {
     if angle > -PI && angle <= PI {
         return angle;

@@ -32,7 +32,7 @@ use crate::scenario::{FAILURE_REACTION_S, Failure, FailureKind, Scenario};
 use crate::seeds::Stream;
 
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
-const DIVERGED_M: f64 = 10.0;
+pub(crate) const DIVERGED_M: f64 = 10.0;
 
 /// Samples per second of a trace.
 pub const SAMPLE_RATE_HZ: u32 = 200;
@@ -98,19 +98,19 @@ impl Outcome<'_> {
 /// A closed loop under way.
 #[derive(Debug, Clone)]
 pub struct Simulation<G = AnyGuidance> {
-    road: Arc<Centreline>,
-    plan: Plan,
+    pub(crate) road: Arc<Centreline>,
+    pub(crate) plan: Plan,
     guidance: G,
     plant: Plant,
     /// What moves the plant where the paper's model does not do.
-    real: Option<Box<RealPlant>>,
+    pub(crate) real: Option<Box<RealPlant>>,
     /// What the sensors add, if they add anything.
-    sensing: Option<Box<Sensing>>,
-    vision: Vision,
-    remnant: Remnant,
-    driver_points: PreviewPoints,
-    camera: PreviewPoints,
-    body: Tracker,
+    pub(crate) sensing: Option<Box<Sensing>>,
+    pub(crate) vision: Vision,
+    pub(crate) remnant: Remnant,
+    pub(crate) driver_points: PreviewPoints,
+    pub(crate) camera: PreviewPoints,
+    pub(crate) body: Tracker,
     /// Step in which something first went wrong.
     failed_at: Option<u32>,
     target_now_rad: f64,
@@ -123,15 +123,15 @@ pub struct Simulation<G = AnyGuidance> {
 
 /// What the scenario decides for every step.
 #[derive(Debug, Clone)]
-struct Plan {
-    speed_m_per_s: f64,
+pub(crate) struct Plan {
+    pub(crate) speed_m_per_s: f64,
     relying: Transition,
     manual: Transition,
-    changed: Option<(u32, Transition)>,
+    pub(crate) changed: Option<(u32, Transition)>,
     probe: bool,
     failure: FailureKind,
-    failure_step: u32,
-    end_m: f64,
+    pub(crate) failure_step: u32,
+    pub(crate) end_m: f64,
 }
 
 impl Simulation {
@@ -388,7 +388,7 @@ impl Plan {
     }
 
     /// What the scenario lets go wrong.
-    fn faults(&self, step: u32) -> WorldFaults {
+    pub(crate) fn faults(&self, step: u32) -> WorldFaults {
         let fails = step >= self.failure_step;
         WorldFaults {
             torque_lost: fails && self.failure == FailureKind::Torque,
@@ -411,7 +411,7 @@ impl Plan {
     }
 
     /// How the driver's arm moves: a driver notices a failure after a second and then drives as manually.
-    fn transition(&self, step: u32, failed_at: Option<u32>) -> &Transition {
+    pub(crate) fn transition(&self, step: u32, failed_at: Option<u32>) -> &Transition {
         let noticed = failed_at.is_some_and(|at| step >= at.saturating_add(step_of(FAILURE_REACTION_S)));
         match &self.changed {
             _ if noticed => &self.manual,
@@ -423,7 +423,7 @@ impl Plan {
 
 /// The sensors of a world that is not the paper's.
 #[derive(Debug, Clone)]
-struct Sensing {
+pub(crate) struct Sensing {
     errors: SensorErrors,
     camera: ErringCamera,
     gyro: ErringGyro,
@@ -471,7 +471,7 @@ fn real(scenario: &Scenario) -> Option<Box<RealPlant>> {
 }
 
 /// The step at or next to a time.
-fn step_of(time_s: f64) -> u32 {
+pub(crate) fn step_of(time_s: f64) -> u32 {
     (time_s / STEP_S).round() as u32
 }
 

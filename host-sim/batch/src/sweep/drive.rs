@@ -27,24 +27,32 @@ impl Sweep {
     /// # Errors
     /// As [`Sweep::scenario`].
     pub fn drive(&self, point: &Point) -> Result<Driven, InputError> {
-        let scenario = self.scenario(point)?;
-        let recovery = self.metrics.iter().any(|d| d.name == "time_to_recover_s");
-        let time_s = scenario.failure().at_s().filter(|_| recovery);
-        let Some(time_s) = time_s else {
-            return Ok(self.measured(&scenario, &simulate(&scenario), None));
-        };
-        // Until the failure the two are one.
-        let forked = simulate_forked(&scenario, &[scenario.failure()]);
-        let (nominal, runs) = forked.map_err(|e| InputError::new(&self.name, e))?;
-        let peak_m = nominal_peak_m(&nominal, self.window_of(&scenario), time_s);
-        Ok(self.measured(&scenario, &runs[0], peak_m))
+        self.drive_alone(&self.scenario(point)?)
     }
 
-    /// Drives a chunk. What it gives follows from the sweep and the number alone.
+    /// Drives a scenario with the shipping ECU.
+    pub(super) fn drive_alone(&self, scenario: &Scenario) -> Result<Driven, InputError> {
+        let Some(time_s) = self.recovers_from(scenario) else {
+            return Ok(self.measured(scenario, &simulate(scenario), None));
+        };
+        // Until the failure the two are one.
+        let forked = simulate_forked(scenario, &[scenario.failure()]);
+        let (nominal, runs) = forked.map_err(|e| InputError::new(&self.name, e))?;
+        let peak_m = nominal_peak_m(&nominal, self.window_of(scenario), time_s);
+        Ok(self.measured(scenario, &runs[0], peak_m))
+    }
+
+    /// When a scenario fails, if a metric asks how the same drive goes without the failure, s.
+    pub(super) fn recovers_from(&self, scenario: &Scenario) -> Option<f64> {
+        let recovery = self.metrics.iter().any(|d| d.name == "time_to_recover_s");
+        scenario.failure().at_s().filter(|_| recovery)
+    }
+
+    /// Drives a chunk one by one with the shipping ECU: what [`Sweep::run_chunk`] gives too, and slower.
     ///
     /// # Errors
     /// As [`Sweep::scenario`].
-    pub fn run_chunk(&self, number: u64) -> Result<Chunk, InputError> {
+    pub fn run_chunk_one_by_one(&self, number: u64) -> Result<Chunk, InputError> {
         let rows = self.drives_of(number).map(|drive| self.drive(&self.point(drive)));
         Ok(Chunk {
             number,
@@ -52,11 +60,11 @@ impl Sweep {
         })
     }
 
-    fn window_of(&self, scenario: &Scenario) -> Window {
+    pub(super) fn window_of(&self, scenario: &Scenario) -> Window {
         self.window.unwrap_or_else(|| default_window(scenario.course()))
     }
 
-    fn measured(&self, scenario: &Scenario, run: &Run, nominal_peak_m: Option<f64>) -> Driven {
+    pub(super) fn measured(&self, scenario: &Scenario, run: &Run, nominal_peak_m: Option<f64>) -> Driven {
         let record = RunRecord::new(scenario, run, self.window_of(scenario), nominal_peak_m);
         Driven {
             diverged: record.diverged,

@@ -17,6 +17,7 @@ mod design;
 mod drive;
 mod effects;
 mod file;
+mod lanes;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod point;

@@ -28,7 +28,7 @@ fn sweep(text: &str) -> Result<Sweep, String> {
     Sweep::from_text("sweep.toml", &text).map_err(|e| e.to_string())
 }
 
-fn with_road(text: &str, vary: &str) -> Sweep {
+pub(super) fn with_road(text: &str, vary: &str) -> Sweep {
     sweep(&format!("{text}{ROAD}{vary}")).unwrap()
 }
 

@@ -91,12 +91,12 @@ impl DriverParameters {
 /// Equation (7) with its delay: errors in, delayed target angle out.
 #[derive(Debug, Clone)]
 pub struct Vision {
-    a_1: f64,
-    a_2: f64,
-    a_3: f64,
+    pub(crate) a_1: f64,
+    pub(crate) a_2: f64,
+    pub(crate) a_3: f64,
     integral: f64,
     last_e_y_m: f64,
-    delay: Delay,
+    pub(crate) delay: Delay,
 }
 
 impl Vision {
@@ -124,12 +124,14 @@ impl Vision {
 
 /// A pure delay of at least one step, linear between samples; zero before the first.
 #[derive(Debug, Clone)]
-struct Delay {
+pub(crate) struct Delay {
     ring: Vec<f64>,
     mask: usize,
     next: usize,
-    whole: usize,
-    fraction: f64,
+    /// Whole steps, one at least.
+    pub(crate) whole: usize,
+    /// What is left of a step.
+    pub(crate) fraction: f64,
 }
 
 impl Delay {
@@ -161,7 +163,7 @@ impl Delay {
 #[derive(Debug, Clone)]
 pub struct Remnant {
     decay: f64,
-    scale_nm: f64,
+    pub(crate) scale_nm: f64,
     value_nm: f64,
     generator: Xoshiro256PlusPlus,
 }

@@ -19,12 +19,12 @@ use super::driver::{ArmGains, DriverParameters};
 use super::vehicle::VehicleParameters;
 
 /// Number of linear states.
-const STATES: usize = 6;
+pub(crate) const STATES: usize = 6;
 /// States that drive others; the yaw angle drives none.
 const COUPLED: usize = 5;
 /// Inputs: target angle now, target angle one step ahead, guidance torque, remnant.
 const INPUTS: usize = 4;
-const COLUMNS: usize = COUPLED + INPUTS;
+pub(crate) const COLUMNS: usize = COUPLED + INPUTS;
 
 const BETA: usize = 0;
 const YAW_RATE: usize = 1;
@@ -49,9 +49,9 @@ pub struct PlantInput {
 /// One step of the linear part, for given parameters and arm gains.
 #[derive(Debug, Clone)]
 pub struct Transition {
-    columns: [[f64; STATES]; COLUMNS],
+    pub(crate) columns: [[f64; STATES]; COLUMNS],
     /// Distance travelled in a step, m.
-    distance_m: f64,
+    pub(crate) distance_m: f64,
     gains: ArmGains,
 }
 

@@ -16,35 +16,35 @@ const MAX_CELL_M: f64 = 1.0;
 const MAX_CELL_TURN_RAD: f64 = 0.005;
 /// A Newton step below this ends the search, m. Convergence is quadratic with a factor below 1 per metre, so
 /// the foot is then within 1e-8 m along the curve, and its distance within 1e-16 m.
-const CONVERGED_M: f64 = 1e-4;
+pub(crate) const CONVERGED_M: f64 = 1e-4;
 /// A point that needs more steps has left the region where its perpendicular is unique.
 const MAX_NEWTON_STEPS: usize = 20;
 /// The projection is refused where 1 - curvature * offset falls below this: so close to the centre of the
 /// curve that the foot of the perpendicular is not unique any more.
-const MIN_DETERMINANT: f64 = 0.1;
+pub(crate) const MIN_DETERMINANT: f64 = 0.1;
 /// How far beyond its ends the centreline is continued, m: enough for the step that finds the end.
-const OVERRUN_M: f64 = 2.0;
+pub(crate) const OVERRUN_M: f64 = 2.0;
 /// A lane of a file may have kinks, where a perpendicular has no foot on one side and two on the other: the search
 /// goes to and fro across the kink in steps of this length at most, m, and the kink itself is the answer.
 const KINK_M: f64 = 0.5;
 
 /// A piece of the centreline, expanded about its middle.
 #[derive(Debug, Clone, Copy)]
-struct Cell {
+pub(crate) struct Cell {
     /// Arc length at the middle, m.
-    s_m: f64,
+    pub(crate) s_m: f64,
     /// Half the arc length, m.
-    half_m: f64,
-    x_m: f64,
-    y_m: f64,
+    pub(crate) half_m: f64,
+    pub(crate) x_m: f64,
+    pub(crate) y_m: f64,
     /// Unit tangent.
-    tangent: [f64; 2],
-    heading_rad: f64,
-    curvature_1pm: f64,
+    pub(crate) tangent: [f64; 2],
+    pub(crate) heading_rad: f64,
+    pub(crate) curvature_1pm: f64,
     /// Change of curvature with arc length, 1/m^2.
-    curvature_slope_1pm2: f64,
+    pub(crate) curvature_slope_1pm2: f64,
     /// Square of the curvature over six, and its third power: a division less in each projection.
-    curvature_powers: [f64; 2],
+    pub(crate) curvature_powers: [f64; 2],
 }
 
 /// A point in the frame of a place on the centreline.
@@ -171,9 +171,9 @@ pub struct Projection {
 /// Where a moving point was last projected, and how far it had come since the time before.
 #[derive(Debug, Clone, Copy)]
 pub struct Tracker {
-    cell: usize,
-    s_m: f64,
-    advance_m: f64,
+    pub(crate) cell: usize,
+    pub(crate) s_m: f64,
+    pub(crate) advance_m: f64,
 }
 
 impl Centreline {
@@ -305,6 +305,11 @@ impl Centreline {
     /// Arc length of the whole course, m.
     pub fn length_m(&self) -> f64 {
         self.length_m
+    }
+
+    /// Its cells in order.
+    pub(crate) fn cells(&self) -> &[Cell] {
+        &self.cells
     }
 
     /// Width of the lane whose middle is the centreline, m.

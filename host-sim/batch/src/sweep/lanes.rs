@@ -1,0 +1,133 @@
+//! A chunk in lanes ([`haptic_sim::lanes`]): many drives side by side, and the shipping ECU where they are not enough.
+//!
+//! What the lanes cannot drive, and every drive in which something could have ended guidance, is driven alone with the
+//! shipping ECU. So is one drive in [`CHECKED_OF`], whatever the lanes say of it: a bit that differs is an error, because the
+//! table must not depend on who drove.
+
+use haptic_sim::input::InputError;
+use haptic_sim::lanes::{Width, drive};
+use haptic_sim::scenario::{Failure, FailureKind, Scenario};
+use haptic_sim::seeds::{self, Stream};
+
+use super::{Chunk, Driven, Sweep};
+use crate::record::nominal_peak_m;
+
+/// One in so many drives of the lanes is driven by the shipping ECU too.
+const CHECKED_OF: u64 = 100;
+
+impl Sweep {
+    /// Drives a chunk. What it gives follows from the sweep and the number alone.
+    ///
+    /// # Errors
+    /// As [`Sweep::scenario`]; a drive for which lanes and shipping ECU differ.
+    pub fn run_chunk(&self, number: u64) -> Result<Chunk, InputError> {
+        let drives = self.drives_of(number);
+        let scenarios = drives.clone().map(|drive| self.scenario(&self.point(drive)));
+        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
+        let in_lanes = self.drive_in_lanes(&scenarios)?;
+        let rows = drives.zip(&scenarios).zip(in_lanes);
+        let rows = rows.map(|((drive, scenario), row)| match row {
+            Some(row) if self.is_checked(drive) => {
+                let alone = self.drive_alone(scenario)?;
+                self.agree(drive, &row, &alone)?;
+                Ok(row)
+            }
+            Some(row) => Ok(row),
+            None => self.drive_alone(scenario),
+        });
+        Ok(Chunk {
+            number,
+            rows: rows.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// What the lanes give; `None` for a drive that they hand back.
+    fn drive_in_lanes(&self, scenarios: &[Scenario]) -> Result<Vec<Option<Driven>>, InputError> {
+        let mut peaks: Vec<Option<Option<f64>>> = vec![Some(None); scenarios.len()];
+        // First the same drives without their failures, where a metric asks for them.
+        let (mut places, mut nominals) = (Vec::new(), Vec::new());
+        for (place, scenario) in scenarios.iter().enumerate() {
+            if self.recovers_from(scenario).is_some() {
+                let failure = Failure {
+                    kind: FailureKind::None,
+                    ..scenario.failure()
+                };
+                let nominal = scenario.to_builder().failure(failure).build();
+                nominals.push(nominal.map_err(|e| InputError::new(&self.name, e))?);
+                places.push(place);
+            }
+        }
+        drive(&nominals, Width::Widest, |number, run| {
+            let scenario = &scenarios[places[number]];
+            peaks[places[number]] =
+                run.map(|run| nominal_peak_m(run, self.window_of(scenario), scenario.failure().time_s));
+        });
+        let mut rows: Vec<Option<Driven>> = vec![None; scenarios.len()];
+        drive(scenarios, Width::Widest, |number, run| {
+            let known = run.zip(peaks[number]);
+            rows[number] = known.map(|(run, peak_m)| self.measured(&scenarios[number], run, peak_m));
+        });
+        Ok(rows)
+    }
+
+    fn is_checked(&self, drive: u64) -> bool {
+        seeds::nth(Stream::Design.seed(self.seed), drive).is_multiple_of(CHECKED_OF)
+    }
+
+    /// Whether two rows are the same to the last bit.
+    fn agree(&self, drive: u64, lanes: &Driven, alone: &Driven) -> Result<(), InputError> {
+        let bits = |value: Option<f64>| value.map(f64::to_bits);
+        let own = [
+            (
+                "diverged",
+                Some(f64::from(lanes.diverged)),
+                Some(f64::from(alone.diverged)),
+            ),
+            ("end_m", Some(lanes.end_m), Some(alone.end_m)),
+        ];
+        let metrics = self.metrics.iter().zip(lanes.metrics.iter().zip(&alone.metrics));
+        let metrics = metrics.map(|(metric, (lanes, alone))| (metric.name, *lanes, *alone));
+        let mut all = own.into_iter().chain(metrics);
+        match all.find(|(_, lanes, alone)| bits(*lanes) != bits(*alone)) {
+            None => Ok(()),
+            Some((name, lanes, alone)) => Err(InputError::new(
+                &self.name,
+                format!(
+                    "drive {drive}: {name} is {lanes:?} in lanes and {alone:?} with the shipping ECU. This is a fault of \
+                     this program, not of the sweep: please report it, with the text of --replay {drive}"
+                ),
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::sweep::tests::with_road;
+
+    /// Lanes drive side by side what the shipping ECU drives alone, and hand back what they cannot: the bytes are the same.
+    #[test]
+    fn the_table_does_not_depend_on_lanes() {
+        let sweep = with_road(
+            "samples = 12\nmetrics = [\"time_to_recover_s\", \"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
+            "[vary]\nfailure.kind = [\"none\", \"torque\", \"input\"]\nsensors = [\"paper\", \"exact\"]\n\
+             \"failure.time\" = { uniform = [1.5, 9] }\nspeed = { uniform = [40, 90] }\n\
+             \"driver.t_p\" = { uniform = [0.05, 0.5] }\n\"driver.K_hg\" = { uniform = [0, 1] }\n\
+             \"driver.remnant_sd\" = [0, 0.1]\n",
+        );
+        let (mut in_lanes, mut out) = (0, 0);
+        for chunk in 0..sweep.chunks() {
+            let side_by_side = sweep.run_chunk(chunk).unwrap();
+            let alone = sweep.run_chunk_one_by_one(chunk).unwrap();
+            assert_eq!(side_by_side.to_bytes(1), alone.to_bytes(1), "chunk {chunk}");
+            for drive in sweep.drives_of(chunk) {
+                let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
+                match haptic_sim::lanes::why_not(&scenario) {
+                    None => in_lanes += 1,
+                    Some(_) => out += 1,
+                }
+            }
+        }
+        assert!(in_lanes > 40 && out > 40, "{in_lanes} in lanes, {out} not");
+    }
+}

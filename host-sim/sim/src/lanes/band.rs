@@ -1,0 +1,126 @@
+//! The band of the shipping ECU's monitor in several runs, a little narrower: whoever is within this one is within that.
+
+use super::counts::{flag, whole};
+use super::ecu::GUIDED;
+
+/// Half the band of the monitor at least, mN.m, and for how many steps a torque may be beyond it.
+const BAND_MNM: f64 = 300.0;
+const ASTRAY_MS: i32 = 20;
+/// The monitor takes rates over at least this, ms.
+const RATE_SPAN_MS: i32 = 50;
+
+/// What the monitor compares the torque with.
+#[repr(C, align(64))]
+pub(super) struct Band<const N: usize> {
+    /// mN.m per m, per rad, per m/s, per rad/s; the last is what its coarse arithmetic may be off by, mN.m.
+    gains: [[f64; N]; 4],
+    half: [f64; N],
+    before: [[f64; N]; 2],
+    last: [[f64; N]; 2],
+    before_ms: [i32; N],
+    last_ms: [i32; N],
+    low: [i32; N],
+    high: [i32; N],
+    torque: [i32; N],
+    astray: [i32; N],
+}
+
+impl<const N: usize> Band<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            gains: [[0.0; N]; 4],
+            half: [0.0; N],
+            before: [[0.0; N]; 2],
+            last: [[0.0; N]; 2],
+            before_ms: [0; N],
+            last_ms: [0; N],
+            low: [0; N],
+            high: [0; N],
+            torque: [0; N],
+            astray: [0; N],
+        }
+    }
+
+    pub(super) fn begin(
+        &mut self,
+        lane: usize,
+        [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate]: [f64; 4],
+    ) {
+        let gains = [on_e_y, on_e_theta, on_e_y_rate, on_e_theta_rate].map(|gain| gain * 1e3);
+        for (all, gain) in self.gains.iter_mut().zip(gains) {
+            all[lane] = gain;
+        }
+        // Errors are cut to 1 mm and 0.1 mrad there, rates to 40 mm/s and 2 mrad/s; gains are whole numbers.
+        let [e_y, e_theta, e_y_rate, e_theta_rate] = gains;
+        let coarse = 8.0 + 2e-3 * e_y + 3e-4 * e_theta + 0.1 * e_y_rate + 4e-3 * e_theta_rate;
+        self.half[lane] = BAND_MNM - coarse;
+        for errors in self.before.iter_mut().chain(&mut self.last) {
+            errors[lane] = 0.0;
+        }
+        for state in [
+            &mut self.before_ms,
+            &mut self.last_ms,
+            &mut self.low,
+            &mut self.high,
+            &mut self.torque,
+            &mut self.astray,
+        ] {
+            state[lane] = 0;
+        }
+    }
+
+    /// What the lane errors ask for: proportional part, and with rates.
+    #[inline(always)]
+    pub(super) fn picture(&mut self, seen: &[[f64; N]; 2], own: &[i32; N], hears: &[i32; N]) {
+        let [per_m, per_rad, per_mps, per_radps] = &self.gains;
+        for l in 0..N {
+            let hears = hears[l] != 0;
+            let is_old = (self.last_ms[l].wrapping_sub(self.before_ms[l]) > RATE_SPAN_MS) & hears;
+            for i in 0..2 {
+                self.before[i][l] = if is_old {
+                    self.last[i][l]
+                } else {
+                    self.before[i][l]
+                };
+                self.last[i][l] = if hears { seen[i][l] } else { self.last[i][l] };
+            }
+            self.before_ms[l] = if is_old {
+                self.last_ms[l]
+            } else {
+                self.before_ms[l]
+            };
+            self.last_ms[l] = if hears { own[l] } else { self.last_ms[l] };
+            let span_ms = self.last_ms[l].wrapping_sub(self.before_ms[l]).max(1);
+            let per_s = 1e3 / f64::from(span_ms);
+            let [e_y, e_theta] = [self.last[0][l], self.last[1][l]];
+            let position = per_m[l] * e_y + per_rad[l] * e_theta;
+            let rate = per_mps[l] * (e_y - self.before[0][l]) * per_s
+                + per_radps[l] * (e_theta - self.before[1][l]) * per_s;
+            let both = position + rate;
+            let high = position.max(both).max(0.0) + self.half[l];
+            let low = position.min(both).min(0.0) - self.half[l];
+            self.high[l] = whole(high.min(1e6));
+            self.low[l] = whole(low.max(-1e6));
+        }
+    }
+
+    /// Counts the steps in which the torque is away from that.
+    #[inline(always)]
+    pub(super) fn judge(
+        &mut self,
+        applied: &[i32; N],
+        mode: &[i32; N],
+        matters: &[i32; N],
+        suspect: &mut [i32; N],
+    ) {
+        for l in 0..N {
+            let torque = (applied[l] >> 12).wrapping_mul(1000) / 4096;
+            let is_within = (torque >= self.low[l]) & (torque <= self.high[l]);
+            let is_falling = torque.wrapping_abs() < self.torque[l].wrapping_abs();
+            let longer = self.astray[l].wrapping_add(if is_falling { 0 } else { 1 });
+            self.astray[l] = if is_within { 0 } else { longer };
+            suspect[l] |= flag((self.astray[l] > ASTRAY_MS) & (mode[l] == GUIDED)) & matters[l];
+            self.torque[l] = torque;
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The checks of the shipping ECU that could end guidance, in float64 and a little stricter.
+//!
+//! `haptic-core`'s plausibility of lane and column are sums that leak: a step's error is forgotten within a second (16 s
+//! for what is learnt slowly). Here the same sums are taken without the roundings of fixed point. These are some counts of
+//! 2^-24 a step, and no term of a sum amplifies them: over all that a sum remembers they come to less than
+//! 0.005 N.m.s, and less than 0.001 m. The margins here are smaller by several times as much, so that whoever stays within
+//! them stays within core's. The other way a run is driven anew without need.
+
+use super::counts::{flag, speed_on_the_bus};
+use crate::scenario::Scenario;
+
+/// Of core's 0.6 N.m.s.
+const COLUMN_MARGIN: f64 = 0.58;
+/// Of core's 0.4 m, of half of that, and of 0.8 m.
+const LANE_MARGIN: f64 = 0.38;
+const LANE_MOVED: f64 = 0.18;
+const LANE_UNREAL: f64 = 0.78;
+const COLUMN_BIAS: f64 = 0.5;
+const LANE_BIAS: f64 = 0.15;
+/// What is learnt slowly is learnt by a sixteenth.
+const LEARNS: f64 = 1.0 / 16.0;
+const FRICTION: f64 = 0.5;
+const TOLERANCE: f64 = 77.0 / 256.0;
+const ASSIST: f64 = 5.0;
+/// Far inside what the frames carry, rad and rad/s.
+const LARGEST_WHEEL: f64 = 12.0;
+const LARGEST_YAW_RATE: f64 = 1.9;
+/// Counts of a yaw rate on the bus, per rad/s.
+const YAW_RATE_COUNTS: f64 = 4096.0;
+/// Times in s: between frames of the column, and of the vehicle.
+const COLUMN_S: f64 = 0.002;
+const VEHICLE_S: f64 = 0.010;
+/// Directions of the line are kept, one every 25 ms.
+const LINES: usize = 32;
+const LINE_US: i32 = 25_000;
+
+/// The sums of several runs.
+#[repr(C, align(64))]
+pub(super) struct Checks<const N: usize> {
+    speed: [f64; N],
+    near_m: [f64; N],
+    aligning_gain: [f64; N],
+    damping: [f64; N],
+    /// 0 until the first frames came, then 1.
+    began: [f64; N],
+    yaw_rate: [f64; N],
+    aligning: [f64; N],
+    heading: [f64; N],
+    wheel: [f64; N],
+    column_bias: [f64; N],
+    column_sum: [f64; N],
+    e_y: [f64; N],
+    /// Heading and yaw rate at the last picture.
+    heading_then: [f64; N],
+    yaw_rate_then: [f64; N],
+    lane_bias: [f64; N],
+    predicted: [f64; N],
+    seen: [f64; N],
+    between_us: [i32; N],
+    lines: [[f64; N]; LINES],
+}
+
+/// How far an interval is from zero, beside a tolerance.
+#[inline(always)]
+fn beyond(least: f64, most: f64, tolerance: f64) -> f64 {
+    (least - tolerance).max(0.0) + (most + tolerance).min(0.0)
+}
+
+impl<const N: usize> Checks<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            speed: [0.0; N],
+            near_m: [0.0; N],
+            aligning_gain: [0.0; N],
+            damping: [0.0; N],
+            began: [0.0; N],
+            yaw_rate: [0.0; N],
+            aligning: [0.0; N],
+            heading: [0.0; N],
+            wheel: [0.0; N],
+            column_bias: [0.0; N],
+            column_sum: [0.0; N],
+            e_y: [0.0; N],
+            heading_then: [0.0; N],
+            yaw_rate_then: [0.0; N],
+            lane_bias: [0.0; N],
+            predicted: [0.0; N],
+            seen: [0.0; N],
+            between_us: [0; N],
+            lines: [[0.0; N]; LINES],
+        }
+    }
+
+    pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario) {
+        let vehicle = scenario.controller_params().vehicle;
+        let speed = speed_on_the_bus(scenario.speed_m_per_s());
+        self.speed[lane] = speed;
+        self.near_m[lane] = vehicle.near_time_s * speed;
+        self.aligning_gain[lane] = vehicle.aligning_gain_nm_s2_per_m;
+        self.damping[lane] = vehicle.column_damping_nm_s;
+        let between_s = (vehicle.far_time_s - vehicle.near_time_s).max(0.0);
+        self.between_us[lane] = (between_s * 1e6 + 0.5) as i32;
+        for state in [
+            &mut self.began,
+            &mut self.yaw_rate,
+            &mut self.aligning,
+            &mut self.heading,
+            &mut self.wheel,
+            &mut self.column_bias,
+            &mut self.column_sum,
+            &mut self.e_y,
+            &mut self.heading_then,
+            &mut self.yaw_rate_then,
+            &mut self.lane_bias,
+            &mut self.predicted,
+            &mut self.seen,
+        ] {
+            state[lane] = 0.0;
+        }
+    }
+
+    /// A frame of the vehicle.
+    #[inline(always)]
+    pub(super) fn vehicle(&mut self, yaw_rate: &[f64; N], matters: &[i32; N], suspect: &mut [i32; N]) {
+        for l in 0..N {
+            suspect[l] |= !flag(yaw_rate[l].abs() <= LARGEST_YAW_RATE) & matters[l];
+            self.heading[l] += self.yaw_rate[l] * VEHICLE_S;
+            self.yaw_rate[l] = (yaw_rate[l] * YAW_RATE_COUNTS).round() * (1.0 / YAW_RATE_COUNTS);
+            self.aligning[l] = self.speed[l] * self.yaw_rate[l] * self.aligning_gain[l];
+        }
+    }
+
+    /// A frame of the column: driver torque and the guidance torque applied as the ECU has them, N.m, and the true wheel
+    /// angle, rad.
+    #[inline(always)]
+    pub(super) fn column(
+        &mut self,
+        driver: &[f64; N],
+        applied: &[f64; N],
+        wheel: &[f64; N],
+        matters: &[i32; N],
+        suspect: &mut [i32; N],
+    ) {
+        const RESOLUTION: f64 = crate::models::sensors::ANGLE_RESOLUTION_DEG;
+        for l in 0..N {
+            let dt = COLUMN_S * self.began[l];
+            let sensed = (wheel[l].to_degrees() / RESOLUTION).round() * RESOLUTION.to_radians();
+            let damped = (sensed - self.wheel[l]) * self.damping[l];
+            self.wheel[l] = sensed;
+            let lacking = applied[l] - self.aligning[l];
+            let assisted = ASSIST * driver[l];
+            let least = (lacking + driver[l].min(assisted)) * dt - damped;
+            let most = (lacking + driver[l].max(assisted)) * dt - damped;
+            let bias = self.column_bias[l];
+            let learnt = bias * dt;
+            let change = (beyond(least, most, 0.0) - learnt) * LEARNS;
+            self.column_bias[l] = (bias + change).min(COLUMN_BIAS).max(-COLUMN_BIAS);
+            let tolerance = (self.aligning[l].abs() * TOLERANCE + FRICTION) * dt;
+            let sum = self.column_sum[l];
+            let sum = sum - sum * dt + beyond(least - learnt, most - learnt, tolerance);
+            self.column_sum[l] = sum;
+            let is_sound = (sum.abs() <= COLUMN_MARGIN) & (wheel[l].abs() <= LARGEST_WHEEL);
+            suspect[l] |= !flag(is_sound) & matters[l];
+        }
+    }
+
+    /// A picture that came `dt_ms` after the one before and `since_ms` after the last frame of the vehicle; `own` is the
+    /// number of the step in each run, and `keeps` every 25 ms.
+    #[inline(always)]
+    pub(super) fn picture(
+        &mut self,
+        [e_y, e_theta]: &[[f64; N]; 2],
+        [dt_ms, since_ms]: [u32; 2],
+        own: &[i32; N],
+        keeps: bool,
+        matters: &[i32; N],
+        suspect: &mut [i32; N],
+    ) {
+        let (dt, since) = (f64::from(dt_ms) * 1e-3, f64::from(since_ms) * 1e-3);
+        let mut heading = [0.0; N];
+        for l in 0..N {
+            heading[l] = self.heading[l] + self.yaw_rate[l] * since;
+        }
+        if keeps {
+            for l in 0..N {
+                self.lines[(own[l] / 25) as usize % LINES][l] = heading[l] + e_theta[l];
+            }
+        }
+        let (mut near, mut known) = ([0.0; N], [0.0; N]);
+        for l in 0..N {
+            // Where the far point was `between` before the last picture.
+            let wanted_us = (own[l] - dt_ms as i32) * 1000 - self.between_us[l];
+            let (place, newest) = (wanted_us / LINE_US, own[l] / 25);
+            if wanted_us >= 0 && newest - place < LINES as i32 {
+                let from = self.lines[place as usize % LINES][l];
+                let to = self.lines[(place + 1).min(newest) as usize % LINES][l];
+                let share = f64::from(wanted_us % LINE_US) * (1.0 / f64::from(LINE_US));
+                (near[l], known[l]) = (from + (to - from) * share - self.heading_then[l], 1.0);
+            }
+        }
+        for l in 0..N {
+            let began = self.began[l];
+            let dt = dt * began;
+            let seen = (e_y[l] - self.e_y[l]) * began;
+            let rate = self.speed[l] * near[l] - self.near_m[l] * self.yaw_rate_then[l];
+            let predicted = if known[l] != 0.0 { rate * dt } else { seen };
+            let bias = self.lane_bias[l];
+            let predicted = predicted + bias * dt;
+            let learnt = bias + (seen - predicted) * LEARNS * began;
+            self.lane_bias[l] = learnt.min(LANE_BIAS).max(-LANE_BIAS);
+            let (sum_predicted, sum_seen) = (self.predicted[l], self.seen[l]);
+            let sum_predicted = sum_predicted - sum_predicted * dt + predicted;
+            let sum_seen = sum_seen - sum_seen * dt + seen;
+            (self.predicted[l], self.seen[l]) = (sum_predicted, sum_seen);
+            let missing = sum_predicted - sum_seen;
+            // The sign is beyond doubt where the first rule asks for it, and the second does not.
+            let missing = if sum_predicted < 0.0 { -missing } else { missing };
+            let is_missing = (missing > LANE_MARGIN) & (sum_predicted.abs() > LANE_MOVED);
+            suspect[l] |= flag(is_missing | (missing.abs() > LANE_UNREAL)) & matters[l];
+            (self.e_y[l], self.heading_then[l], self.yaw_rate_then[l]) =
+                (e_y[l], heading[l], self.yaw_rate[l]);
+        }
+    }
+
+    /// The first frames of every run have come.
+    #[inline(always)]
+    pub(super) fn let_time_pass(&mut self) {
+        self.began = [1.0; N];
+    }
+}

@@ -1,0 +1,93 @@
+//! Quantities as counts of 2^-24 of their unit, as `haptic-core` has them.
+
+pub(super) const ONE: f64 = (1 << 24) as f64;
+/// A millisecond as a share of a second in 2^-32, as core has it.
+pub(super) const MS: i64 = 1000 * 4295;
+
+/// As core turns SI values into bits; saturates.
+#[inline(always)]
+pub(super) fn bits(si: f64) -> i32 {
+    let scaled = si * ONE;
+    (if scaled >= 0.0 { scaled + 0.5 } else { scaled - 0.5 }) as i32
+}
+
+/// The same of a value that is no larger than 100, in steps that every machine has for several lanes at once: a conversion
+/// that saturates is made one by one.
+#[inline(always)]
+pub(super) fn small_bits(si: f64) -> i32 {
+    let scaled = si * ONE;
+    whole(scaled + 0.5_f64.copysign(scaled))
+}
+
+/// Toward zero; of less than 2^31.
+#[inline(always)]
+pub(super) fn whole(value: f64) -> i32 {
+    // 1.5 * 2^52: what is added to it stands in its lowest bits.
+    const AT_THE_END: f64 = 6_755_399_441_055_744.0;
+    (value.trunc() + AT_THE_END).to_bits() as i32
+}
+
+#[inline(always)]
+pub(super) fn per_second(bits: i32, share: i64) -> i32 {
+    (i64::from(bits).wrapping_mul(share).wrapping_add(1 << 31) >> 32) as i32
+}
+
+/// Rounded to a count of 2^-(24 - `cut`), in 2^-24.
+#[inline(always)]
+pub(super) fn on_the_bus(bits: i32, cut: u32) -> i32 {
+    (bits.wrapping_add(1 << (cut - 1)) >> cut) << cut
+}
+
+#[inline(always)]
+pub(super) fn flag(holds: bool) -> i32 {
+    if holds { -1 } else { 0 }
+}
+
+/// The speed as the bus carries it, m/s.
+pub(super) fn speed_on_the_bus(speed_m_per_s: f64) -> f64 {
+    f64::from(on_the_bus(bits(speed_m_per_s), 16)) * (1.0 / ONE)
+}
+
+#[cfg(test)]
+mod tests {
+    use haptic_core::quantity::{Speed, Torque};
+
+    use super::*;
+    use crate::lanes::ecu::{
+        ACTS, FELT, HELD, LANE_STEP, OVERRIDE_FROM, TORQUE_LSB, WINDOW_GROWTH, YAW_STEP,
+    };
+
+    #[test]
+    fn constants_are_the_bits_of_what_core_writes_in_si() {
+        let of = |nm: f64| (Torque::from_nm(nm).nm() * ONE) as i32;
+        for (nm, count) in [
+            (1.2, WINDOW_GROWTH),
+            (0.8, OVERRIDE_FROM),
+            (0.3, LANE_STEP),
+            (0.1, YAW_STEP),
+            (0.08, FELT),
+            (0.35, HELD),
+            (0.05, ACTS),
+            (1.0 / 4096.0, TORQUE_LSB),
+        ] {
+            assert_eq!(of(nm), count, "{nm}");
+        }
+        for nm in [
+            0.0,
+            1e-9,
+            3.3e-8,
+            -3.3e-8,
+            1.2345,
+            -4.321,
+            127.9,
+            -200.0,
+            f64::NAN,
+        ] {
+            assert_eq!(bits(nm), of(nm), "{nm}");
+        }
+        assert_eq!(
+            speed_on_the_bus(16.667),
+            Speed::from_m_per_s(16.667).m_per_s().mul_add(256.0, 0.5).floor() / 256.0
+        );
+    }
+}

@@ -1,0 +1,445 @@
+//! The lean ECU of several runs: what the shipping one does while nothing is wrong, to the same bits.
+//!
+//! The rounding of sensors and bus, the law (9), the envelope, the rounding of the guidance frame, and a handover after
+//! the loss of the lane preview. Every quantity is a count of 2^-24 of its unit, as in `haptic-core`, from which formulas
+//! and constants are taken; the property test of this module holds the two together. What could end guidance, and is not
+//! decided here, makes a run suspect ([`super::checks`]).
+
+use haptic_core::params::Params;
+
+use super::band::Band;
+use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, whole};
+use crate::models::sensors::TORQUE_RESOLUTION_NM;
+use crate::scenario::{Condition, Scenario};
+
+/// Who decides the torque.
+pub(super) const GUIDED: i32 = 0;
+const HANDOVER: i32 = 1;
+const OFF: i32 = 2;
+
+/// An LSB of a torque on the bus.
+pub(super) const TORQUE_LSB: i32 = 1 << 12;
+pub(super) const WINDOW_GROWTH: i32 = 20_132_659;
+const WINDOW_STEPS: i32 = 250;
+pub(super) const OVERRIDE_FROM: i32 = 13_421_773;
+const OVERRIDE_SLOPE: i32 = 3;
+const MAX_RATE: u64 = 1000 << 20;
+/// The largest honest step of a lane sample, 0.3 m and 0.1 rad.
+pub(super) const LANE_STEP: i32 = 5_033_165;
+pub(super) const YAW_STEP: i32 = 1_677_722;
+/// Ends of a lane sample on the bus, 4 m and 0.5 rad, and a bit less.
+const LARGEST_E_Y: f64 = 3.99;
+const LARGEST_E_THETA: f64 = 0.499;
+/// Hands: a change that is felt, a torque that is held, a guidance that acts, and the patience in ms until
+/// guidance ends.
+pub(super) const FELT: i32 = 1_342_177;
+pub(super) const HELD: i32 = 5_872_026;
+pub(super) const ACTS: i32 = 838_861;
+const HANDS_MS: i32 = 30_000;
+/// Far inside what a column frame carries, N.m.
+const LARGEST_DRIVER_NM: f64 = 10.0;
+/// Between a loss of the lane preview and its time-out, ms; then the handover.
+pub(super) const TIMEOUT_MS: u32 = 31;
+const HANDOVER_MS: i32 = 2000;
+/// Torques kept for a handover, one every 5 ms.
+const PAST: usize = 16;
+/// The ECUs.
+#[repr(C, align(64))]
+pub(super) struct Ecus<const N: usize> {
+    /// Gains of the law, on e_y, its rate, e_theta and its rate.
+    gains: [[i32; N]; 4],
+    /// Of the rates' filter, 2^-8 us.
+    tau: [u32; N],
+    /// Share of the law's torque at this speed.
+    scheduled: [i32; N],
+    limit: [i32; N],
+    /// What a step may change: none in the first, which takes no time.
+    growth: [i32; N],
+    fall: [i32; N],
+    growth_in_a_step: [i32; N],
+    fall_in_a_step: [i32; N],
+    /// -1 until the first picture came.
+    first: [i32; N],
+    e_y: [i32; N],
+    e_theta: [i32; N],
+    e_y_rate: [i32; N],
+    e_theta_rate: [i32; N],
+    /// Age of the lane sample, as a share of a second in 2^-32.
+    age: [i32; N],
+    /// The torque of the last step and whether a limit held it.
+    pub(super) applied: [i32; N],
+    limited: [i32; N],
+    anchor: [i32; N],
+    anchor_step: [i32; N],
+    pub(super) driver: [i32; N],
+    felt: [i32; N],
+    without_ms: [i32; N],
+    mode: [i32; N],
+    /// -1 where what the ECU does matters: it guides, and its torque is applied.
+    matters: [i32; N],
+    /// -1 where the ECU hears the camera.
+    pub(super) hears: [i32; N],
+    /// Not 0 where something could have ended guidance.
+    pub(super) suspect: [i32; N],
+    ramp_from: [i32; N],
+    ramp_done: [i32; N],
+    past: [[i32; N]; PAST],
+    band: Band<N>,
+}
+
+/// One update of a filtered rate.
+fn filtered(tau: u32, rate: i32, from: i32, to: i32, dt_us: u32) -> i32 {
+    let change = (i64::from(to) - i64::from(from)) * (1_000_000 << 4);
+    let sum = i64::from(tau).wrapping_mul(i64::from(rate)).wrapping_add(change);
+    let span = tau.wrapping_add(dt_us << 8).max(1);
+    let size = (sum.unsigned_abs().wrapping_add(u64::from(span >> 1)) / u64::from(span)).min(MAX_RATE) as i32;
+    if sum < 0 { -size } else { size }
+}
+
+impl<const N: usize> Ecus<N> {
+    pub(super) fn new() -> Self {
+        const fn zero<const N: usize>() -> [i32; N] {
+            [0; N]
+        }
+        Self {
+            gains: [zero(); 4],
+            tau: [1; N],
+            scheduled: zero(),
+            limit: zero(),
+            growth: zero(),
+            fall: zero(),
+            growth_in_a_step: zero(),
+            fall_in_a_step: zero(),
+            first: zero(),
+            e_y: zero(),
+            e_theta: zero(),
+            e_y_rate: zero(),
+            e_theta_rate: zero(),
+            age: zero(),
+            applied: zero(),
+            limited: zero(),
+            anchor: zero(),
+            anchor_step: zero(),
+            driver: zero(),
+            felt: zero(),
+            without_ms: zero(),
+            mode: [OFF; N],
+            matters: zero(),
+            hears: zero(),
+            suspect: zero(),
+            ramp_from: zero(),
+            ramp_done: zero(),
+            past: [zero(); PAST],
+            band: Band::new(),
+        }
+    }
+
+    /// A new run begins in a lane: engaged, as the paper's studies have it, or without guidance.
+    pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario) {
+        let p = scenario.controller_params();
+        let guided = scenario.condition() != Condition::Manual;
+        let gains = [p.a_1, p.a_2, p.a_3, p.a_4].map(|a| p.k_1 * a);
+        for (all, gain) in self.gains.iter_mut().zip(gains) {
+            all[lane] = bits(gain);
+        }
+        self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
+        self.scheduled[lane] = scheduled(&p, scenario.speed_m_per_s());
+        self.limit[lane] = bits(p.torque_limit_nm);
+        self.growth_in_a_step[lane] = per_second(bits(p.wind_up_nm_per_s), MS);
+        let fall = per_second(bits(p.reduction_nm_per_s), MS);
+        self.fall_in_a_step[lane] = (fall - TORQUE_LSB).max(0);
+        self.mode[lane] = if guided { GUIDED } else { OFF };
+        (self.matters[lane], self.hears[lane]) = (flag(guided), flag(guided));
+        self.first[lane] = -1;
+        for state in [
+            &mut self.growth,
+            &mut self.fall,
+            &mut self.e_y,
+            &mut self.e_theta,
+            &mut self.e_y_rate,
+            &mut self.e_theta_rate,
+            &mut self.age,
+            &mut self.applied,
+            &mut self.limited,
+            &mut self.anchor,
+            &mut self.anchor_step,
+            &mut self.driver,
+            &mut self.felt,
+            &mut self.without_ms,
+            &mut self.suspect,
+            &mut self.ramp_from,
+            &mut self.ramp_done,
+        ] {
+            state[lane] = 0;
+        }
+        for torques in &mut self.past {
+            torques[lane] = 0;
+        }
+        self.band.begin(lane, gains);
+    }
+
+    /// From its second step on a run's steps take a millisecond each.
+    #[inline(always)]
+    pub(super) fn let_time_pass(&mut self) {
+        (self.growth, self.fall) = (self.growth_in_a_step, self.fall_in_a_step);
+    }
+
+    /// The torque does not reach the column any more: what the ECU decides is nobody's matter.
+    pub(super) fn lose_torque(&mut self, lane: usize) {
+        (self.matters[lane], self.mode[lane]) = (0, OFF);
+    }
+
+    /// The lane preview is stale: the last torque from before it was lost fades.
+    pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
+        let last = (step - TIMEOUT_MS - 1) / 5;
+        let (trusted, applied) = (self.past[last as usize % PAST][lane], self.applied[lane]);
+        self.mode[lane] = HANDOVER;
+        self.ramp_from[lane] = smaller_of_same_sign(trusted, applied);
+    }
+
+    /// Takes the driver's torque from the column's sensor, N.m.
+    #[inline(always)]
+    pub(super) fn column(&mut self, torque_nm: &[f64; N]) {
+        for l in 0..N {
+            let sensed = (torque_nm[l] / TORQUE_RESOLUTION_NM).round() * TORQUE_RESOLUTION_NM;
+            let driver = on_the_bus(small_bits(sensed), 12);
+            // What is no number is too large too.
+            let is_small = sensed.abs() <= LARGEST_DRIVER_NM;
+            self.suspect[l] |= !flag(is_small) & self.matters[l];
+            self.driver[l] = driver;
+            let is_felt =
+                (driver.wrapping_abs() > HELD) | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT);
+            self.felt[l] = if is_felt { driver } else { self.felt[l] };
+            self.without_ms[l] = if is_felt { 0 } else { self.without_ms[l] };
+        }
+    }
+
+    /// Takes a picture, `dt_ms` after the one before. Returns the errors as the bus has them, m and rad.
+    #[inline(always)]
+    pub(super) fn picture(
+        &mut self,
+        e_y_m: &[f64; N],
+        e_theta_rad: &[f64; N],
+        dt_ms: u32,
+        own: &[i32; N],
+    ) -> [[f64; N]; 2] {
+        let mut seen = [[0.0; N]; 2];
+        for l in 0..N {
+            let (e_y, e_theta) = (
+                on_the_bus(small_bits(e_y_m[l]), 11),
+                on_the_bus(small_bits(e_theta_rad[l]), 8),
+            );
+            let is_near = (e_y_m[l].abs() <= LARGEST_E_Y) & (e_theta_rad[l].abs() <= LARGEST_E_THETA);
+            let moved = e_y.wrapping_sub(self.e_y[l]).wrapping_abs();
+            let turned = e_theta.wrapping_sub(self.e_theta[l]).wrapping_abs();
+            let jumps = flag((moved > LANE_STEP) | (turned > YAW_STEP)) & !self.first[l];
+            self.suspect[l] |= (!flag(is_near) | jumps) & self.matters[l] & self.hears[l];
+            seen[0][l] = f64::from(e_y) * (1.0 / ONE);
+            seen[1][l] = f64::from(e_theta) * (1.0 / ONE);
+        }
+        for l in 0..N {
+            if self.hears[l] == 0 {
+                continue;
+            }
+            let (e_y, e_theta) = (whole(seen[0][l] * ONE), whole(seen[1][l] * ONE));
+            if self.first[l] == 0 {
+                let (tau, dt_us) = (self.tau[l], dt_ms * 1000);
+                self.e_y_rate[l] = filtered(tau, self.e_y_rate[l], self.e_y[l], e_y, dt_us);
+                self.e_theta_rate[l] = filtered(tau, self.e_theta_rate[l], self.e_theta[l], e_theta, dt_us);
+            }
+            (self.e_y[l], self.e_theta[l]) = (e_y, e_theta);
+            (self.first[l], self.age[l]) = (0, 0);
+        }
+        self.band.picture(&seen, own, &self.hears);
+        seen
+    }
+
+    /// The torque of this step.
+    #[inline(always)]
+    pub(super) fn decide(&mut self, own: &[i32; N], is_window_due: bool, is_kept: bool) {
+        for l in 0..N {
+            // Hands: the torque of the last step acted for a millisecond.
+            let acts = (self.applied[l].wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
+            self.without_ms[l] = self.without_ms[l].wrapping_add(if acts { 1 } else { 0 });
+            self.suspect[l] |= flag(self.without_ms[l] >= HANDS_MS) & self.matters[l];
+        }
+        if is_window_due {
+            for l in 0..N {
+                let is_due = own[l].wrapping_sub(self.anchor_step[l]) >= WINDOW_STEPS;
+                self.anchor[l] = if is_due { self.applied[l] } else { self.anchor[l] };
+                self.anchor_step[l] = if is_due { own[l] } else { self.anchor_step[l] };
+            }
+        }
+        let mut wanted = [0; N];
+        self.law(&mut wanted);
+        let mut hands_over = 0;
+        for l in 0..N {
+            hands_over |= self.mode[l] & HANDOVER;
+        }
+        if hands_over != 0 {
+            self.ramps(&mut wanted);
+        }
+        let mut torque = [0; N];
+        self.envelope(&wanted, &mut torque);
+        if is_kept {
+            for l in 0..N {
+                self.past[(own[l] / 5) as usize % PAST][l] = torque[l];
+            }
+        }
+        for l in 0..N {
+            // Toward zero.
+            let rounded = (torque[l].wrapping_add((torque[l] >> 31) & (TORQUE_LSB - 1)) >> 12) << 12;
+            self.applied[l] = if self.mode[l] == OFF { 0 } else { rounded };
+            self.limited[l] = if self.mode[l] == OFF { 0 } else { self.limited[l] };
+        }
+        self.band
+            .judge(&self.applied, &self.mode, &self.matters, &mut self.suspect);
+    }
+
+    /// Equation (9).
+    #[inline(always)]
+    fn law(&mut self, wanted: &mut [i32; N]) {
+        let [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate] = &self.gains;
+        for l in 0..N {
+            let now = |error: i32, rate: i32| {
+                ((error >> 3).wrapping_add(1) >> 1).wrapping_add(per_second(rate, i64::from(self.age[l])))
+            };
+            let term = |gain: i32, value: i32| i64::from(gain).wrapping_mul(i64::from(value));
+            let sum = term(on_e_y[l], now(self.e_y[l], self.e_y_rate[l]))
+                .wrapping_add(term(on_e_y_rate[l], self.e_y_rate[l]))
+                .wrapping_add(term(on_e_theta[l], now(self.e_theta[l], self.e_theta_rate[l])))
+                .wrapping_add(term(on_e_theta_rate[l], self.e_theta_rate[l]));
+            let rounded = sum.wrapping_add(1 << 19);
+            // More than 32 bits would saturate.
+            let is_wide = (rounded.wrapping_add(1 << 51) as u64) >> 52 != 0;
+            self.suspect[l] |= flag(is_wide) & self.matters[l];
+            let asked = ((rounded as u64) >> 20) as i32;
+            let shared = term(self.scheduled[l], asked).wrapping_add(1 << 23);
+            wanted[l] = ((shared as u64) >> 24) as i32;
+            self.age[l] = self.age[l].wrapping_add(MS as i32);
+        }
+    }
+
+    /// The torques of the handovers.
+    #[cold]
+    #[inline(never)]
+    fn ramps(&mut self, wanted: &mut [i32; N]) {
+        for (l, wanted) in wanted.iter_mut().enumerate() {
+            if self.mode[l] != HANDOVER {
+                continue;
+            }
+            if self.ramp_done[l] >= HANDOVER_MS && self.applied[l] == 0 {
+                (self.mode[l], self.matters[l]) = (OFF, 0);
+                continue;
+            }
+            self.ramp_done[l] += 1;
+            let left = i64::from(HANDOVER_MS - self.ramp_done[l]).max(0) * 1000;
+            let torque = i64::from(self.ramp_from[l]) * left / i64::from(HANDOVER_MS * 1000);
+            *wanted = smaller_of_same_sign(torque as i32, self.applied[l]);
+        }
+    }
+
+    /// The nearest torque within the limits, and whether one of them acted.
+    #[inline(always)]
+    fn envelope(&mut self, wanted: &[i32; N], torque: &mut [i32; N]) {
+        for l in 0..N {
+            let (limit, applied) = (self.limit[l], self.applied[l]);
+            let mut limited = 0;
+            let mut hold = |command: i32, low: i32, high: i32| {
+                let held = command.max(low).min(high);
+                limited |= held ^ command;
+                held
+            };
+            let command = hold(wanted[l], limit.wrapping_neg(), limit);
+            let window = self.anchor[l].wrapping_abs().wrapping_add(WINDOW_GROWTH);
+            let command = hold(command, window.wrapping_neg(), window);
+            // In the frame where the applied torque is positive.
+            let mirror = applied >> 31;
+            let turn = |torque: i32| (torque ^ mirror).wrapping_sub(mirror);
+            let (growth, fall, size) = (self.growth[l], self.fall[l], applied.wrapping_abs());
+            let turned = hold(turn(command), i32::MIN, size.wrapping_add(growth));
+            let low = if size > fall {
+                size.wrapping_sub(fall)
+            } else {
+                growth.wrapping_neg()
+            };
+            let command = turn(hold(turned, low, i32::MAX));
+            let bound = |toward: i32| {
+                let margin = toward.wrapping_add(OVERRIDE_FROM).min(0);
+                limit.wrapping_add(margin.wrapping_mul(OVERRIDE_SLOPE)).max(0)
+            };
+            let driver = self.driver[l];
+            let (low, high) = (bound(driver.wrapping_neg()).wrapping_neg(), bound(driver));
+            let held = command.max(low).min(high);
+            // A driver who overrides: the monitor has its own bound for that.
+            self.suspect[l] |= flag(held != command) & self.matters[l];
+            torque[l] = held;
+            self.limited[l] = limited;
+        }
+    }
+
+    /// The torque of this step as the actuator has it, N.m.
+    #[inline(always)]
+    pub(super) fn torque_nm(&self) -> [f64; N] {
+        let mut torque = [0.0; N];
+        for l in 0..N {
+            torque[l] = f64::from(self.applied[l]) * (1.0 / ONE);
+        }
+        torque
+    }
+
+    /// The driver's torque as the ECU has it, N.m.
+    #[inline(always)]
+    pub(super) fn driver_nm(&self) -> [f64; N] {
+        let mut torque = [0.0; N];
+        for l in 0..N {
+            torque[l] = f64::from(self.driver[l]) * (1.0 / ONE);
+        }
+        torque
+    }
+
+    /// Whether a limit held the torque of this step.
+    #[inline(always)]
+    pub(super) fn is_limited(&self, lane: usize) -> bool {
+        self.limited[lane] != 0
+    }
+
+    /// Whether what the ECU decides matters.
+    #[inline(always)]
+    pub(super) fn matters(&self) -> &[i32; N] {
+        &self.matters
+    }
+}
+
+/// Share of the torque at a speed, as the bus carries it.
+fn scheduled(p: &Params, speed_m_per_s: f64) -> i32 {
+    let middle = 60.0 / 3.6;
+    let speed = on_the_bus(bits(speed_m_per_s), 16);
+    let slower = speed < bits(middle);
+    let (per, least) = if slower {
+        (
+            (1.0 - p.low_speed_share) / (middle - 20.0 / 3.6),
+            p.low_speed_share,
+        )
+    } else {
+        (
+            (1.0 - p.high_speed_share) / (130.0 / 3.6 - middle),
+            p.high_speed_share,
+        )
+    };
+    let away = (speed - bits(middle)).abs();
+    let taken = (i64::from(bits(per)) * i64::from(away) + (1 << 23)) >> 24;
+    ((1_i64 << 24) - taken)
+        .clamp(i64::from(i32::MIN), i64::from(i32::MAX))
+        .max(i64::from(bits(least))) as i32
+}
+
+fn smaller_of_same_sign(a: i32, b: i32) -> i32 {
+    if (a > 0) != (b > 0) {
+        0
+    } else if a.abs() < b.abs() {
+        a
+    } else {
+        b
+    }
+}

@@ -1,0 +1,80 @@
+//! Which scenarios the lanes can drive.
+
+use std::fmt;
+
+use crate::models::disturbances::SensorErrors;
+use crate::models::tolerances::Car;
+use crate::scenario::{Condition, FailureKind, Scenario, Sensors};
+
+/// What keeps a run out of the lanes: the shipping ECU drives it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Reason {
+    /// A world that is not the paper's: wind, tyres, a real column, a road that is not level.
+    World,
+    /// Sensors with errors.
+    SensorErrors,
+    /// Exact sensors, past the bus.
+    ExactSensors,
+    /// The host asks for the probe.
+    Probe,
+    /// Slower than the controller guides.
+    TooSlow,
+    /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
+    EarlyFailure,
+    /// Longer than the lanes' clock counts.
+    TooLong,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::World => "a world that is not the paper's",
+            Self::SensorErrors => "sensors with errors",
+            Self::ExactSensors => "exact sensors, past the bus",
+            Self::Probe => "a probe",
+            Self::TooSlow => "slower than is guided",
+            Self::EarlyFailure => "a lane preview that fails within the first 2 s",
+            Self::TooLong => "longer than 2000 s",
+        })
+    }
+}
+
+/// From here on the ECU waits the same time for every sender of a lane preview.
+const SETTLED_S: f64 = 2.0;
+/// A count of speed on the bus, m/s.
+const SPEED_LSB_M_PER_S: f64 = 1.0 / 256.0;
+/// The lanes count microseconds in 31 bits.
+const LONGEST_S: f64 = 2000.0;
+
+/// Why the lanes cannot drive a scenario; `None` if they can.
+#[must_use]
+pub fn why_not(scenario: &Scenario) -> Option<Reason> {
+    let Car {
+        world, sensor_errors, ..
+    } = scenario.car();
+    let guided = scenario.condition() != Condition::Manual;
+    let params = scenario.controller_params();
+    let failure = scenario.failure();
+    let reasons = [
+        (!world.is_ideal() || !scenario.course().is_level(), Reason::World),
+        (sensor_errors != SensorErrors::default(), Reason::SensorErrors),
+        (
+            guided && scenario.sensors() == Sensors::Exact,
+            Reason::ExactSensors,
+        ),
+        (guided && scenario.guidance().probe, Reason::Probe),
+        (
+            guided && scenario.speed_m_per_s() < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
+            Reason::TooSlow,
+        ),
+        (
+            failure.kind == FailureKind::Input && failure.time_s < SETTLED_S,
+            Reason::EarlyFailure,
+        ),
+        (scenario.duration_s() > LONGEST_S, Reason::TooLong),
+    ];
+    reasons
+        .into_iter()
+        .find_map(|(holds, reason)| holds.then_some(reason))
+}

@@ -1,0 +1,314 @@
+//! The runs that are under way in the lanes, and their millisecond.
+
+use std::sync::Arc;
+
+use haptic_log::trace::{Sample, Trace};
+
+use super::ALIVE;
+use super::checks::Checks;
+use super::ecu::{Ecus, TIMEOUT_MS};
+use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, Worlds, YAW_RATE};
+use crate::guidance::NoGuidance;
+use crate::models::STEP_S;
+use crate::models::driver::Remnant;
+use crate::models::road::Centreline;
+use crate::models::sensors::camera_looks;
+use crate::preview::wrapped;
+use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
+use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Simulation, step_of};
+
+/// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
+/// then has the others' rhythm.
+const BLOCK: u32 = 50;
+/// Of a camera, in ms: its rhythm, and that of the frames.
+const CAMERA_MS: u32 = 25;
+const COLUMN_MS: u32 = 2;
+const VEHICLE_MS: u32 = 10;
+
+/// What a lane has of its run beside the arrays.
+struct Slot {
+    /// The scenario's number, while its run is under way or not yet handed on.
+    scenario: Option<usize>,
+    plan: Option<Plan>,
+    remnant: Option<Remnant>,
+    run: Run,
+    /// Whether the run came to its end without suspicion.
+    is_whole: bool,
+    /// The next step in which something is planned.
+    event: u32,
+    /// The step of the time-out behind a lane preview that fails.
+    timeout: u32,
+}
+
+pub(super) struct Lanes<const N: usize> {
+    worlds: Worlds<N>,
+    ecus: Ecus<N>,
+    checks: Checks<N>,
+    /// Number of the step in each run.
+    own: [i32; N],
+    /// All bits where there is a camera for the guidance.
+    looks: [u64; N],
+    /// Whether something is planned in some lane within this block.
+    has_events: bool,
+    roads: [Arc<Centreline>; N],
+    slots: [Slot; N],
+}
+
+impl<const N: usize> Lanes<N> {
+    pub(super) fn new(whole: usize, any: &Scenario) -> Self {
+        let road = any.course().centreline();
+        Self {
+            worlds: Worlds::new(whole),
+            ecus: Ecus::new(),
+            checks: Checks::new(),
+            own: [0; N],
+            looks: [0; N],
+            has_events: false,
+            roads: std::array::from_fn(|_| Arc::clone(&road)),
+            slots: std::array::from_fn(|_| Slot {
+                scenario: None,
+                plan: None,
+                remnant: None,
+                run: Run {
+                    trace: Trace {
+                        sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
+                        samples: Vec::new(),
+                    },
+                    ending: Ending::CourseEnd,
+                    steps: 0,
+                },
+                is_whole: false,
+                event: u32::MAX,
+                timeout: u32::MAX,
+            }),
+        }
+    }
+
+    pub(super) fn begin(&mut self, lane: usize, number: usize, scenario: &Scenario) {
+        let simulation = Simulation::with(scenario, NoGuidance);
+        self.worlds.begin(lane, &simulation);
+        self.ecus.begin(lane, scenario);
+        self.checks.begin(lane, scenario);
+        self.own[lane] = 0;
+        self.looks[lane] = if self.ecus.hears[lane] == 0 { 0 } else { ALIVE };
+        self.roads[lane] = Arc::clone(&simulation.road);
+        let failure = scenario.failure();
+        let slot = &mut self.slots[lane];
+        // Room for the whole run, and for no other: growing would copy it again and again.
+        slot.run.trace.samples.clear();
+        let samples = scenario.duration_s() * f64::from(SAMPLE_RATE_HZ);
+        slot.run.trace.samples.reserve(samples as usize + 2);
+        slot.scenario = Some(number);
+        slot.is_whole = false;
+        slot.timeout = u32::MAX;
+        if failure.kind == FailureKind::Input {
+            let last = (0..simulation.plan.failure_step)
+                .rev()
+                .find(|step| camera_looks(*step));
+            slot.timeout = last.map_or(0, |last| last + TIMEOUT_MS);
+        }
+        slot.remnant = (simulation.remnant.scale_nm != 0.0).then_some(simulation.remnant);
+        slot.plan = Some(simulation.plan);
+        self.happen(lane);
+    }
+
+    /// Lets happen what is planned for this step of a run, and finds when the next is.
+    #[cold]
+    #[inline(never)]
+    fn happen(&mut self, lane: usize) {
+        let step = self.own[lane] as u32;
+        let slot = &mut self.slots[lane];
+        let Some(plan) = &slot.plan else { return };
+        let faults = plan.faults(step);
+        let failed_at = faults.any().then_some(plan.failure_step);
+        self.worlds.set_transition(lane, plan.transition(step, failed_at));
+        if faults.torque_lost {
+            self.ecus.lose_torque(lane);
+        }
+        if faults.lane_lost {
+            self.ecus.hears[lane] = 0;
+        }
+        if step == slot.timeout {
+            self.ecus.hand_over(lane, step);
+        }
+        let noticed = plan.failure_step.saturating_add(step_of(FAILURE_REACTION_S));
+        let changed = plan.changed.as_ref().map_or(u32::MAX, |(at, _)| *at);
+        let events = [plan.failure_step, noticed, changed, slot.timeout];
+        let next = events.into_iter().filter(|event| *event > step).min();
+        slot.event = next.unwrap_or(u32::MAX);
+    }
+
+    /// Whether a lane has no run under way; one that has become suspect is given up.
+    pub(super) fn is_free(&mut self, lane: usize) -> bool {
+        if self.worlds.suspect[lane] != 0 || self.ecus.suspect[lane] != 0 {
+            self.worlds.alive[lane] = 0;
+        }
+        !self.is_under_way(lane)
+    }
+
+    pub(super) fn is_under_way(&self, lane: usize) -> bool {
+        self.worlds.alive[lane] == ALIVE
+    }
+
+    /// The number of a lane's run that has ended, and the run unless it is suspect.
+    pub(super) fn take(&mut self, lane: usize) -> Option<(usize, Option<&Run>)> {
+        let slot = &mut self.slots[lane];
+        let number = slot.scenario.take()?;
+        Some((number, slot.is_whole.then_some(&slot.run)))
+    }
+
+    /// Steps until everything periodic is where it was.
+    #[inline(always)]
+    pub(super) fn block(&mut self) {
+        self.has_events = (0..N).any(|lane| {
+            let left = self.slots[lane].event.wrapping_sub(self.own[lane] as u32);
+            self.worlds.alive[lane] == ALIVE && left < BLOCK
+        });
+        for phase in 0..BLOCK {
+            if self.has_events {
+                for lane in 0..N {
+                    if self.slots[lane].event == self.own[lane] as u32 && self.worlds.alive[lane] == ALIVE {
+                        self.happen(lane);
+                    }
+                }
+            }
+            if phase == 1 {
+                self.ecus.let_time_pass();
+                self.checks.let_time_pass();
+            }
+            self.step(phase);
+        }
+    }
+
+    /// One millisecond of every run.
+    #[inline(always)]
+    fn step(&mut self, phase: u32) {
+        if self.worlds.driver_looks(&self.roads) {
+            self.end_runs();
+        }
+        let is_sample = phase.is_multiple_of(STEPS_PER_SAMPLE);
+        let looks = camera_looks(phase);
+        if looks || is_sample {
+            let mut asked = self.worlds.alive;
+            if !is_sample {
+                for l in 0..N {
+                    asked[l] &= self.looks[l];
+                }
+            }
+            self.worlds.camera_looks(&self.roads, &asked);
+        }
+        self.draw_remnants();
+        let mut driver_nm = [0.0; N];
+        for l in 0..N {
+            driver_nm[l] = self.worlds.state[ARM][l] + self.worlds.remnant_nm[l];
+        }
+        self.hear(phase, looks, &driver_nm);
+        self.ecus.decide(&self.own, phase == 0, is_sample);
+        let torque_nm = self.ecus.torque_nm();
+        if is_sample {
+            self.worlds.locate(&self.roads);
+            self.record(&driver_nm, &torque_nm);
+        }
+        self.worlds.move_on(&torque_nm);
+        for own in &mut self.own {
+            *own = own.wrapping_add(1);
+        }
+    }
+
+    /// The frames of a step reach the ECUs.
+    #[inline(always)]
+    fn hear(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
+        let Self {
+            worlds, ecus, checks, ..
+        } = self;
+        let matters = *ecus.matters();
+        if phase.is_multiple_of(VEHICLE_MS) {
+            checks.vehicle(&worlds.state[YAW_RATE], &matters, &mut ecus.suspect);
+        }
+        if phase.is_multiple_of(COLUMN_MS) {
+            ecus.column(driver_nm);
+            let applied = ecus.torque_nm();
+            let driver = ecus.driver_nm();
+            checks.column(
+                &driver,
+                &applied,
+                &worlds.state[WHEEL],
+                &matters,
+                &mut ecus.suspect,
+            );
+        }
+        if looks {
+            let dt_ms = if phase % CAMERA_MS == 9 { 9 } else { 8 };
+            let camera = &worlds.camera;
+            let seen = ecus.picture(&camera.e_y, &camera.e_theta, dt_ms, &self.own);
+            let mut heard = matters;
+            for l in 0..N {
+                heard[l] &= ecus.hears[l];
+            }
+            let times = [dt_ms, phase % VEHICLE_MS];
+            let keeps = phase.is_multiple_of(CAMERA_MS);
+            checks.picture(&seen, times, &self.own, keeps, &heard, &mut ecus.suspect);
+        }
+    }
+
+    #[inline(always)]
+    fn draw_remnants(&mut self) {
+        for (lane, slot) in self.slots.iter_mut().enumerate() {
+            if let Some(remnant) = &mut slot.remnant {
+                // As a hand's torque of zero is added there.
+                self.worlds.remnant_nm[lane] = remnant.step() + 0.0;
+            }
+        }
+    }
+
+    /// Runs whose farthest point has come to the end of the course.
+    #[cold]
+    #[inline(never)]
+    fn end_runs(&mut self) {
+        for lane in 0..N {
+            if self.worlds.alive[lane] == ALIVE && self.worlds.is_at_its_end(lane) {
+                let slot = &mut self.slots[lane];
+                slot.is_whole = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) == 0;
+                slot.run.steps = self.own[lane] as u32;
+                self.worlds.alive[lane] = 0;
+            }
+        }
+    }
+
+    /// A sample of each run.
+    #[inline(always)]
+    fn record(&mut self, driver_nm: &[f64; N], torque_nm: &[f64; N]) {
+        let chi = self.worlds.direction_rad();
+        let Worlds {
+            state,
+            body,
+            driver,
+            camera,
+            alive,
+            ..
+        } = &self.worlds;
+        for (l, slot) in self.slots.iter_mut().enumerate() {
+            if alive[l] != ALIVE {
+                continue;
+            }
+            slot.run.trace.samples.push(Sample {
+                time_s: f64::from(self.own[l]) * STEP_S,
+                s_m: body.s()[l],
+                lateral_error_m: body.offset[l],
+                heading_error_rad: wrapped(chi[l] - body.found_heading[l]),
+                curvature_1pm: body.found_curvature[l],
+                e_y_m: driver.e_y[l],
+                e_theta_rad: driver.e_theta[l],
+                guidance_e_y_m: camera.e_y[l],
+                guidance_e_theta_rad: camera.e_theta[l],
+                wheel_angle_rad: state[WHEEL][l],
+                wheel_rate_rad_per_s: state[WHEEL_RATE][l],
+                yaw_rate_rad_per_s: state[YAW_RATE][l],
+                sideslip_rad: state[BETA][l],
+                driver_torque_nm: driver_nm[l],
+                guidance_torque_nm: torque_nm[l],
+                guidance_limited: self.ecus.is_limited(l),
+            });
+        }
+    }
+}

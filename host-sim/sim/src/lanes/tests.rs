@@ -1,0 +1,144 @@
+//! Lanes against runs one by one: the shipping ECU is the oracle.
+
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+use super::*;
+use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::road::Course;
+use crate::scenario::{Condition, DriverChange, Failure, FailureKind, Sensors};
+use crate::simulation::simulate;
+use haptic_log::trace::Sample;
+
+/// Every field of every sample, signs of zeros included.
+fn bits(run: &Run) -> Vec<u64> {
+    let fields =
+        |sample: &Sample| haptic_log::trace::CHANNELS.map(|channel| (channel.value)(sample).to_bits());
+    run.trace.samples.iter().flat_map(fields).collect()
+}
+
+/// Drives scenarios in lanes and one by one; returns how many were suspect.
+fn compare(scenarios: &[Scenario], width: Width) -> usize {
+    let (mut suspects, mut seen) = (0, vec![0; scenarios.len()]);
+    drive(scenarios, width, |number, run| {
+        seen[number] += 1;
+        let Some(run) = run else {
+            suspects += 1;
+            return;
+        };
+        let alone = simulate(&scenarios[number]);
+        assert_eq!((run.steps, run.ending), (alone.steps, alone.ending), "{number}");
+        let pairs = run.trace.samples.iter().zip(&alone.trace.samples);
+        for (mine, shipping) in pairs {
+            assert_eq!(mine, shipping, "{}", scenarios[number].to_toml());
+        }
+        assert_eq!(bits(run), bits(&alone), "{}", scenarios[number].to_toml());
+    });
+    assert!(seen.iter().all(|times| *times == 1), "{seen:?}");
+    suspects
+}
+
+fn short_course() -> Course {
+    let text = "[[segment]]\nlength = 120\n[[segment]]\nlength = 60\ncurvature_start = 0\ncurvature_end = 0.004\n\
+        [[segment]]\nlength = 150\ncurvature = 0.004\n[[segment]]\nlength = 60\ncurvature_start = 0.004\n\
+        curvature_end = -0.003\n[[segment]]\nlength = 200\ncurvature = -0.003\n[[segment]]\nlength = 150";
+    Course::from_toml("short.toml", text).unwrap()
+}
+
+/// Random scenarios over all that lanes drive.
+fn random(count: usize, seed: u64) -> Vec<Scenario> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let course = short_course();
+    let mut scenarios = Vec::new();
+    while scenarios.len() < count {
+        let mut between = |from: f64, to: f64| from + (to - from) * random.random::<f64>();
+        let driver = DriverParameters {
+            a_1: between(0.05, 0.3),
+            a_2: between(0.0, 0.06),
+            a_3: between(2.0, 4.0),
+            t_p: between(0.001, 0.3),
+            t_n: between(0.2, 0.5),
+            t_f: between(0.8, 1.2),
+            remnant_sd_nm: (between(-0.1, 0.2)).max(0.0),
+            ..DriverParameters::default()
+        };
+        let kind = [FailureKind::None, FailureKind::Torque, FailureKind::Input][between(0.0, 3.0) as usize];
+        let time_s = between(2.0, 20.0);
+        let change = DriverChange {
+            time_s: between(0.0, 15.0),
+            k_d: between(1.0, 4.0),
+            k_hg: between(0.0, 1.0),
+        };
+        let manual = between(0.0, 1.0) < 0.1;
+        let mut builder = Scenario::builder()
+            .course(course.clone())
+            .speed_kmh(between(30.0, 110.0))
+            .driver(driver)
+            .seed(between(0.0, 1e9) as u64);
+        builder = if manual {
+            builder.condition(Condition::Manual)
+        } else {
+            let failure = Failure { kind, time_s };
+            builder
+                .gains(ArmGains {
+                    k_d: between(1.0, 5.0),
+                    k_hg: between(0.0, 1.5),
+                })
+                .failure(failure)
+        };
+        if between(0.0, 1.0) < 0.3 {
+            builder = builder.driver_change(Some(change));
+        }
+        if let Ok(scenario) = builder.build() {
+            scenarios.push(scenario);
+        }
+    }
+    scenarios
+}
+
+#[test]
+fn the_papers_drives_are_the_same_in_lanes() {
+    let mut scenarios = Vec::new();
+    for condition in [Condition::Manual, Condition::High, Condition::Mid, Condition::Low] {
+        scenarios.push(Scenario::builder().condition(condition).build().unwrap());
+    }
+    for kind in [FailureKind::Torque, FailureKind::Input] {
+        for condition in [Condition::High, Condition::Low] {
+            let failure = Failure { kind, time_s: 70.0 };
+            let builder = Scenario::builder().condition(condition).failure(failure);
+            scenarios.push(builder.build().unwrap());
+        }
+    }
+    let driver = DriverParameters {
+        remnant_sd_nm: 0.1,
+        ..DriverParameters::default()
+    };
+    scenarios.push(Scenario::builder().driver(driver).build().unwrap());
+    assert_eq!(
+        compare(&scenarios, Width::Widest),
+        0,
+        "the paper's drives are nominal"
+    );
+}
+
+#[test]
+fn random_drives_are_the_same_in_lanes_and_few_are_suspect() {
+    let suspects = compare(&random(80, 1), Width::Widest);
+    assert!(suspects < 30, "{suspects} of 80");
+}
+
+#[test]
+fn every_width_gives_the_same() {
+    let scenarios = random(16, 2);
+    for width in [Width::Widest, Width::Avx2, Width::Portable] {
+        compare(&scenarios, width);
+    }
+}
+
+#[test]
+fn what_lanes_cannot_drive_is_named_and_handed_back() {
+    let exact = Scenario::builder().sensors(Sensors::Exact).build().unwrap();
+    assert_eq!(why_not(&exact), Some(Reason::ExactSensors));
+    assert_eq!(why_not(&Scenario::default()), None);
+    assert_eq!(compare(&[exact], Width::Widest), 1);
+}

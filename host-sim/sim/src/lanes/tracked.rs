@@ -1,0 +1,233 @@
+//! Points of several runs on their roads: [`Centreline::project`] for one point of each run at once, to the same bits.
+//!
+//! Every run keeps a copy of the cell that its point is in, so that the search reads from its own place and not from
+//! all over a table. A search that does not end soon, or that leaves the road, is given up: its run is suspect.
+
+use std::sync::Arc;
+
+use super::ALIVE;
+use crate::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Tracker};
+
+/// Steps of a search, of which one or two are the rule.
+const MOST_STEPS: usize = 4;
+
+/// One point of each run.
+#[repr(C, align(64))]
+pub(super) struct Tracked<const N: usize> {
+    s: [f64; N],
+    advance: [f64; N],
+    /// Ends of the cell.
+    low: [f64; N],
+    high: [f64; N],
+    middle: [f64; N],
+    x: [f64; N],
+    y: [f64; N],
+    tangent_x: [f64; N],
+    tangent_y: [f64; N],
+    heading: [f64; N],
+    curvature: [f64; N],
+    slope: [f64; N],
+    square_over_6: [f64; N],
+    cube: [f64; N],
+    /// Largest arc length that a search may end at.
+    end: [f64; N],
+    /// What was found, as a [`crate::models::road::Projection`] has it.
+    pub(super) offset: [f64; N],
+    pub(super) found_heading: [f64; N],
+    pub(super) found_curvature: [f64; N],
+    cell: [usize; N],
+    /// The most bent of the cells that the points are in.
+    shape: u8,
+}
+
+const STRAIGHT: u8 = 0;
+const ARC: u8 = 1;
+const CLOTHOID: u8 = 2;
+
+impl<const N: usize> Tracked<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            s: [0.0; N],
+            advance: [0.0; N],
+            low: [0.0; N],
+            high: [0.0; N],
+            middle: [0.0; N],
+            x: [0.0; N],
+            y: [0.0; N],
+            tangent_x: [0.0; N],
+            tangent_y: [0.0; N],
+            heading: [0.0; N],
+            curvature: [0.0; N],
+            slope: [0.0; N],
+            square_over_6: [0.0; N],
+            cube: [0.0; N],
+            end: [0.0; N],
+            offset: [0.0; N],
+            found_heading: [0.0; N],
+            found_curvature: [0.0; N],
+            cell: [0; N],
+            shape: STRAIGHT,
+        }
+    }
+
+    /// Arc lengths found.
+    #[inline(always)]
+    pub(super) fn s(&self) -> &[f64; N] {
+        &self.s
+    }
+
+    /// A new run begins in a lane.
+    pub(super) fn begin(&mut self, lane: usize, road: &Centreline, tracker: &Tracker) {
+        (self.s[lane], self.advance[lane]) = (tracker.s_m, tracker.advance_m);
+        self.end[lane] = road.length_m() + OVERRUN_M;
+        self.enter(lane, road, tracker.cell);
+    }
+
+    fn enter(&mut self, lane: usize, road: &Centreline, index: usize) {
+        let cell = &road.cells()[index];
+        self.cell[lane] = index;
+        self.low[lane] = cell.s_m - cell.half_m;
+        self.high[lane] = cell.s_m + cell.half_m;
+        self.middle[lane] = cell.s_m;
+        (self.x[lane], self.y[lane]) = (cell.x_m, cell.y_m);
+        [self.tangent_x[lane], self.tangent_y[lane]] = cell.tangent;
+        self.heading[lane] = cell.heading_rad;
+        // A negative zero becomes a positive one, as the straight's own formula has it.
+        self.curvature[lane] = cell.curvature_1pm + 0.0;
+        self.slope[lane] = cell.curvature_slope_1pm2 + 0.0;
+        [self.square_over_6[lane], self.cube[lane]] = cell.curvature_powers;
+        self.shape = if self.slope.iter().any(|slope| *slope != 0.0) {
+            CLOTHOID
+        } else if self.curvature.iter().any(|curvature| *curvature != 0.0) {
+            ARC
+        } else {
+            STRAIGHT
+        };
+    }
+
+    /// Walks to the cells that the searches are in now.
+    #[cold]
+    #[inline(never)]
+    fn walk(&mut self, roads: &[Arc<Centreline>; N], at: &[f64; N], open: &[u64; N]) {
+        for lane in 0..N {
+            if open[lane] != ALIVE {
+                continue;
+            }
+            let cells = roads[lane].cells();
+            let mut index = self.cell[lane];
+            while at[lane] > cells[index].s_m + cells[index].half_m && index + 1 < cells.len() {
+                index += 1;
+            }
+            while at[lane] < cells[index].s_m - cells[index].half_m && index > 0 {
+                index -= 1;
+            }
+            if index != self.cell[lane] {
+                self.enter(lane, &roads[lane], index);
+            }
+        }
+    }
+
+    /// Projects a point of each run that is asked for; returns which of them found no foot.
+    #[inline(always)]
+    pub(super) fn project(
+        &mut self,
+        roads: &[Arc<Centreline>; N],
+        px: &[f64; N],
+        py: &[f64; N],
+        asked: &[u64; N],
+    ) -> [u64; N] {
+        let mut at = [0.0; N];
+        let mut open = *asked;
+        for l in 0..N {
+            at[l] = self.s[l] + self.advance[l];
+        }
+        for _ in 0..MOST_STEPS {
+            let mut outside = 0;
+            for l in 0..N {
+                let is_outside = (at[l] > self.high[l]) | (at[l] < self.low[l]);
+                outside |= if is_outside { open[l] } else { 0 };
+            }
+            if outside != 0 {
+                self.walk(roads, &at, &open);
+            }
+            let left = match self.shape {
+                STRAIGHT => self.search::<STRAIGHT>(px, py, &mut at, &mut open),
+                ARC => self.search::<ARC>(px, py, &mut at, &mut open),
+                _ => self.search::<CLOTHOID>(px, py, &mut at, &mut open),
+            };
+            if left == 0 {
+                break;
+            }
+        }
+        open
+    }
+
+    /// One step of every search that is open; returns whether any still is. A shape's formula is that of the next one
+    /// without the terms that vanish, to the same bits.
+    #[inline(always)]
+    fn search<const SHAPE: u8>(
+        &mut self,
+        px: &[f64; N],
+        py: &[f64; N],
+        at: &mut [f64; N],
+        open: &mut [u64; N],
+    ) -> u64 {
+        let mut left = 0;
+        for l in 0..N {
+            let sigma = at[l] - self.middle[l];
+            let (k0, k1) = (self.curvature[l], self.slope[l]);
+            let (tx, ty) = (self.tangent_x[l], self.tangent_y[l]);
+            let (dx, dy) = (px[l] - self.x[l], py[l] - self.y[l]);
+            let sigma2 = sigma * sigma;
+            let (theta, along, across, curvature) = match SHAPE {
+                STRAIGHT => (sigma * 0.0, sigma, 0.0, 0.0),
+                ARC => (
+                    sigma * k0,
+                    sigma - sigma2 * sigma * self.square_over_6[l],
+                    sigma2 * (0.5 * k0 - self.cube[l] * sigma2 / 24.0),
+                    k0,
+                ),
+                _ => (
+                    sigma * (k0 + 0.5 * k1 * sigma),
+                    sigma
+                        - sigma2
+                            * sigma
+                            * (self.square_over_6[l] + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0)),
+                    sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - self.cube[l] * sigma2 / 24.0),
+                    k0 + k1 * sigma,
+                ),
+            };
+            let (cos, sin) = match SHAPE {
+                STRAIGHT => (1.0, 0.0),
+                _ => (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0),
+            };
+            let (ahead, left_of) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
+            let distance = ahead * cos + left_of * sin;
+            let offset = left_of * cos - ahead * sin;
+            let determinant = 1.0 - curvature * offset;
+            let step = distance / determinant;
+            let s = at[l] + step;
+            let is_sound = (determinant >= MIN_DETERMINANT) & (s >= -OVERRUN_M) & (s <= self.end[l]);
+            let is_found = is_sound & (step.abs() < CONVERGED_M);
+            let take = if is_found { open[l] } else { 0 };
+            let heading = self.heading[l] + theta + curvature * step;
+            self.advance[l] = either(take, s - self.s[l], self.advance[l]);
+            self.s[l] = either(take, s, self.s[l]);
+            self.offset[l] = either(take, offset, self.offset[l]);
+            self.found_heading[l] = either(take, heading, self.found_heading[l]);
+            self.found_curvature[l] = either(take, curvature, self.found_curvature[l]);
+            // What is not sound stays open for ever.
+            at[l] = if is_sound { s } else { f64::NAN };
+            open[l] &= !take;
+            left |= open[l];
+        }
+        left
+    }
+}
+
+/// The first where all bits of the mask are set, the second where none is: as a choice the compiler makes a masked store
+/// of it, which some processors take long for.
+#[inline(always)]
+fn either(mask: u64, a: f64, b: f64) -> f64 {
+    f64::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
+}

@@ -1,0 +1,322 @@
+//! The world of several runs: plant, driver and the points that they look at, to the same bits as
+//! [`crate::simulation::Simulation`] has them one by one.
+
+use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+use super::ALIVE;
+use super::tracked::Tracked;
+use crate::guidance::NoGuidance;
+use crate::models::STEP_S;
+use crate::models::plant::{COLUMNS, STATES, Transition};
+use crate::models::road::Centreline;
+use crate::simulation::Simulation;
+
+/// Places of the states, as the plant has them.
+pub(super) const BETA: usize = 0;
+pub(super) const YAW_RATE: usize = 1;
+pub(super) const WHEEL: usize = 2;
+pub(super) const WHEEL_RATE: usize = 3;
+pub(super) const ARM: usize = 4;
+const YAW: usize = 5;
+
+/// A near and a far point of each run.
+#[repr(C, align(64))]
+pub(super) struct Points<const N: usize> {
+    near_m: [f64; N],
+    far_m: [f64; N],
+    near: Tracked<N>,
+    pub(super) far: Tracked<N>,
+    /// The errors found.
+    pub(super) e_y: [f64; N],
+    pub(super) e_theta: [f64; N],
+}
+
+/// The worlds.
+#[repr(C, align(64))]
+pub(super) struct Worlds<const N: usize> {
+    pub(super) state: [[f64; N]; STATES],
+    x: [f64; N],
+    y: [f64; N],
+    direction: [[f64; N]; 2],
+    distance: [f64; N],
+    columns: [[[f64; N]; STATES]; COLUMNS],
+    a: [[f64; N]; 3],
+    integral: [f64; N],
+    last_e_y: [f64; N],
+    fraction: [f64; N],
+    older: [f64; N],
+    target: [f64; N],
+    end: [f64; N],
+    pub(super) driver: Points<N>,
+    pub(super) camera: Points<N>,
+    pub(super) body: Tracked<N>,
+    pub(super) remnant_nm: [f64; N],
+    /// [`ALIVE`] where a run is under way.
+    pub(super) alive: [u64; N],
+    /// Not 0 where something happened that is not modelled here.
+    pub(super) suspect: [u64; N],
+    /// Inputs of the delays, one row a step.
+    delayed: Vec<[f64; N]>,
+    next: usize,
+    whole: [usize; N],
+}
+
+impl<const N: usize> Points<N> {
+    fn new() -> Self {
+        Self {
+            near_m: [0.0; N],
+            far_m: [0.0; N],
+            near: Tracked::new(),
+            far: Tracked::new(),
+            e_y: [0.0; N],
+            e_theta: [0.0; N],
+        }
+    }
+
+    fn begin(&mut self, lane: usize, road: &Centreline, points: &crate::preview::PreviewPoints) {
+        (self.near_m[lane], self.far_m[lane]) = (points.near_m, points.far_m);
+        self.near.begin(lane, road, &points.near);
+        self.far.begin(lane, road, &points.far);
+        (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
+    }
+}
+
+impl<const N: usize> Worlds<N> {
+    /// `whole` is the longest delay, in steps.
+    pub(super) fn new(whole: usize) -> Self {
+        Self {
+            state: [[0.0; N]; STATES],
+            x: [0.0; N],
+            y: [0.0; N],
+            direction: [[1.0; N], [0.0; N]],
+            distance: [0.0; N],
+            columns: [[[0.0; N]; STATES]; COLUMNS],
+            a: [[0.0; N]; 3],
+            integral: [0.0; N],
+            last_e_y: [0.0; N],
+            fraction: [0.0; N],
+            older: [0.0; N],
+            target: [0.0; N],
+            end: [0.0; N],
+            driver: Points::new(),
+            camera: Points::new(),
+            body: Tracked::new(),
+            remnant_nm: [0.0; N],
+            alive: [0; N],
+            suspect: [0; N],
+            delayed: vec![[0.0; N]; (whole + 1).next_power_of_two()],
+            next: 0,
+            whole: [1; N],
+        }
+    }
+
+    /// A new run begins in a lane, as a simulation of it begins.
+    pub(super) fn begin(&mut self, lane: usize, simulation: &Simulation<NoGuidance>) {
+        let road = &simulation.road;
+        for state in &mut self.state {
+            state[lane] = 0.0;
+        }
+        for state in [
+            &mut self.x,
+            &mut self.y,
+            &mut self.integral,
+            &mut self.last_e_y,
+            &mut self.older,
+            &mut self.target,
+            &mut self.remnant_nm,
+        ] {
+            state[lane] = 0.0;
+        }
+        (self.direction[0][lane], self.direction[1][lane]) = (1.0, 0.0);
+        let vision = &simulation.vision;
+        [self.a[0][lane], self.a[1][lane], self.a[2][lane]] = [vision.a_1, vision.a_2, vision.a_3];
+        (self.whole[lane], self.fraction[lane]) = (vision.delay.whole, vision.delay.fraction);
+        for row in &mut self.delayed {
+            row[lane] = 0.0;
+        }
+        self.driver.begin(lane, road, &simulation.driver_points);
+        self.camera.begin(lane, road, &simulation.camera);
+        self.body.begin(lane, road, &simulation.body);
+        self.end[lane] = simulation.plan.end_m;
+        (self.alive[lane], self.suspect[lane]) = (ALIVE, 0);
+    }
+
+    /// How the arm of a run moves from now on.
+    pub(super) fn set_transition(&mut self, lane: usize, transition: &Transition) {
+        for (all, column) in self.columns.iter_mut().zip(&transition.columns) {
+            for (row, entry) in all.iter_mut().zip(column) {
+                row[lane] = *entry;
+            }
+        }
+        self.distance[lane] = transition.distance_m;
+    }
+
+    /// chi of each run, rad.
+    #[inline(always)]
+    pub(super) fn direction_rad(&self) -> [f64; N] {
+        let mut chi = [0.0; N];
+        for l in 0..N {
+            chi[l] = self.state[YAW][l] + self.state[BETA][l];
+        }
+        chi
+    }
+
+    /// The driver looks at the road; returns whether a run that is alive has come to its end.
+    #[inline(always)]
+    pub(super) fn driver_looks(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
+        let asked = self.alive;
+        let chi = self.direction_rad();
+        let place = (&self.x, &self.y, &self.direction);
+        self.driver.look(roads, place, &chi, &asked, &mut self.suspect);
+        let mut ended = 0;
+        for l in 0..N {
+            ended |= if self.driver.far.s()[l] >= self.end[l] {
+                asked[l]
+            } else {
+                0
+            };
+        }
+        ended != 0
+    }
+
+    /// Whether the run of a lane has come to its end.
+    pub(super) fn is_at_its_end(&self, lane: usize) -> bool {
+        self.driver.far.s()[lane] >= self.end[lane]
+    }
+
+    /// The camera looks at the road in the runs that are asked for.
+    #[inline(always)]
+    pub(super) fn camera_looks(&mut self, roads: &[Arc<Centreline>; N], asked: &[u64; N]) {
+        let chi = self.direction_rad();
+        let place = (&self.x, &self.y, &self.direction);
+        self.camera.look(roads, place, &chi, asked, &mut self.suspect);
+    }
+
+    /// Where the centres of gravity are on their roads.
+    #[inline(always)]
+    pub(super) fn locate(&mut self, roads: &[Arc<Centreline>; N]) {
+        let lost = self.body.project(roads, &self.x, &self.y, &self.alive);
+        for l in 0..N {
+            let is_off = self.body.offset[l].abs() > crate::simulation::DIVERGED_M;
+            self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
+        }
+    }
+
+    /// The drivers' eyes and arms, columns and vehicles move for a millisecond under these torques.
+    #[inline(always)]
+    pub(super) fn move_on(&mut self, torque_nm: &[f64; N]) {
+        let mut next_target = [0.0; N];
+        self.vision(&mut next_target);
+        let before = self.direction_rad();
+        let mut next = [[0.0; N]; STATES];
+        self.linear(&next_target, torque_nm, &mut next);
+        (self.state, self.target) = (next, next_target);
+        for l in 0..N {
+            let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);
+            let square = half_turn * half_turn;
+            self.suspect[l] |= if square < 1e-6 { 0 } else { ALIVE };
+            let (sin, cos) = (
+                half_turn * (1.0 - square / 6.0),
+                1.0 - square * (0.5 - square / 24.0),
+            );
+            let [x, y] = rotated([self.direction[0][l], self.direction[1][l]], sin, cos);
+            self.x[l] += self.distance[l] * x;
+            self.y[l] += self.distance[l] * y;
+            [self.direction[0][l], self.direction[1][l]] = rotated([x, y], sin, cos);
+        }
+    }
+
+    /// Equation (7) with its delay.
+    #[inline(always)]
+    fn vision(&mut self, target: &mut [f64; N]) {
+        let mask = self.delayed.len() - 1;
+        let mut row = [0.0; N];
+        for l in 0..N {
+            let (e_y, e_theta) = (self.driver.e_y[l], self.driver.e_theta[l]);
+            self.integral[l] += 0.5 * STEP_S * (e_y + self.last_e_y[l]);
+            self.last_e_y[l] = e_y;
+            row[l] = self.a[0][l] * e_y + self.a[1][l] * self.integral[l] + self.a[2][l] * e_theta;
+        }
+        self.delayed[self.next & mask] = row;
+        self.next = self.next.wrapping_add(1);
+        let mut newer = [0.0; N];
+        for l in 0..N {
+            newer[l] = self.delayed[self.next.wrapping_sub(self.whole[l]) & mask][l];
+        }
+        for l in 0..N {
+            target[l] = newer[l] + self.fraction[l] * (self.older[l] - newer[l]);
+        }
+        self.older = newer;
+    }
+
+    /// Equations (1) to (6) and (8), in the plant's order of sums.
+    #[inline(always)]
+    fn linear(&self, next_target: &[f64; N], torque_nm: &[f64; N], next: &mut [[f64; N]; STATES]) {
+        let [beta, yaw_rate, wheel, wheel_rate, arm, yaw] = &self.state;
+        let [c0, c1, c2, c3, c4, c5, c6, c7, c8] = &self.columns;
+        let (target, remnant) = (&self.target, &self.remnant_nm);
+        // All rows in one loop over the lanes: the compiler then takes as many lanes at once as there are.
+        for l in 0..N {
+            let row = |row: usize, start: f64| {
+                start
+                    + c0[row][l] * beta[l]
+                    + c1[row][l] * yaw_rate[l]
+                    + c2[row][l] * wheel[l]
+                    + c3[row][l] * wheel_rate[l]
+                    + c4[row][l] * arm[l]
+                    + c5[row][l] * target[l]
+                    + c6[row][l] * next_target[l]
+                    + c7[row][l] * torque_nm[l]
+                    + c8[row][l] * remnant[l]
+            };
+            // Every sum begins with a zero, which keeps the signs of zeros.
+            next[BETA][l] = row(BETA, 0.0);
+            next[YAW_RATE][l] = row(YAW_RATE, 0.0);
+            next[WHEEL][l] = row(WHEEL, 0.0);
+            next[WHEEL_RATE][l] = row(WHEEL_RATE, 0.0);
+            next[ARM][l] = row(ARM, 0.0);
+            next[YAW][l] = row(YAW, yaw[l]);
+        }
+    }
+}
+
+impl<const N: usize> Points<N> {
+    #[inline(always)]
+    fn look(
+        &mut self,
+        roads: &[Arc<Centreline>; N],
+        (x, y, direction): (&[f64; N], &[f64; N], &[[f64; N]; 2]),
+        chi: &[f64; N],
+        asked: &[u64; N],
+        suspect: &mut [u64; N],
+    ) {
+        let (mut px, mut py) = ([0.0; N], [0.0; N]);
+        for l in 0..N {
+            px[l] = x[l] + self.near_m[l] * direction[0][l];
+            py[l] = y[l] + self.near_m[l] * direction[1][l];
+        }
+        let lost_near = self.near.project(roads, &px, &py, asked);
+        for l in 0..N {
+            px[l] = x[l] + self.far_m[l] * direction[0][l];
+            py[l] = y[l] + self.far_m[l] * direction[1][l];
+        }
+        let lost_far = self.far.project(roads, &px, &py, asked);
+        for l in 0..N {
+            // An angle that would have to be wrapped is that of a run that turns.
+            let e_theta = self.far.found_heading[l] - chi[l];
+            let is_sound = e_theta.abs() < FRAC_PI_2;
+            suspect[l] |= lost_near[l] | lost_far[l] | if is_sound { 0 } else { asked[l] };
+            self.e_y[l] = -self.near.offset[l];
+            self.e_theta[l] = e_theta;
+        }
+    }
+}
+
+/// A unit vector turned, kept at unit length.
+#[inline(always)]
+fn rotated([x, y]: [f64; 2], sin: f64, cos: f64) -> [f64; 2] {
+    let (x, y) = (x * cos - y * sin, x * sin + y * cos);
+    let scale = 1.5 - 0.5 * (x * x + y * y);
+    [x * scale, y * scale]
+}
