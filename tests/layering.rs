@@ -318,6 +318,7 @@ const LONGER: &[(&str, &str)] = &[
     ("core/src/controller/step.rs", "one step of the controller, read from top to bottom"),
     ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
     ("core/src/plausibility.rs", "the checks, with the sums that they keep"),
+    ("core/src/monitor.rs", "the second computation, which stands by itself"),
     ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),
     ("firmware/src/boards/sam_e54_xpro.rs", "one file for each board"),

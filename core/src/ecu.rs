@@ -13,7 +13,7 @@ use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use crate::bus::{Frame, Reject};
 use crate::config::{Config, Setup};
-use crate::controller::{Command, Controller, ControllerState, Input, Inputs};
+use crate::controller::{Column, Command, Controller, ControllerState, Input, Inputs};
 use crate::envelope::LimitReason;
 use crate::estimator::Sample;
 use crate::faults::{Fault, FaultSet, History};
@@ -203,15 +203,9 @@ impl Ecu {
         let motor = self.receivers.actuator.judge(applied);
         faults.insert_if(motor == Motor::Astray, Fault::Actuator);
         faults.set(motor == Motor::Weak, Fault::MotorWeak);
-        let place = steps % SELF_TEST;
-        self.is_test_due |= place == 1;
-        if self.is_test_due {
-            let is_busy = matches!(inputs.column, Input::New(_)) || steps % TURN == TURN / 2;
-            self.is_test_due = is_busy && place <= PATIENCE;
-            faults.insert_if(
-                !self.is_test_due && !passes_self_test(monitor, steps / SELF_TEST, injection),
-                Fault::SelfTest,
-            );
+        if has_test_come(&mut self.is_test_due, steps, &inputs) {
+            let passes = passes_self_test(monitor, steps / SELF_TEST, injection);
+            faults.insert_if(!passes, Fault::SelfTest);
         }
         faults.insert_if(monitor.is_none(), Fault::Memory);
         inputs.faults = inputs.faults.union(faults);
@@ -256,15 +250,7 @@ impl Ecu {
             };
             guidance = self.guidance(&command, steps);
         }
-        let sample = match inputs.column {
-            Input::New(column) => Some(Sample {
-                at: now,
-                applied,
-                driver_torque: column.driver_torque,
-                wheel_angle: column.wheel_angle,
-            }),
-            _ => None,
-        };
+        let sample = sample(&inputs.column, now, applied);
         self.background.take(sample, command.probe);
         self.history.step(now, command.faults);
         let others = self.others(&command, steps);
@@ -355,6 +341,33 @@ impl Ecu {
     #[must_use]
     pub fn config(&self) -> Option<Config> {
         self.controller.config()
+    }
+}
+
+/// Whether the monitor is tested in this step.
+#[inline(always)]
+fn has_test_come(is_due: &mut bool, steps: u32, inputs: &Inputs) -> bool {
+    let place = steps % SELF_TEST;
+    *is_due |= place == 1;
+    if !*is_due {
+        return false;
+    }
+    let is_busy = matches!(inputs.column, Input::New(_)) || steps % TURN == TURN / 2;
+    *is_due = is_busy && place <= PATIENCE;
+    !*is_due
+}
+
+/// A new sample of the column, for the estimator.
+#[inline(always)]
+fn sample(column: &Input<Column>, now: Instant, applied: Torque) -> Option<Sample> {
+    match column {
+        Input::New(column) => Some(Sample {
+            at: now,
+            applied,
+            driver_torque: column.driver_torque,
+            wheel_angle: column.wheel_angle,
+        }),
+        _ => None,
     }
 }
 

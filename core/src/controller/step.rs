@@ -107,7 +107,6 @@ impl<I: Injection> Step<'_, I> {
             ..
         } = self.inputs;
         let checks = &self.config.plausibility;
-        let mut lost = FaultSet::NONE;
         let mut implausible = FaultSet::from_bits(v.hot.implausible);
 
         if let Input::New(motion) = motion {
@@ -164,7 +163,29 @@ impl<I: Injection> Step<'_, I> {
                 implausible.set(false, Fault::LaneImplausible);
             }
         }
-        if let Some(c) = to_check(column, &mut due.column) {
+        self.check(v, changed, past, due, &mut implausible);
+        self.make_up_for_age(v, past);
+        if let Input::New(_) = request {
+            v.heard.request = self.now;
+            changed.add(Changed::HEARD);
+        }
+
+        v.hot.implausible = implausible.bits();
+        self.lost()
+    }
+
+    /// The checks whose time has come.
+    #[inline(always)]
+    fn check(
+        &self,
+        v: &mut Memory,
+        changed: &mut Changed,
+        past: &mut Past,
+        due: &mut Due,
+        implausible: &mut FaultSet,
+    ) {
+        let checks = &self.config.plausibility;
+        if let Some(c) = to_check(&self.inputs.column, &mut due.column) {
             changed.add(Changed::COLUMN);
             let plausible = checks.column(
                 &mut v.plausibility,
@@ -175,17 +196,24 @@ impl<I: Injection> Step<'_, I> {
             );
             implausible.set(!plausible, Fault::ColumnImplausible);
         }
-        if let Some(sample) = to_check(lane, &mut due.lane) {
+        if let Some(sample) = to_check(&self.inputs.lane, &mut due.lane) {
             changed.add(Changed::LANE);
             let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
             implausible.set(!plausible, Fault::LaneImplausible);
         }
-        self.make_up_for_age(v, past);
-        if let Input::New(_) = request {
-            v.heard.request = self.now;
-            changed.add(Changed::HEARD);
-        }
+    }
 
+    /// The inputs that are lost.
+    #[inline(always)]
+    fn lost(&self) -> FaultSet {
+        let Inputs {
+            lane,
+            column,
+            motion,
+            request,
+            ..
+        } = self.inputs;
+        let mut lost = FaultSet::NONE;
         // A frame that arrives and is refused is no time-out: the fault that says so came with the inputs.
         let refused = |fault| self.inputs.faults.contains(fault);
         lost.insert_if(
@@ -198,7 +226,6 @@ impl<I: Injection> Step<'_, I> {
             Fault::SpeedTimeout,
         );
         lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
-        v.hot.implausible = implausible.bits();
         lost
     }
 
