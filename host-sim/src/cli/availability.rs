@@ -96,7 +96,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         results
             .cells
             .iter()
-            .any(|cell| cell.judged && !(cell.declarations.upper_95 <= most))
+            .map(|cell| (cell.judged, cell.declarations.upper_95))
+            .any(|(judged, upper)| judged && (upper > most || upper.is_nan()))
     };
     Ok(if arguments.most_per_hour.is_some_and(too_many) {
         Outcome::Failed
