@@ -30,12 +30,12 @@ pub(super) const YAW_STEP: i32 = 1_677_722;
 /// Ends of a lane sample on the bus, 4 m and 0.5 rad, and a bit less.
 const LARGEST_E_Y: f64 = 3.99;
 const LARGEST_E_THETA: f64 = 0.499;
-/// Hands: a change that is felt, a torque that is held, a guidance that acts, and the patience in ms until
-/// guidance ends.
+/// Hands: a change that is felt, a torque that is held, a guidance that acts, and a bit less than the
+/// patience until guidance ends, ms.
 pub(super) const FELT: i32 = 1_342_177;
 pub(super) const HELD: i32 = 5_872_026;
 pub(super) const ACTS: i32 = 838_861;
-const HANDS_MS: i32 = 30_000;
+const HANDS_MS: i32 = 29_990;
 /// Far inside what a column frame carries, N.m.
 const LARGEST_DRIVER_NM: f64 = 10.0;
 /// Between a loss of the lane preview and its time-out, ms; then the handover.

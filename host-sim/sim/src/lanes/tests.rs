@@ -1,14 +1,15 @@
 //! Lanes against runs one by one: the shipping ECU is the oracle.
 
+use haptic_core::params::Params;
+use haptic_log::trace::Sample;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use super::*;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::road::Course;
-use crate::scenario::{Condition, DriverChange, Failure, FailureKind, Sensors};
+use crate::scenario::{Condition, DriverChange, Failure, FailureKind, GuidanceParameters, Sensors};
 use crate::simulation::simulate;
-use haptic_log::trace::Sample;
 
 /// Every field of every sample, signs of zeros included.
 fn bits(run: &Run) -> Vec<u64> {
@@ -86,6 +87,28 @@ fn random(count: usize, seed: u64) -> Vec<Scenario> {
                 })
                 .failure(failure)
         };
+        if between(0.0, 1.0) < 0.5 {
+            let controller = Params {
+                k_1: between(0.05, 0.4),
+                a_1: between(0.5, 4.0),
+                a_2: between(0.0, 0.3),
+                a_3: between(10.0, 60.0),
+                a_4: between(0.0, 3.0),
+                rate_corner_hz: between(4.0, 20.0),
+                torque_limit_nm: between(0.3, 5.0),
+                wind_up_nm_per_s: between(0.5, 4.0),
+                reduction_nm_per_s: between(4.0, 8.0),
+                low_speed_share: between(0.0, 1.0),
+                high_speed_share: between(0.0, 1.0),
+                ..Params::PAPER
+            };
+            builder = builder.guidance(GuidanceParameters {
+                controller,
+                t_n: between(0.2, 0.5),
+                t_f: between(0.5, 0.9),
+                probe: false,
+            });
+        }
         if between(0.0, 1.0) < 0.3 {
             builder = builder.driver_change(Some(change));
         }
