@@ -138,10 +138,11 @@ pub fn shares(map: &Map) -> Table {
     };
     let mut columns = vec!["Speed (km/h)".into()];
     columns.extend(SHARES.map(|share| format!("Share {share}")));
-    columns.push("Best share".into());
+    columns.push("Recommended".into());
     Table {
         caption: "Largest growth (1/s) of all guided drives where the manual one is stable, by the share of the guidance that a \
-                  schedule leaves at the speed (guidance.low_speed_share, guidance.high_speed_share)"
+                  schedule leaves at the speed (guidance.low_speed_share, guidance.high_speed_share); recommended is the largest \
+                  share within 0.01 /s of the least growth"
             .into(),
         columns,
         rows: map.shares.iter().map(row).collect(),
