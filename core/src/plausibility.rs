@@ -460,6 +460,23 @@ mod tests {
     }
 
     #[test]
+    fn a_sample_that_comes_twice_says_nothing_new() {
+        let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+        CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
+        let at = |ms: u32, e_y: f64| LaneSample {
+            e_y: Metres::from_m(e_y),
+            e_theta: Radians::ZERO,
+            at: Instant::from_us(1000 * ms),
+        };
+        for sample in [at(10, 0.0), at(20, 0.01)] {
+            assert!(CHECKS.lane(&mut state, &mut past, sample.at, sample));
+        }
+        let before = state;
+        assert!(CHECKS.lane(&mut state, &mut past, Instant::from_us(21_000), at(20, 0.01)));
+        assert_eq!(state, before);
+    }
+
+    #[test]
     fn a_torque_that_the_column_lacks_is_learnt_within_sixteen_seconds() {
         let mut state = PlausibilityState::NEW;
         CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
