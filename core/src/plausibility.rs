@@ -432,3 +432,62 @@ fn leak(sum: i32, change: i64, dt: Micros) -> i64 {
     let kept = sum.saturating_sub(per_second_times(sum, dt));
     kept.saturating_add(change)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use crate::params::Params;
+
+    const CHECKS: Plausibility = Config::PAPER.plausibility;
+
+    #[test]
+    fn a_wheel_angle_turns_the_vehicle_before_it_is_checked() {
+        let v = Params::PAPER.vehicle;
+        for speed in [8.0, 20.0, 35.0] {
+            let mut state = PlausibilityState::NEW;
+            CHECKS.motion(&mut state, Speed::from_m_per_s(speed), None);
+            state.steer(Radians::from_rad(-0.2));
+            // The bicycle model in steady state.
+            let steady =
+                v.curvature_gain_per_m * speed / (1.0 + v.stability_factor_s2_per_m2 * speed * speed);
+            let turning = f64::from(state.turning().bits()) / f64::from(1 << FRAC_BITS);
+            assert!(
+                (turning + 0.2 * steady).abs() < 1e-4,
+                "{speed}: {turning} {steady}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_sample_that_comes_twice_says_nothing_new() {
+        let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+        CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
+        let at = |ms: u32, e_y: f64| LaneSample {
+            e_y: Metres::from_m(e_y),
+            e_theta: Radians::ZERO,
+            at: Instant::from_us(1000 * ms),
+        };
+        for sample in [at(10, 0.0), at(20, 0.01)] {
+            assert!(CHECKS.lane(&mut state, &mut past, sample.at, sample));
+        }
+        let before = state;
+        assert!(CHECKS.lane(&mut state, &mut past, Instant::from_us(21_000), at(20, 0.01)));
+        assert_eq!(state, before);
+    }
+
+    #[test]
+    fn a_torque_that_the_column_lacks_is_learnt_within_sixteen_seconds() {
+        let mut state = PlausibilityState::NEW;
+        CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
+        let lacking = Torque::from_nm(0.4);
+        for ms in 0..16_000 {
+            let now = Instant::from_us(2000 * ms);
+            assert!(CHECKS.column(&mut state, now, Torque::ZERO, Radians::ZERO, lacking));
+            // A first-order lag of 16 s.
+            let learnt = 0.4 * (1.0 - (-2e-3 * f64::from(ms) / 16.0).exp());
+            let found = state.column.bias.nm();
+            assert!((found - learnt).abs() < 0.01, "{ms}: {found} {learnt}");
+        }
+    }
+}

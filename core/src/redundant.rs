@@ -5,7 +5,6 @@
 
 use core::hint::black_box;
 use core::ops::Not;
-use core::sync::atomic::{Ordering, compiler_fence};
 
 /// A value made of 32-bit words, each of which may hold any bits.
 pub trait Words: Copy + PartialEq {
@@ -21,11 +20,6 @@ pub trait Words: Copy + PartialEq {
     #[must_use]
     fn complement(self) -> Self {
         self.map_words(&mut |word| !word)
-    }
-
-    /// The same into a place.
-    fn complement_into(&self, other: &mut Self) {
-        *other = self.complement();
     }
 }
 
@@ -73,9 +67,8 @@ pub(crate) const fn ends_block(offset: usize, size: usize) -> bool {
 /// instruction itself.
 #[inline(always)]
 pub(crate) fn keep_together() {
-    if cfg!(target_pointer_width = "32") {
-        compiler_fence(Ordering::SeqCst);
-    }
+    #[cfg(target_pointer_width = "32")]
+    core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::SeqCst);
 }
 
 /// Declares a struct of such fields, laid out as it is written, without padding.
@@ -104,16 +97,6 @@ macro_rules! words {
                 )*
                 all
             }
-
-            #[inline]
-            fn complement_into(&self, other: &mut Self) {
-                if size_of::<Self>() > $crate::redundant::SMALL {
-                    $($crate::redundant::Words::complement_into(&self.$field, &mut other.$field);)*
-                } else {
-                    *other = $crate::redundant::Words::complement(*self);
-                }
-                $crate::redundant::keep_together();
-            }
         }
     };
 }
@@ -125,9 +108,6 @@ pub(crate) use words;
 pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
     a.agrees() && b.agrees()
 }
-
-/// Bytes of a value that is compared and copied where it is used.
-pub(crate) const SMALL: usize = 32;
 
 /// A value and its inverted copy.
 #[derive(Debug, Clone, Copy)]
@@ -165,16 +145,7 @@ impl<T: Words> Redundant<T> {
     /// The copy anew, likewise.
     #[inline(always)]
     fn seal(&mut self) {
-        if size_of::<T>() > SMALL {
-            self.seal_apart();
-        } else {
-            self.inverted = self.value.complement();
-        }
-    }
-
-    #[inline(never)]
-    fn seal_apart(&mut self) {
-        self.value.complement_into(&mut self.inverted);
+        self.inverted = self.value.complement();
     }
 
     /// Changes the value in place, if both copies still agree.

@@ -9,12 +9,13 @@ use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{Guidance, Message};
 use haptic_core::config::Setup;
+use haptic_core::controller::Motion;
 use haptic_core::ecu::Step;
 use haptic_core::ecu::injection::Region;
 use haptic_core::estimator::Sample;
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
-use haptic_core::quantity::{Instant, Micros, Radians, Torque};
+use haptic_core::quantity::{Instant, Micros, Radians, Speed, Torque, TurningRate};
 use rig::Rig;
 
 const LANE: usize = 0;
@@ -325,4 +326,12 @@ fn stands_by_both_of_its_speeds_and_only_when_they_are_known() {
         rig.run(600);
         assert_eq!(rig.ecu.stands(), stands, "{speeds:?}, silent: {silent}");
     }
+}
+
+#[test]
+fn a_yaw_rate_is_there_if_it_was_measured() {
+    let rate = TurningRate::from_rad_per_s(-0.1);
+    let speeds = [Speed::from_m_per_s(20.0); 2];
+    assert_eq!(Motion::new(speeds, Some(rate)).yaw_rate(), Some(rate));
+    assert_eq!(Motion::new(speeds, None).yaw_rate(), None);
 }

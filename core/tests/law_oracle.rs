@@ -337,6 +337,8 @@ fn two_samples_share_a_rate_over_100_ms() {
         (&[(0, 0.0), (100_001, 0.5)][..], position),
         // The clock starts from zero, and so does what there is of a last sample.
         (&[(50_000, 0.5)][..], position),
+        // Two at one instant have no time for a rate between them.
+        (&[(50_000, 0.0), (50_000, 0.5)][..], position),
     ] {
         let torque = torque(samples);
         assert!(

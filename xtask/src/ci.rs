@@ -112,6 +112,7 @@ pub(crate) fn run_all() -> Result<()> {
         ("FMUs", &fmu::check),
         ("lab in the browser", &web::check),
         ("bindings agree", &bindings_agree::check),
+        ("coverage of the core", &evidence::coverage),
         ("defects made by hand", &by_hand::run),
         ("defects in the last change", &evidence::mutants_of_last_commit),
     ]);
