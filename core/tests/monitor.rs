@@ -301,33 +301,23 @@ fn a_rate_is_taken_over_more_than_50_ms() {
 
 #[test]
 fn rates_are_forgotten_in_a_gap() {
+    let steps = |from: i64, torque_mnm: i64, gap_ms: u32| {
+        let torque = counts(torque_mnm).0;
+        let mut bench = Bench::at(5.0, torque);
+        assert!(bench.show(Some(lane(from, 0, 0)), None, guidance(torque, FADE), 1000));
+        for _ in 1..gap_ms {
+            assert!(bench.torque(torque, FADE));
+        }
+        assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 1000));
+        (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
+    };
     // Two samples 1 m apart. Within 40 ms that is 25 m/s, worth 0.31 N.m more than the 0.3 of the band.
-    let torque = counts(450).0;
-    let steps = |gap_ms: u32| {
-        let mut bench = Bench::at(5.0, torque);
-        assert!(bench.show(Some(lane(-8192, 0, 0)), None, guidance(torque, FADE), 1000));
-        for _ in 1..gap_ms {
-            assert!(bench.torque(torque, FADE));
-        }
-        assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 1000));
-        (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
-    };
-    assert_eq!(steps(40), 30);
-    assert_eq!(steps(300), 20);
-    assert_eq!(steps(361), 20);
+    assert_eq!(steps(-8192, 450, 40), 30);
+    assert_eq!(steps(-8192, 450, 300), 20);
+    assert_eq!(steps(-8192, 450, 361), 20);
     // 8 m in 360 ms are worth 0.28 N.m; a millisecond later nothing is known of the rate.
-    let far = |gap_ms: u32| {
-        let torque = counts(500).0;
-        let mut bench = Bench::at(5.0, torque);
-        assert!(bench.show(Some(lane(-65_535, 0, 0)), None, guidance(torque, FADE), 1000));
-        for _ in 1..gap_ms {
-            assert!(bench.torque(torque, FADE));
-        }
-        assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, FADE), 1000));
-        (0..30).take_while(|_| bench.torque(torque, ACTIVE)).count()
-    };
-    assert_eq!(far(360), 30);
-    assert_eq!(far(361), 20);
+    assert_eq!(steps(-65_535, 500, 360), 30);
+    assert_eq!(steps(-65_535, 500, 361), 20);
 }
 
 /// Errors that passed zero at a constant rate with the last picture, and no picture since. From 40 ms of age on the
