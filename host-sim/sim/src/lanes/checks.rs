@@ -5,8 +5,7 @@
 //! 2^-24 a step, and no term of a sum amplifies them: over all that a sum remembers they come to less than
 //! 0.005 N.m.s, and less than 0.001 m. The margins here are smaller by several times as much, so that whoever stays within
 //! them stays within core's. The other way a run is driven anew without need.
-//! Core also lets the wheel angle explain up to 0.3 N.m of the aligning torque; here the yaw rate alone does. A run in
-//! which the two differ by so much is nearer to a margin here, and core's friction of 0.5 N.m covers what they learn apart.
+//! Core also lets the wheel angle explain up to 0.3 N.m of the aligning torque; here the yaw rate alone does.
 
 use super::counts::{flag, speed_on_the_bus};
 use crate::scenario::Scenario;
