@@ -105,6 +105,10 @@ fn trusted_is_the_last_output_kept_before_the_suspect_time() {
         assert!(got < newest && got > newest - 40.1, "{suspect_ms}: {got} mN.m");
     }
     assert_eq!(history.trusted(last, Micros::from_ms(2600)), Torque::ZERO);
+    // At 300 ms already, where the fine one would give a later output.
+    let trusted = |ms| history.trusted(last, Micros::from_ms(ms));
+    assert!(trusted(299) > trusted(310));
+    assert_eq!(trusted(300), trusted(310));
 }
 
 #[test]
