@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::file::Kind;
 use super::{Driven, Point, SLICES, Sweep, value};
 
 /// A list with more rows is cut into slices.
@@ -33,6 +32,21 @@ pub struct Level {
     pub mean: Option<f64>,
     /// Share of the drives beyond the limit, if there is one.
     pub beyond: Option<f64>,
+    /// The same for each value of the field that the sweep compares; of that field itself none.
+    pub compared: Vec<Compared>,
+}
+
+/// Drives of a level with one value of the field that the sweep compares.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// The value.
+    pub label: String,
+    /// Drives with it.
+    pub drives: u64,
+    /// Mean of the metric that judges.
+    pub mean: Option<f64>,
+    /// Share of the drives beyond the limit, if there is one.
+    pub beyond: Option<f64>,
 }
 
 /// Effects on their way.
@@ -40,6 +54,8 @@ pub(super) struct Effects {
     axes: Vec<Axis>,
     metrics: Vec<&'static str>,
     has_limit: bool,
+    compare: Option<usize>,
+    judge: usize,
 }
 
 struct Axis {
@@ -66,6 +82,15 @@ struct Sums {
     drives: u64,
     beyond: u64,
     metrics: Vec<Moments>,
+    /// By the level of the axis that is compared.
+    compared: Vec<Part>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    drives: u64,
+    beyond: u64,
+    judged: Moments,
 }
 
 impl Moments {
@@ -82,13 +107,10 @@ impl Moments {
 }
 
 impl Effects {
-    pub(super) fn new(sweep: &Sweep) -> Self {
+    pub(super) fn new(sweep: &Sweep, judge: usize) -> Self {
         let mut column = 0;
         let axis = |axis: &super::file::Axis| {
-            let of_list = match &axis.kind {
-                Kind::Grid(rows) => Some(rows.len()),
-                Kind::Sampled(distribution) => distribution.rows().map(<[_]>::len),
-            };
+            let of_list = axis.rows();
             let rows = of_list.unwrap_or(SLICES as usize);
             let first = column;
             column += axis.columns.len();
@@ -104,11 +126,14 @@ impl Effects {
             axes: sweep.axes().map(axis).collect(),
             metrics: sweep.metrics().iter().map(|d| d.name).collect(),
             has_limit: sweep.limit.is_some(),
+            compare: sweep.compare,
+            judge,
         }
     }
 
     pub(super) fn add(&mut self, point: &Point, driven: &Driven, is_beyond: bool) {
         let metrics = self.metrics.len();
+        let part = self.compare.map(|axis| point.levels[axis] as usize);
         for (axis, level) in self.axes.iter_mut().zip(&point.levels) {
             let level = *level as usize;
             let level = if axis.rows > MOST_LEVELS {
@@ -138,12 +163,35 @@ impl Effects {
                     moments.add(*value);
                 }
             }
+            if let Some(part) = part {
+                sums.add_to(part, is_beyond, driven.metrics[self.judge]);
+            }
         }
     }
 
-    pub(super) fn finish(self, judge: usize) -> Vec<Effect> {
-        let effect = |axis: &Axis| {
-            let share = |metric: usize| share_between(axis.levels.iter().map(|level| level.metrics[metric]));
+    pub(super) fn finish(self) -> Vec<Effect> {
+        // What the compared values are called; each axis met the same ones.
+        let labels: Vec<String> = self.compare.map_or_else(Vec::new, |compared| {
+            let levels = self.axes[compared].levels.iter();
+            levels
+                .map(|level| level.label.clone().unwrap_or_default())
+                .collect()
+        });
+        let share = |part: u64, of: u64| (self.has_limit && of > 0).then(|| part as f64 / of as f64);
+        let compared = |(part, label): (&Part, &String)| Compared {
+            label: label.clone(),
+            drives: part.drives,
+            mean: part.judged.mean(),
+            beyond: share(part.beyond, part.drives),
+        };
+        let effect = |(place, axis): (usize, &Axis)| {
+            let labels = if self.compare == Some(place) {
+                &[]
+            } else {
+                &labels[..]
+            };
+            let of_variance =
+                |metric: usize| share_between(axis.levels.iter().map(|level| level.metrics[metric]));
             let level = |level: &Sums| Level {
                 label: level
                     .label
@@ -151,8 +199,9 @@ impl Effects {
                     .unwrap_or_else(|| format!("{:.4}", level.x.mean)),
                 x: level.x.mean(),
                 drives: level.drives,
-                mean: level.metrics[judge].mean(),
-                beyond: self.has_limit.then(|| level.beyond as f64 / level.drives as f64),
+                mean: level.metrics[self.judge].mean(),
+                beyond: share(level.beyond, level.drives),
+                compared: level.compared.iter().zip(labels).map(compared).collect(),
             };
             Effect {
                 field: axis.field.clone(),
@@ -166,11 +215,25 @@ impl Effects {
                     .metrics
                     .iter()
                     .enumerate()
-                    .map(|(i, name)| (*name, share(i)))
+                    .map(|(i, name)| (*name, of_variance(i)))
                     .collect(),
             }
         };
-        self.axes.iter().map(effect).collect()
+        self.axes.iter().enumerate().map(effect).collect()
+    }
+}
+
+impl Sums {
+    fn add_to(&mut self, part: usize, is_beyond: bool, judged: Option<f64>) {
+        if self.compared.len() <= part {
+            self.compared.resize(part + 1, Part::default());
+        }
+        let part = &mut self.compared[part];
+        part.drives += 1;
+        part.beyond += u64::from(is_beyond);
+        if let Some(value) = judged {
+            part.judged.add(value);
+        }
     }
 }
 
@@ -200,6 +263,56 @@ mod tests {
         let mut moments = Moments::default();
         values.iter().for_each(|value| moments.add(*value));
         moments
+    }
+
+    /// Counted again from the rows of the table.
+    #[test]
+    fn what_is_compared_is_what_the_rows_say() {
+        let failing = "[scenario.failure]\ntime = 8\n[vary]\n\"failure.kind\" = [\"torque\", \"input\"]\n";
+        let sweep = crate::sweep::tests::with_road(
+            "samples = 20\nmetrics = [\"peak_lateral_error_m\"]\nlimit = 0.3\ncompare = \"failure.kind\"\n",
+            &format!("{failing}speed = [50, 80]\n\"driver.t_p\" = {{ uniform = [0.1, 0.4] }}\n"),
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let store = crate::sweep::Store::open(&sweep, "test 1", folder.path()).unwrap();
+        crate::sweep::drive_all(&store, &sweep, crate::sweep::Shard::WHOLE, 1, |_| ()).unwrap();
+        let summary = store.finish().unwrap();
+        assert_eq!(summary.compare.as_deref(), Some("failure.kind"));
+        let csv = std::fs::read_to_string(folder.path().join("drives.csv")).unwrap();
+        let heads: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+        let column = |name: &str| heads.iter().position(|head| *head == name).unwrap();
+        let [kind, speed, peak] = ["failure.kind", "speed", "peak_lateral_error_m"].map(column);
+        let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|row| row.split(',').collect()).collect();
+        let effect = |field: &str| summary.effects.iter().find(|of| of.field == field).unwrap();
+        let mut beyond = 0;
+        for level in &effect("speed").levels {
+            for own in &level.compared {
+                let with = |row: &&Vec<&str>| row[kind] == own.label && row[speed] == level.label;
+                let peaks: Vec<f64> = rows
+                    .iter()
+                    .filter(with)
+                    .map(|row| row[peak].parse().unwrap())
+                    .collect();
+                let bad = peaks.iter().filter(|peak| **peak > 0.3).count();
+                beyond += bad;
+                assert_eq!((own.drives, peaks.len()), (20, 20));
+                assert_eq!(own.beyond, Some(bad as f64 / 20.0));
+                assert!((own.mean.unwrap() - peaks.iter().sum::<f64>() / 20.0).abs() < 1e-12);
+            }
+        }
+        assert!((1..80).contains(&beyond), "{beyond}");
+        assert!(
+            effect("failure.kind")
+                .levels
+                .iter()
+                .all(|level| level.compared.is_empty())
+        );
+        let slices = &effect("driver.t_p").levels;
+        let drives = slices
+            .iter()
+            .flat_map(|level| &level.compared)
+            .map(|own| own.drives);
+        assert_eq!(drives.sum::<u64>(), 80);
     }
 
     /// By hand: groups 1,2,3 and 4,5,6. SSB 13.5, SSW 4, MSW 1, SST 17.5: (13.5 - 1) / 17.5.

@@ -79,6 +79,8 @@ pub(super) struct SweepFile {
     pub metrics: Option<Vec<String>>,
     pub judge: Option<String>,
     pub limit: Option<f64>,
+    /// The varied field whose values are told apart.
+    pub compare: Option<String>,
     pub stop: Option<Stop>,
     #[serde(default)]
     pub vary: Table,
@@ -121,6 +123,16 @@ pub(super) struct Column {
 pub(super) struct Axis {
     pub columns: Vec<Column>,
     pub kind: Kind,
+}
+
+impl Axis {
+    /// How many values a list or a choice has; none of a distribution.
+    pub(super) fn rows(&self) -> Option<usize> {
+        match &self.kind {
+            Kind::Grid(rows) => Some(rows.len()),
+            Kind::Sampled(distribution) => distribution.rows().map(<[_]>::len),
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -35,7 +35,7 @@ mod vary;
 
 pub use chunk::Chunk;
 pub use drive::Driven;
-pub use effects::{Effect, Level};
+pub use effects::{Compared, Effect, Level};
 pub use file::{Design, Stop};
 pub use run::{Progress, Shard, drive_all};
 pub use saltelli::SobolIndex;
@@ -81,6 +81,8 @@ pub struct Sweep {
     metrics: Vec<&'static Definition>,
     judge: &'static Definition,
     limit: Option<f64>,
+    /// The axis whose values are told apart, among all.
+    compare: Option<usize>,
     stop: Option<Stop>,
 }
 
@@ -101,6 +103,8 @@ pub struct Point {
     levels: Vec<u32>,
 }
 
+/// Most values of a field that are told apart: a figure has as many styles.
+const MOST_COMPARED: usize = 7;
 /// Slices of a distribution in a summary.
 const SLICES: f64 = 16.0;
 
@@ -156,7 +160,7 @@ impl Sweep {
         if !metrics.iter().any(|d| d.name == judge.name) {
             return Err(bad(format!("judge = {:?} is not among the metrics", judge.name)));
         }
-        let sweep = Self {
+        let mut sweep = Self {
             name: name.into(),
             text: text.into(),
             courses: courses(name, &file.courses)?,
@@ -172,8 +176,12 @@ impl Sweep {
             metrics,
             judge,
             limit: file.limit,
+            compare: None,
             stop: file.stop,
         };
+        if let Some(field) = &file.compare {
+            sweep.compare = Some(sweep.compared(field).map_err(bad)?);
+        }
         sweep.check()?;
         Ok(sweep)
     }
@@ -232,6 +240,27 @@ impl Sweep {
     /// Number of samples.
     pub fn samples(&self) -> u64 {
         self.samples
+    }
+
+    /// The axis of a field whose values are told apart.
+    fn compared(&self, field: &str) -> Result<usize, String> {
+        let is_it = |axis: &Axis| axis.columns.iter().any(|column| column.name == field);
+        let Some(place) = self.axes().position(is_it) else {
+            let all: Vec<&str> = self.columns().collect();
+            return Err(format!(
+                "compare = {field:?} is not varied; varied are {}",
+                all.join(", ")
+            ));
+        };
+        match self.axes().nth(place).and_then(Axis::rows) {
+            Some(2..=MOST_COMPARED) => Ok(place),
+            Some(rows) => Err(format!(
+                "compare = {field:?}: has {rows} values, 2 to {MOST_COMPARED} can be told apart"
+            )),
+            None => Err(format!(
+                "compare = {field:?}: is drawn from a distribution; only the values of a list or a choice can be told apart"
+            )),
+        }
     }
 
     fn axes(&self) -> impl Iterator<Item = &Axis> {

@@ -31,6 +31,8 @@ pub struct Summary {
     pub limit: Option<f64>,
     /// Drives beyond the limit, and those that diverged.
     pub beyond: Option<u64>,
+    /// The field whose values are told apart, if the sweep compares.
+    pub compare: Option<String>,
     /// Of each metric.
     pub distributions: Vec<Distribution>,
     /// Of each axis.
@@ -103,18 +105,16 @@ impl<'a> Summarised<'a> {
     pub(super) fn new(sweep: &'a Sweep) -> Self {
         let metrics = sweep.metrics().len();
         let fields = sweep.sampled.len();
+        let is_judge = |d: &&Definition| d.name == sweep.judge().name;
+        let judge = sweep.metrics().iter().position(is_judge).unwrap_or(0);
         Self {
             sweep,
-            judge: sweep
-                .metrics()
-                .iter()
-                .position(|d| d.name == sweep.judge().name)
-                .unwrap_or(0),
+            judge,
             drives: 0,
             diverged: 0,
             beyond: 0,
             spreads: vec![Spread::default(); metrics],
-            effects: Effects::new(sweep),
+            effects: Effects::new(sweep, judge),
             blocks: (sweep.design() == Design::Saltelli).then(|| Blocks::new(fields, metrics)),
             worst: Vec::new(),
         }
@@ -188,12 +188,16 @@ impl<'a> Summarised<'a> {
             judge: self.sweep.judge().name,
             limit: self.sweep.limit,
             beyond: self.sweep.limit.map(|_| self.beyond),
+            compare: self.sweep.compare.and_then(|axis| {
+                let axis = self.sweep.axes().nth(axis)?;
+                Some(axis.columns[0].name.clone())
+            }),
             distributions: names
                 .iter()
                 .zip(&self.spreads)
                 .map(|(name, spread)| spread.finish(name))
                 .collect(),
-            effects: self.effects.finish(self.judge),
+            effects: self.effects.finish(),
             sobol: self
                 .blocks
                 .map(|blocks| blocks.finish(&fields, &names))

@@ -323,6 +323,17 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
         &["sweep.toml: ", "line 1", "unknown field `desing`"],
     );
     has(refused("base = \"no-such.toml\"\n"), &["no-such.toml: "]);
+    for (compare, why) in [
+        ("speed", "from a distribution"),
+        ("seed", "is not varied; varied are speed"),
+    ] {
+        let text =
+            format!("samples = 3\ncompare = \"{compare}\"\n[vary]\nspeed = {{ uniform = [50, 60] }}\n");
+        has(
+            refused(&text),
+            &["sweep.toml: ", &format!("compare = \"{compare}\""), why],
+        );
+    }
     has(
         refused("design = \"saltelli\"\nsamples = 4\n[vary]\nspeed = [50]\nseed = { choice = [1, 2] }\n"),
         &["saltelli"],

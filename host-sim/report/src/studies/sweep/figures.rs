@@ -1,6 +1,6 @@
 //! The figures of a sweep.
 
-use super::words::{heading, label};
+use super::words::{by_weight, heading, label};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::sweep::{Effect, Summary};
 
@@ -20,7 +20,18 @@ pub(super) fn caption(name: &str, summary: &Summary) -> String {
             "Sobol indices of {} with their standard errors.",
             label(summary.judge)
         ),
-        _ => "Mean by value of each field; of a distribution by its sixteenths.".into(),
+        _ => {
+            let what = if summary.limit.is_some() {
+                "Share of bad drives"
+            } else {
+                "Mean"
+            };
+            let apart = summary
+                .compare
+                .as_ref()
+                .map_or(String::new(), |field| format!(", by {field}"));
+            format!("{what} by value of each field, of a distribution by its sixteenths{apart}.")
+        }
     }
 }
 
@@ -115,16 +126,8 @@ pub(super) fn influence(summary: &Summary) -> Option<Figure> {
 /// A panel for each field with numbers, those that matter most first; each over the range of its own field, as a
 /// share of it, so that the panels can stand over one axis.
 pub(super) fn response(summary: &Summary) -> Option<Figure> {
-    let share = |effect: &Effect| {
-        let of_judge = effect.shares.iter().find(|(metric, _)| *metric == summary.judge);
-        of_judge.and_then(|(_, share)| *share).unwrap_or(0.0)
-    };
-    let mut fields: Vec<&Effect> = summary
-        .effects
-        .iter()
-        .filter(|effect| effect.levels.len() > 1 && effect.levels.iter().all(|l| l.x.is_some()))
-        .collect();
-    fields.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    let mut fields = by_weight(summary);
+    fields.retain(|effect| effect.levels.len() > 1 && effect.levels.iter().all(|l| l.x.is_some()));
     fields.truncate(DRAWN);
     let panel = |effect: &&Effect| {
         let mut levels: Vec<(f64, &haptic_batch::sweep::Level)> = effect
@@ -135,16 +138,34 @@ pub(super) fn response(summary: &Summary) -> Option<Figure> {
         levels.sort_by(|a, b| a.0.total_cmp(&b.0));
         let [low, high] = [levels.first(), levels.last()].map(|end| end.map_or(0.0, |end| end.0));
         let place = |x: f64| 100.0 * (x - low) / (high - low);
-        let (value, label): (fn(&haptic_batch::sweep::Level) -> Option<f64>, &str) =
-            if summary.limit.is_some() {
-                (|l| l.beyond.map(|b| 100.0 * b), "Bad (%)")
-            } else {
-                (|l| l.mean, "Mean")
-            };
-        let points: Vec<_> = levels
-            .iter()
-            .map(|(x, level)| (place(*x), value(level).unwrap_or(f64::NAN)))
-            .collect();
+        let is_share = summary.limit.is_some();
+        let value = |mean: Option<f64>, beyond: Option<f64>| {
+            let value = if is_share { beyond.map(|b| 100.0 * b) } else { mean };
+            value.unwrap_or(f64::NAN)
+        };
+        // Of all drives, or of those with each value of the field that is compared.
+        let parts = levels.iter().map(|(_, level)| level.compared.len()).max();
+        let series = match parts.unwrap_or(0) {
+            0 => {
+                let points = levels
+                    .iter()
+                    .map(|(x, level)| (place(*x), value(level.mean, level.beyond)));
+                joined("", 1, points.collect())
+            }
+            parts => {
+                let part = |i: usize| {
+                    let own = levels
+                        .iter()
+                        .filter_map(|(x, level)| Some((*x, level.compared.get(i)?)));
+                    let label = own.clone().next().map_or("", |(_, own)| own.label.as_str());
+                    let points = own
+                        .clone()
+                        .map(|(x, own)| (place(x), value(own.mean, own.beyond)));
+                    joined(label, i + 1, points.collect())
+                };
+                (0..parts).flat_map(part).collect()
+            }
+        };
         Panel {
             title: format!(
                 "{}, {} to {}",
@@ -152,8 +173,8 @@ pub(super) fn response(summary: &Summary) -> Option<Figure> {
                 short_number(low),
                 short_number(high)
             ),
-            y: Axis::of(label),
-            series: vec![Series::line("", 1, points.clone()), Series::dots("", 1, points)],
+            y: Axis::of(if is_share { "Bad (%)" } else { "Mean" }),
+            series,
         }
     };
     (!fields.is_empty()).then(|| Figure {
@@ -165,6 +186,14 @@ pub(super) fn response(summary: &Summary) -> Option<Figure> {
         panels: fields.iter().map(panel).collect(),
         ..Figure::default()
     })
+}
+
+/// Dots that a line joins; one entry in the legend.
+fn joined(label: &str, style: usize, points: Vec<(f64, f64)>) -> Vec<Series> {
+    vec![
+        Series::line(label, style, points.clone()),
+        Series::dots("", style, points),
+    ]
 }
 
 fn short_number(x: f64) -> String {

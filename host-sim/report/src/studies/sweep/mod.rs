@@ -43,7 +43,8 @@ pub fn write(sweep: &Sweep, summary: &Summary, file: &str, directory: &Path) -> 
                 caption: caption(name, summary),
             });
         }
-        let own = if name == "influence" { 2 } else { 1 };
+        // The tables that belong to it.
+        let own = if name == "distribution" { 1 } else { 2 };
         let filled = tables.by_ref().take(own).filter(|table| !table.rows.is_empty());
         blocks.extend(filled.map(Block::Table));
         if !blocks.is_empty() {

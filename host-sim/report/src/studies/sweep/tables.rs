@@ -1,21 +1,26 @@
 //! The tables of a sweep.
 
-use super::words::{decimals, heading, label};
+use super::words::{by_weight, decimals, heading, label};
 use crate::document::{Cell, Table};
 use haptic_batch::sweep::{Effect, Summary, Sweep};
 
-/// Distributions, shares of the variance, Sobol indices, levels, the worst drives: in this order, some empty.
+/// Of what is compared a terminal shows the fields that matter most.
+const SHOWN: usize = 2;
+
+/// Distributions, shares of the variance, Sobol indices, levels, what is compared, the worst drives: in this order, some
+/// empty.
 pub fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
     vec![
         distributions(summary),
         shares(summary),
         indices(summary),
         levels(summary),
+        compared(summary, usize::MAX),
         worst(sweep, summary, file),
     ]
 }
 
-/// What a terminal shows: of what matters only the metric that judges, and no levels.
+/// What a terminal shows: of what matters only the metric that judges, and levels only of what is compared.
 pub fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
     let judge = summary.judge;
     let own = Summary {
@@ -43,6 +48,7 @@ pub fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> 
         distributions(summary),
         shares(&own),
         indices(&own),
+        compared(summary, SHOWN),
         worst(sweep, summary, file),
     ]
 }
@@ -143,6 +149,56 @@ fn levels(summary: &Summary) -> Table {
         .flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
     Table {
         caption: "By value of each field (of a distribution: by sixteenths)".into(),
+        columns,
+        rows: rows.collect(),
+    }
+}
+
+/// What the values of one field do along the others, those that matter most first.
+fn compared(summary: &Summary, most: usize) -> Table {
+    let compare = summary.compare.as_deref().unwrap_or_default();
+    let mut effects = by_weight(summary);
+    effects.retain(|effect| effect.levels.iter().any(|level| !level.compared.is_empty()));
+    let labels: Vec<String> = effects.first().map_or_else(Vec::new, |effect| {
+        let most = effect.levels.iter().max_by_key(|level| level.compared.len());
+        most.map_or_else(Vec::new, |level| {
+            level.compared.iter().map(|own| own.label.clone()).collect()
+        })
+    });
+    let [what, unit] = match summary.limit {
+        Some(_) => ["Bad drives".to_string(), " (%)".into()],
+        None => [format!("Mean {}", label(summary.judge)), String::new()],
+    };
+    let digits = if summary.limit.is_some() {
+        2
+    } else {
+        decimals(summary.judge)
+    };
+    let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
+        let value = |label: &String| {
+            let own = level.compared.iter().find(|own| own.label == *label);
+            let value = own.and_then(|own| own.beyond.map(|share| 100.0 * share).or(own.mean));
+            Cell::Number {
+                value,
+                decimals: digits,
+            }
+        };
+        let mut cells = vec![
+            Cell::Text(effect.field.clone()),
+            Cell::Text(level.label.clone()),
+            Cell::number(level.drives as f64, 0),
+        ];
+        cells.extend(labels.iter().map(value));
+        cells
+    };
+    let rows = effects
+        .iter()
+        .take(most)
+        .flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
+    let mut columns: Vec<String> = ["Field", "Value", "Drives"].map(String::from).to_vec();
+    columns.extend(labels.iter().map(|own| format!("{own}{unit}")));
+    Table {
+        caption: format!("{what} by {compare}, along the other fields"),
         columns,
         rows: rows.collect(),
     }

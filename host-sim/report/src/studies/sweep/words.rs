@@ -1,6 +1,7 @@
-//! Metrics in words.
+//! Metrics in words, and the order of fields.
 
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_batch::sweep::{Effect, Summary};
 
 fn definition(metric: &str) -> Option<&'static Definition> {
     DEFINITIONS.iter().find(|d| d.name == metric)
@@ -15,6 +16,17 @@ pub(super) fn heading(metric: &str) -> String {
         Some(d) if d.unit != "1" => format!("{} ({})", d.label, d.unit),
         _ => label(metric),
     }
+}
+
+/// The varied fields, that which explains most of the metric that judges first.
+pub(super) fn by_weight(summary: &Summary) -> Vec<&Effect> {
+    let share = |effect: &Effect| {
+        let of_judge = effect.shares.iter().find(|(metric, _)| *metric == summary.judge);
+        of_judge.and_then(|(_, share)| *share).unwrap_or(0.0)
+    };
+    let mut effects: Vec<&Effect> = summary.effects.iter().collect();
+    effects.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    effects
 }
 
 /// Digits after the point.
