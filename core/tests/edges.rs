@@ -282,6 +282,33 @@ fn a_measurement_speaks_for_four_steps_and_not_five() {
     assert_eq!(judged.iter().position(|motor| *motor == Motor::Astray), Some(14));
 }
 
+/// `>=` in place of `>` at the edges of the band: 0.1 N.m from nothing commanded.
+#[test]
+fn a_motor_at_the_edge_of_its_band_obeys() {
+    for edge in [0.1, -0.1] {
+        let mut actuator = Actuator::default();
+        for step in 0..100 {
+            actuator.deliver(Torque::from_nm(edge));
+            assert_eq!(actuator.judge(Torque::ZERO), Motor::Obeys, "{edge} {step}");
+        }
+    }
+}
+
+/// WEAK_PATIENCE of 49 or 51 steps, or a motor that is weak in one step alone.
+#[test]
+fn a_motor_is_weak_from_the_fifty_first_step_on() {
+    let mut actuator = Actuator::default();
+    let mut judge = |delivered: f64| {
+        actuator.deliver(Torque::from_nm(delivered));
+        actuator.judge(Torque::from_nm(2.0))
+    };
+    // Until the band has closed around the command.
+    (0..1000).for_each(|_| assert_eq!(judge(2.0), Motor::Obeys));
+    let judged: Vec<Motor> = (0..120).map(|_| judge(1.0)).collect();
+    assert!(judged[..50].iter().all(|motor| *motor == Motor::Obeys));
+    assert!(judged[50..].iter().all(|motor| *motor == Motor::Weak));
+}
+
 /// The first sample is taken for one that follows a sample at phase zero: the first block begins in the middle of its
 /// window, and the first reading comes early.
 #[test]

@@ -175,6 +175,18 @@ fn a_ramp_gives_its_slope_and_a_step_decays_with_tau() {
     assert!((area - 0.025).abs() < 1e-5, "{area}");
 }
 
+/// To the bit: a rate that is rounded away from nothing would turn the wheel.
+#[test]
+fn held_errors_have_no_rate() {
+    for (e_y, e_theta) in [(0.3, -0.02), (-1.7, 0.4), (0.0, 0.0)] {
+        let mut pair = Pair::new(Params::PAPER);
+        let first = pair.step(1000, e_y, e_theta);
+        for dt_us in [100, 1000, 8333, 25_000, 99_999] {
+            assert_eq!(pair.step(dt_us, e_y, e_theta), first, "{e_y} {e_theta} {dt_us}");
+        }
+    }
+}
+
 #[test]
 fn extremes_saturate() {
     let mut pair = Pair::new(Params {

@@ -42,7 +42,7 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ("actuator.rs", &["edges", "ecu", "motor"]),
     ("faults.rs", &["faults", "ecu", "dbc", "edges"]),
     ("hands.rs", &["road", "ecu"]),
-    ("law.rs", &["law_oracle"]),
+    ("law.rs", &["law_oracle", "ecu", "road"]),
     ("schedule.rs", &["schedule", "params"]),
     ("past.rs", &["plausibility", "road"]),
     ("probe.rs", &["probe"]),
