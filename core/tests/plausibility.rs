@@ -457,3 +457,32 @@ fn steps_at_their_edges() {
         assert!(speeds_agree(v(0.0), v(2.0 - LSB)) && !speeds_agree(v(0.0), v(2.0)));
     }
 }
+
+/// A vehicle that turns at 0.1 rad/s sees a line that turns at 0.3 rad/s: where it pointed at any earlier instant lies on a
+/// straight line through the directions that are kept, every 21 ms here.
+#[test]
+fn where_the_line_pointed_earlier_is_between_two_kept_directions() {
+    let (turn, line) = (0.1, 0.3);
+    let mut past = Past::new();
+    past.turn(Instant::from_us(0), TurningRate::from_rad_per_s(turn));
+    let at = |ms: u32| Instant::from_us(1000 * ms);
+    for ms in (0..=490).step_by(7) {
+        let e_theta = (line - turn) * 1e-3 * f64::from(ms);
+        past.see(at(ms), at(ms), Radians::from_rad(e_theta));
+    }
+    let now = at(490);
+    // The last kept is 7 ms old.
+    for before_ms in (7..=400).step_by(3) {
+        let found = past.line(now, now, Micros::from_ms(before_ms)).unwrap().rad();
+        let expected = line * 1e-3 * f64::from(490 - before_ms) - turn * 0.49;
+        assert!(
+            (found - expected).abs() < 2e-5,
+            "{before_ms} ms: {found}, not {expected}"
+        );
+    }
+    assert_eq!(past.line(now, now, Micros::from_ms(495)), None);
+    past.forget_line();
+    assert_eq!(past.line(now, now, Micros::from_ms(100)), None);
+    past.see(now, now, Radians::from_rad(0.05));
+    assert_eq!(past.line(now, now, Micros::from_ms(1)), None);
+}
