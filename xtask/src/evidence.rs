@@ -47,7 +47,7 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ("past.rs", &["plausibility", "road"]),
     ("probe.rs", &["probe"]),
     ("sine.rs", &["probe"]),
-    ("quantity.rs", &["quantity", "law_oracle", "ecu"]),
+    ("quantity.rs", &["quantity", "law_oracle", "ecu", "probe"]),
     ("quantity/arithmetic.rs", &["quantity", "law_oracle", "ecu"]),
     (
         "config.rs",
