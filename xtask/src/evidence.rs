@@ -32,7 +32,15 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ),
     (
         "ecu/receivers.rs",
-        &["ecu", "memory", "edges", "endurance", "attacks"],
+        &[
+            "ecu",
+            "memory",
+            "edges",
+            "endurance",
+            "attacks",
+            "senders",
+            "road",
+        ],
     ),
     ("ecu/injection.rs", &["ecu", "memory", "monitor", "edges"]),
     ("ramp.rs", &["ramp", "ecu", "endurance"]),

@@ -1,0 +1,74 @@
+//! For how long a silent sender is waited for: three of its periods, as `docs/design.md` has it.
+//!
+//! The period is the longest time between two messages lately. It grows at once and falls by a sixty-fourth of the way with
+//! each message; it is no less than 10 ms and no more than the slowest sender's. The expected times are worked out here in
+//! milliseconds and f64.
+
+mod rig;
+
+use haptic_core::bus::messages::Message;
+use haptic_core::ecu::Step;
+use haptic_core::faults::Fault;
+use rig::Rig;
+
+const LANE: usize = 0;
+/// What the slowest camera has, ms: 15 pictures a second.
+const SLOWEST_MS: f64 = 1000.0 / 15.0;
+
+/// Pictures with these times between them, ms, and then no more: for how long the ECU waits after the last, ms.
+fn waits(gaps_ms: &[u32]) -> u32 {
+    let mut rig = Rig::paper();
+    rig.silent[LANE] = true;
+    let mut is_heard = false;
+    let lost = |step: &Step| step.command.faults.contains(Fault::LaneTimeout);
+    // The third intact frame is the first that is taken.
+    let gaps = [&[8; 3], gaps_ms].concat();
+    for (counter, gap) in (0_u8..16).cycle().zip(&gaps) {
+        for _ in 1..*gap {
+            let is_lost = lost(&rig.tick());
+            assert!(!is_lost || !is_heard, "{gaps_ms:?}: lost within {gap} ms");
+        }
+        let frame = rig.lane.encode(counter);
+        is_heard = rig.send(&frame).is_ok();
+        rig.tick();
+    }
+    assert!(is_heard);
+    // The last was heard one step ago.
+    rig.run_until(300, lost).0 + 1
+}
+
+/// The first step after three periods.
+fn expected(period_ms: f64) -> u32 {
+    (3.0 * period_ms).floor() as u32 + 1
+}
+
+#[test]
+fn a_camera_is_waited_for_as_long_as_its_pictures_are_apart() {
+    // One picture says nothing: the slowest camera's.
+    assert_eq!(waits(&[]), expected(SLOWEST_MS));
+    // Two say how far apart they are, but no less than a quarter of the slowest.
+    for gap in [20, 33, 50, 66] {
+        assert_eq!(waits(&[gap]), expected(f64::from(gap)), "{gap} ms");
+        assert_eq!(waits(&[gap; 5]), expected(f64::from(gap)), "{gap} ms");
+    }
+    // Cut to whole microseconds.
+    assert_eq!(waits(&[8]), expected((1e3 * SLOWEST_MS / 4.0).floor() / 1e3));
+}
+
+#[test]
+fn a_period_grows_at_once_and_falls_slowly() {
+    let after = |longest: f64, gap: f64, times: i32| gap + (longest - gap) * (63.0_f64 / 64.0).powi(times);
+    let mut gaps = vec![20; 10];
+    gaps.push(50);
+    assert_eq!(waits(&gaps), expected(50.0));
+    for times in [1, 20, 200] {
+        let gaps = [&gaps[..], &vec![20; times]].concat();
+        assert_eq!(waits(&gaps), expected(after(50.0, 20.0, times as i32)), "{times}");
+    }
+    // A quick camera is waited for 30 ms.
+    assert_eq!(waits(&[8; 400]), 31);
+    // Longer than the slowest's is the slowest's, and the next two say how far apart they are.
+    let gaps = [&[50; 5][..], &[140]].concat();
+    assert_eq!(waits(&gaps), expected(SLOWEST_MS));
+    assert_eq!(waits(&[&gaps[..], &[30]].concat()), expected(30.0));
+}
