@@ -7,7 +7,7 @@ mod rig;
 use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
-use haptic_core::bus::messages::{Guidance, Message};
+use haptic_core::bus::messages::{Column, Guidance, Message};
 use haptic_core::config::Setup;
 use haptic_core::controller::Motion;
 use haptic_core::ecu::Step;
@@ -307,6 +307,36 @@ fn a_motor_is_weak_from_the_fifty_first_step_on() {
     let judged: Vec<Motor> = (0..120).map(|_| judge(1.0)).collect();
     assert!(judged[..50].iter().all(|motor| *motor == Motor::Obeys));
     assert!(judged[50..].iter().all(|motor| *motor == Motor::Weak));
+}
+
+/// Telemetry comes every 20 steps, and stands back from a step with a new sample of the column, by three at most.
+#[test]
+fn telemetry_comes_once_in_twenty_steps_and_beside_new_samples() {
+    // The column: silent, every other step, in every step.
+    for (every, place) in [(0, 0), (2, 1), (1, 3)] {
+        let mut rig = Rig::paper();
+        rig.silent[COLUMN] = every != 2;
+        let came: Vec<u64> = (0..400)
+            .filter(|step| {
+                if every == 1 {
+                    let still = Column {
+                        driver_torque: Torque::ZERO,
+                        wheel_angle: Radians::ZERO,
+                        motor_torque: Torque::ZERO,
+                    };
+                    // The first frames are not trusted yet.
+                    let is_heard = rig.send(&still.encode((*step & 15) as u8)).is_ok();
+                    assert!(is_heard || *step < 3, "{step}");
+                }
+                rig.telemetry = None;
+                rig.tick();
+                rig.telemetry.is_some()
+            })
+            .collect();
+        let expected: Vec<u64> = (0..400).step_by(20).map(|turn| turn + place).collect();
+        // From where the column is trusted.
+        assert_eq!(came[2..], expected[2..], "{every}");
+    }
 }
 
 /// The first sample is taken for one that follows a sample at phase zero: the first block begins in the middle of its
