@@ -55,10 +55,12 @@ impl<T: Words, const N: usize> Words for [T; N] {
 }
 
 /// Bytes of a block.
-const BLOCK: usize = 24;
+#[cfg(target_pointer_width = "32")]
+const BLOCK: usize = 20;
 
 /// Whether a field ends a block of words that are compared without a branch. A block fits into the registers of a
-/// 32-bit core, which then loads two words and more at once.
+/// 32-bit core, which then loads two words and more at once. A wider one has no blocks, and compares four words at once.
+#[cfg(target_pointer_width = "32")]
 pub(crate) const fn ends_block(offset: usize, size: usize) -> bool {
     offset / BLOCK != offset.saturating_add(size) / BLOCK
 }
@@ -89,6 +91,7 @@ macro_rules! words {
                 let mut all = u32::MAX;
                 $(
                     all &= $crate::redundant::Words::agreement(&self.$field, &other.$field);
+                    #[cfg(target_pointer_width = "32")]
                     if $crate::redundant::ends_block(core::mem::offset_of!(Self, $field), size_of::<$type>())
                         && all != u32::MAX
                     {
