@@ -348,8 +348,7 @@ impl Ecu {
 #[inline(always)]
 fn has_test_come(is_due: &mut bool, steps: u32, inputs: &Inputs) -> bool {
     let place = steps % SELF_TEST;
-    *is_due |= place == 1;
-    if !*is_due {
+    if place != 1 && !*is_due {
         return false;
     }
     let is_busy = matches!(inputs.column, Input::New(_)) || steps % TURN == TURN / 2;

@@ -204,10 +204,12 @@ impl Monitor {
         } else {
             driver.saturating_neg()
         };
-        let shrink = opposing
-            .saturating_sub(OVERRIDE_FROM_MNM)
-            .max(0)
-            .saturating_mul(OVERRIDE_SLOPE);
+        let beyond = opposing.saturating_sub(OVERRIDE_FROM_MNM);
+        // The usual case first: nobody opposes.
+        if beyond <= 0 {
+            return self.limit_mnm.max(0);
+        }
+        let shrink = beyond.saturating_mul(OVERRIDE_SLOPE);
         self.limit_mnm.saturating_sub(shrink).max(0)
     }
 
@@ -235,10 +237,11 @@ impl Monitor {
             return false;
         }
         // What an old sample has become since, at most: the errors went on at their rates.
-        let late_ms = state.now.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
-        let position = if late_ms == 0 {
+        let late_us = state.now.age_us.saturating_sub(PROMPT_LANE_US);
+        let position = if late_us < 1000 {
             state.picture.position_mnm
         } else {
+            let late_ms = late_us / 1000;
             let [per_m, per_rad, ..] = self.gains_mnm;
             let (e_y_mmps, e_theta_urps) = state.rates();
             let carried = per_m
