@@ -33,11 +33,12 @@ impl Image {
     }
 }
 
-/// The command that builds `bin` of the firmware in release mode.
+/// The command that builds `bin` of the firmware as it is shipped.
 pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command {
     let mut command = cargo();
     command
-        .args(["build", "--release", "-p", "haptic-firmware", "--bin", bin])
+        .args(["build", "--profile", "firmware"])
+        .args(["-p", "haptic-firmware", "--bin", bin])
         .args(["--target", target, "--features", features])
         .arg("--message-format=json-render-diagnostics");
     command

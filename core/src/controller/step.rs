@@ -426,7 +426,9 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(Changed::LAW);
                 self.config.law.take(&mut v.law, sample);
             }
-            self.config.law.asked(&v.law, self.now, self.since(v, sample).as_ref())
+            self.config
+                .law
+                .asked(&v.law, self.now, self.since(v, sample).as_ref())
         });
         let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
