@@ -385,6 +385,7 @@ fn sample(column: &Input<Column>, now: Instant, applied: Torque) -> Option<Sampl
 
 /// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are damaged
 /// refuses everything.
+#[inline(never)]
 fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injection: &I) -> bool {
     monitor.is_none_or(|monitor| {
         let (mut state, guidance) = monitor.self_test_vector(turn);

@@ -56,7 +56,7 @@ impl<T: Words, const N: usize> Words for [T; N] {
 
 /// Bytes of a block.
 #[cfg(target_pointer_width = "32")]
-const BLOCK: usize = 20;
+const BLOCK: usize = 16;
 
 /// Whether a field ends a block of words that are compared without a branch. A block fits into the registers of a
 /// 32-bit core, which then loads two words and more at once. A wider one has no blocks, and compares four words at once.
