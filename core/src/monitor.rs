@@ -233,6 +233,7 @@ impl Monitor {
         state.picture.rate_mnm = asked(per_mps, e_y_mmps, per_radps, e_theta_urps);
     }
 
+    #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
         if state.now.age_us > OLDEST_LANE_US && torque != 0 {
             return false;
@@ -302,6 +303,7 @@ impl Monitor {
 
 impl MonitorState {
     /// Takes what came; `true` for a new lane sample.
+    #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
         self.now.age_us = self.now.age_us.saturating_add(elapsed_us);
         if let Some(bytes) = evidence.lane {

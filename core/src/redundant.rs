@@ -106,10 +106,11 @@ macro_rules! words {
 pub(crate) use words;
 
 /// Whether two values are whole. A function of its own: else the words loaded here stay in use behind it, and most of
-/// them on the stack. The black box as in [`Redundant::get`], and for a compiler that sees the whole image: where the
-/// values are far from the start of what holds them, it could load no two words at once.
+/// them on the stack. The black box is for a compiler that sees a whole image and knows where the values lie: far from
+/// the start of what holds them, it would load no two words at once.
 #[inline(never)]
 pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
+    #[cfg(target_pointer_width = "32")]
     let (a, b) = (black_box(a), black_box(b));
     a.agrees() && b.agrees()
 }
