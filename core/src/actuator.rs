@@ -71,8 +71,17 @@ impl Actuator {
         let before = core::mem::replace(place, commanded);
         self.oldest = self.oldest.wrapping_add(1);
         let (low, high) = (commanded.min(before), commanded.max(before));
-        self.high = high.max(lagging(self.high, high));
-        self.low = low.min(lagging(self.low, low));
+        // An end moves out at once, and back with a lag.
+        self.high = if self.high > high {
+            high.max(lagging(self.high, high))
+        } else {
+            high
+        };
+        self.low = if self.low < low {
+            low.min(lagging(self.low, low))
+        } else {
+            low
+        };
         if self.fresh > 0 {
             self.fresh = self.fresh.saturating_sub(1);
             // The usual case first: within the band, whatever the errors may be.

@@ -43,7 +43,9 @@ impl Background {
 
     /// Takes what a step saw: the column's sample, if it was new, and the probe, if there is one.
     pub(crate) fn take(&mut self, sample: Option<Sample>, probe: Option<Torque>) {
-        self.samples = [sample, self.samples[0]];
+        let [new, before] = &mut self.samples;
+        *before = *new;
+        *new = sample;
         self.probe = probe;
     }
 

@@ -177,7 +177,7 @@ impl Law {
         if !state.knows(&sample) {
             self.take(state, sample);
         }
-        self.asked(state, now, since)
+        self.asked(state, now, Some(since))
     }
 
     /// Takes a sample: the rates of the errors.
@@ -198,12 +198,12 @@ impl Law {
     }
 
     /// The torque now, from the sample taken last.
-    pub(crate) fn asked(&self, state: &LawState, now: Instant, since: &Since) -> Torque {
+    pub(crate) fn asked(&self, state: &LawState, now: Instant, since: Option<&Since>) -> Torque {
         let age = now.since(state.last.at);
-        if *since == Since::NOTHING {
-            return self.torque(state, age);
+        match since {
+            None => self.torque(state, age),
+            Some(since) => self.torque(&state.moved_on(age, since), age),
         }
-        self.torque(&state.moved_on(age, since), age)
     }
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two

@@ -149,6 +149,7 @@ impl Monitor {
     /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
     /// `false` it is never renewed.
     #[must_use]
+    #[inline(always)]
     pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
@@ -204,10 +205,12 @@ impl Monitor {
         } else {
             driver.saturating_neg()
         };
-        let shrink = opposing
-            .saturating_sub(OVERRIDE_FROM_MNM)
-            .max(0)
-            .saturating_mul(OVERRIDE_SLOPE);
+        let beyond = opposing.saturating_sub(OVERRIDE_FROM_MNM);
+        // The usual case first: nobody opposes.
+        if beyond <= 0 {
+            return self.limit_mnm.max(0);
+        }
+        let shrink = beyond.saturating_mul(OVERRIDE_SLOPE);
         self.limit_mnm.saturating_sub(shrink).max(0)
     }
 
@@ -230,15 +233,17 @@ impl Monitor {
         state.picture.rate_mnm = asked(per_mps, e_y_mmps, per_radps, e_theta_urps);
     }
 
+    #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
         if state.now.age_us > OLDEST_LANE_US && torque != 0 {
             return false;
         }
         // What an old sample has become since, at most: the errors went on at their rates.
-        let late_ms = state.now.age_us.saturating_sub(PROMPT_LANE_US).max(0) / 1000;
-        let position = if late_ms == 0 {
+        let late_us = state.now.age_us.saturating_sub(PROMPT_LANE_US);
+        let position = if late_us < 1000 {
             state.picture.position_mnm
         } else {
+            let late_ms = late_us / 1000;
             let [per_m, per_rad, ..] = self.gains_mnm;
             let (e_y_mmps, e_theta_urps) = state.rates();
             let carried = per_m
@@ -298,6 +303,7 @@ impl Monitor {
 
 impl MonitorState {
     /// Takes what came; `true` for a new lane sample.
+    #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
         self.now.age_us = self.now.age_us.saturating_add(elapsed_us);
         if let Some(bytes) = evidence.lane {

@@ -290,8 +290,9 @@ impl Plausibility {
     }
 
     /// Takes driver torque, wheel angle and the guidance torque applied; `false` when they cannot belong
-    /// together.
+    /// together. A function of its own, so that its many words do not push a step's out of the registers.
     #[must_use]
+    #[inline(never)]
     pub fn column(
         &self,
         state: &mut PlausibilityState,
@@ -358,8 +359,10 @@ impl Plausibility {
         above <= 0 || per_second_times(above, dt) <= along >> INERTIA_SHIFT
     }
 
-    /// Takes a new lane sample that came now; `false` when its error did not move as it must have.
+    /// Takes a new lane sample that came now; `false` when its error did not move as it must have. Apart, as
+    /// [`Self::column`].
     #[must_use]
+    #[inline(never)]
     pub fn lane(
         &self,
         state: &mut PlausibilityState,

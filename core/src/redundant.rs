@@ -55,10 +55,12 @@ impl<T: Words, const N: usize> Words for [T; N] {
 }
 
 /// Bytes of a block.
-const BLOCK: usize = 24;
+#[cfg(target_pointer_width = "32")]
+const BLOCK: usize = 16;
 
 /// Whether a field ends a block of words that are compared without a branch. A block fits into the registers of a
-/// 32-bit core, which then loads two words and more at once.
+/// 32-bit core, which then loads two words and more at once. A wider one has no blocks, and compares four words at once.
+#[cfg(target_pointer_width = "32")]
 pub(crate) const fn ends_block(offset: usize, size: usize) -> bool {
     offset / BLOCK != offset.saturating_add(size) / BLOCK
 }
@@ -89,6 +91,7 @@ macro_rules! words {
                 let mut all = u32::MAX;
                 $(
                     all &= $crate::redundant::Words::agreement(&self.$field, &other.$field);
+                    #[cfg(target_pointer_width = "32")]
                     if $crate::redundant::ends_block(core::mem::offset_of!(Self, $field), size_of::<$type>())
                         && all != u32::MAX
                     {
@@ -103,9 +106,12 @@ macro_rules! words {
 pub(crate) use words;
 
 /// Whether two values are whole. A function of its own: else the words loaded here stay in use behind it, and most of
-/// them on the stack.
+/// them on the stack. The black box is for a compiler that sees a whole image and knows where the values lie: far from
+/// the start of what holds them, it would load no two words at once.
 #[inline(never)]
 pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
+    #[cfg(target_pointer_width = "32")]
+    let (a, b) = (black_box(a), black_box(b));
     a.agrees() && b.agrees()
 }
 

@@ -122,7 +122,8 @@ pub(crate) fn image(board: &str, bin: &str) -> PathBuf {
     };
     let output = Command::new(cargo)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(["build", "--release", "-p", "haptic-firmware", "--bin", bin])
+        .args(["build", "--profile", "firmware"])
+        .args(["-p", "haptic-firmware", "--bin", bin])
         .args(["--target", "thumbv7em-none-eabihf", "--features", &features])
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::inherit())

@@ -33,11 +33,19 @@ impl Image {
     }
 }
 
-/// The command that builds `bin` of the firmware in release mode.
+/// The command that builds `bin` of the firmware as it is shipped. Where the sensors are wired to the board, by the
+/// profile without fat LTO: with it the vendor's driver of the converters keeps a panic on the torque path, which
+/// nothing reaches.
 pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command {
+    let profile = if features.split(',').any(|feature| feature.ends_with("-sensors")) {
+        "release"
+    } else {
+        "firmware"
+    };
     let mut command = cargo();
     command
-        .args(["build", "--release", "-p", "haptic-firmware", "--bin", bin])
+        .args(["build", "--profile", profile])
+        .args(["-p", "haptic-firmware", "--bin", bin])
         .args(["--target", target, "--features", features])
         .arg("--message-format=json-render-diagnostics");
     command

@@ -245,11 +245,11 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// How its motion since then differs from going on as it did.
-    fn since(&self, v: &Memory, sample: LaneSample) -> Since {
+    /// How its motion since then differs from going on as it did, if that was so.
+    fn since(&self, v: &Memory, sample: LaneSample) -> Option<Since> {
         let age = self.now.since(sample.at);
         if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
-            return Since::NOTHING;
+            return None;
         }
         let went_on = per_second(v.hot.rate_then.bits(), age);
         let turned = i64::from(v.hot.turned.bits()).saturating_sub(i64::from(went_on));
@@ -257,12 +257,12 @@ impl<I: Injection> Step<'_, I> {
             i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.hot.rate_then.bits()));
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.bits(), speed.bits());
-        Since::new(
+        Some(Since::new(
             Radians::from_wide(turned),
             TurningRate::from_wide(faster),
             speed,
             Metres::from_wide(near),
-        )
+        ))
     }
 
     /// Whether both speeds reach the slowest that is guided, if they are known.
@@ -426,7 +426,9 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(Changed::LAW);
                 self.config.law.take(&mut v.law, sample);
             }
-            self.config.law.asked(&v.law, self.now, &self.since(v, sample))
+            self.config
+                .law
+                .asked(&v.law, self.now, self.since(v, sample).as_ref())
         });
         let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.

@@ -16,6 +16,10 @@ pub(crate) const fn product(a: i32, b: i32) -> i64 {
 /// 32-bit core.
 pub(crate) const fn wide_product(wide: i64, factor: i32) -> i64 {
     let factor = factor as i64;
+    // The usual case first.
+    if wide as i32 as i64 == wide {
+        return wide.wrapping_mul(factor);
+    }
     // Nothing wraps: 32 bits times 31, then 31 times 31 and as much as 31 more.
     let low = (wide as u32 as i64).wrapping_mul(factor);
     let high = (wide >> 32).wrapping_mul(factor).wrapping_add(low >> 32);
@@ -32,7 +36,12 @@ pub(crate) const fn wide_product(wide: i64, factor: i32) -> i64 {
 /// multiplier, 8e-6 of relative error.
 #[inline(always)]
 pub(crate) const fn per_second_times(bits: i64, span: Micros) -> i64 {
-    wide_per_second(bits, span) as i64
+    // The usual case first.
+    if bits as i32 as i64 == bits {
+        per_second(bits as i32, span) as i64
+    } else {
+        wide_per_second(bits, span) as i64
+    }
 }
 
 const fn wide_per_second(bits: i64, span: Micros) -> i32 {

@@ -55,7 +55,8 @@ fn build_locked(root: &Path, machine: Machine) -> Result<PathBuf, PilError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(&cargo)
         .current_dir(root)
-        .args(["build", "--release", "-p", "haptic-firmware", "--bin", "lockstep"])
+        .args(["build", "--profile", "firmware"])
+        .args(["-p", "haptic-firmware", "--bin", "lockstep"])
         .args(["--target", TARGET, "--features", machine.name()])
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::piped())

@@ -177,7 +177,7 @@ const fn narrow(word: u64, start: u32, bits: u32) -> i32 {
 
 /// Whether a field is within +-`max`.
 fn is_within(raw: i32, max: i64) -> bool {
-    i64::from(raw.unsigned_abs()) <= max
+    (max.wrapping_neg()..=max).contains(&i64::from(raw))
 }
 
 /// A field as a count of 2^-24, exact; it has room, for its range has.
