@@ -6,8 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
+use super::sums::Rows;
 use super::{
-    COMPARED, CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
+    COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
     T_NMS_SD_S, T_P,
 };
 use crate::identify::diagnostics;
@@ -57,8 +58,9 @@ impl Problem<'_> {
         hessian: &DMatrix<f64>,
         free: &[usize],
         profile: &[[f64; 2]],
+        rows: &Rows,
     ) {
-        let scattered = self.scattered(p, hessian, free);
+        let scattered = self.scattered(rows, hessian, free);
         let mut wider: Vec<f64> = (0..errors.nrows())
             .map(|i| {
                 let (usual, other) = (errors[(i, i)], scattered[(i, i)]);
@@ -250,7 +252,7 @@ impl Problem<'_> {
         for i in (0..=T_P).chain([K_NMS, T_NMS, H_LATE, D_LATE]) {
             bounds[i] = Bounds::new(point[i], point[i]);
         }
-        let nothing = minimise(&point, &bounds, COMPARED, |p| self.sums::<CORE>(p));
+        let nothing = minimise(&point, &bounds, COMPARED, |p| self.core_sums(p));
         let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
         let gain =
             2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
