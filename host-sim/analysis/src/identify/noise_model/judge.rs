@@ -9,11 +9,11 @@ use super::evidence::Alternative;
 use super::sums::Rows;
 use super::{
     COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
-    T_NMS_SD_S, T_P,
+    T_NMS_SD_S, T_P, VARIATION_WIDTHS,
 };
 use crate::identify::diagnostics;
 use crate::identify::options::Options;
-use crate::identify::result::{AtTNms, Identification, STANDARD_NORMAL_95};
+use crate::identify::result::{AtTNms, Identification, Parameter, STANDARD_NORMAL_95};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict::{self, Refutation};
 
@@ -222,20 +222,18 @@ impl Problem<'_> {
         drawn
     }
 
-    /// The 95 % intervals if t_nms is what is assumed, from the standard errors that hold then.
+    /// The 95 % intervals if t_nms is what is assumed, from the standard errors that hold then; at a bound by the likelihood
+    /// ratio, as the wider ones.
     pub(super) fn at_t_nms(&self, p: &[f64], errors: &DMatrix<f64>, pull: &DVector<f64>) -> AtTNms {
         let interval = |i: usize| {
-            let margin = STANDARD_NORMAL_95 * errors[(i, i)].sqrt();
-            let middle = p[i] + pull[i];
-            let ends = [(middle - margin).min(p[i]), (middle + margin).max(p[i])];
-            let Bounds { low, high } = self.bounds[i];
-            ends.map(|x| x.clamp(low, high))
+            let (bounds, width) = (self.bounds[i], VARIATION_WIDTHS[i]);
+            Parameter::estimated(p[i], pull[i], errors[(i, i)], 0.0, bounds, width).interval_95
         };
         AtTNms {
             t_nms_s: p[T_NMS],
             intervals_95: (0..=T_P)
-                .filter(|&i| self.is_free(i) && errors[(i, i)].is_finite())
-                .filter_map(|i| Some((NAMES[i]?, interval(i))))
+                .filter(|&i| self.is_free(i))
+                .filter_map(|i| Some((NAMES[i]?, interval(i)?)))
                 .collect(),
         }
     }
@@ -271,6 +269,8 @@ impl Problem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::log::DriveLog;
+    use crate::identify::prepare::prepare;
 
     /// A parabola of standard error 0.05 about 0.2 passes 3.841 at 0.2 -+ 1.96 * 0.05, whatever the points; cut off at 0.15, it
     /// ends there.
@@ -286,5 +286,34 @@ mod tests {
             "{low} {high}"
         );
         assert_eq!(within_95(&points(0.15)).unwrap()[0], 0.15);
+    }
+
+    /// t_p on its bound 0, where the likelihood would have its top at -0.15 s with a standard error of 0.05 s: 95 % is where the
+    /// deviance above that of the bound is 1.96^2, at -0.15 + sqrt(0.15^2 + (1.96 * 0.05)^2) = 0.02917. What is 1.96
+    /// standard errors from the top would be no more than the bound itself.
+    #[test]
+    fn the_interval_at_t_nms_reaches_from_a_bound_by_the_likelihood_ratio() {
+        let none = vec![0.0; 2400];
+        let log = DriveLog {
+            start_s: 0.0,
+            dt_s: 1.0 / 120.0,
+            e_y_m: none.clone(),
+            e_theta_rad: none.clone(),
+            wheel_angle_rad: none.clone(),
+            guidance_torque_nm: none.clone(),
+            driver_torque_nm: none,
+            resampling: Vec::new(),
+            findings: Vec::new(),
+        };
+        let options = Options::default();
+        let prepared = prepare(&log, &options);
+        let problem = Problem::new(&prepared, &options);
+        let mut errors = DMatrix::zeros(problem.size(), problem.size());
+        errors[(T_P, T_P)] = 0.05 * 0.05;
+        let mut pull = DVector::zeros(problem.size());
+        pull[T_P] = -0.15;
+        let at = problem.at_t_nms(&vec![0.0; problem.size()], &errors, &pull);
+        let (_, [low, high]) = at.intervals_95.iter().find(|i| i.0 == "t_p").unwrap();
+        assert!(*low == 0.0 && (high - 0.02917).abs() < 1e-4, "{low} {high}");
     }
 }
