@@ -150,6 +150,10 @@ impl Problem<'_> {
                 });
             }
         }
+        if refuted.iter().any(|r| r.assumption == verdict::SIGNS) {
+            // All else that is wrong follows from it.
+            refuted.retain(|r| r.assumption == verdict::SIGNS);
+        }
         if !refuted.is_empty() {
             found.parameters.take_back();
         }

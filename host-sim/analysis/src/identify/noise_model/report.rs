@@ -326,7 +326,14 @@ impl Problem<'_> {
                 .map(|(y, d)| y - d)
                 .collect::<Vec<f64>>()
         };
+        let mut is_used = vec![false; log.len()];
+        for stretch in &self.stretches {
+            is_used[stretch.clone()].fill(true);
+        }
+        let unused = || (0..log.len()).filter(|&k| !is_used[k]);
         let traces = Traces {
+            unused_s: unused().map(|k| log.time_s(k)).collect(),
+            unused_nm: unused().map(|k| log.driver_torque_nm[k]).collect(),
             time_s: self
                 .stretches
                 .iter()
