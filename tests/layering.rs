@@ -325,7 +325,6 @@ const LONGER: &[(&str, &str)] = &[
     ("firmware/src/reset.rs", "the record that crosses a reset, with what writes, reads and repairs it"),
     ("host-sim/analysis/src/identify/bus_trace/mod.rs", "one reader, from the trace's text to a log"),
     ("host-sim/analysis/src/identify/log/mod.rs", "every refusal of a log beside the others"),
-    ("host-sim/analysis/src/identify/noise_model/mod.rs", "one model: its states, their sensitivities, their tests"),
     ("host-sim/analysis/src/identify/noise_model/report.rs", "everything that a fit is reported by"),
     ("host-sim/analysis/src/identify/options.rs", "one document: the options and their ranges"),
     ("host-sim/analysis/src/identify/paper.rs", "one published method, as it stands in the paper"),

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::log::DriveLog;
 use super::signals::SWITCH_RATE_NM_S;
+use super::wide::{add_times, dot};
 
 /// Time constant of each stage of the low-pass, s.
 const STAGE_S: f64 = 0.06;
@@ -125,23 +126,29 @@ pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) 
     }
     let held = held(&log.guidance_torque_nm, dt);
     let phi = pass(&log.wheel_angle_rad, dt, 0.0);
-    let mut columns = vec![phi.acceleration.clone(), phi.rate.clone(), phi.value.clone()];
-    columns.extend(VEHICLE_LAGS_S.map(|t| lagged(&phi.value, dt, t)));
-    let stiff = 2..columns.len();
-    columns.push(vec![1.0; log.len()]);
-    let first_of_torques = columns.len();
+    let mut columns = Columns::default();
+    for column in [&phi.acceleration, &phi.rate, &phi.value] {
+        columns.push(column, &rows);
+    }
+    for t in VEHICLE_LAGS_S {
+        columns.push(&lagged(&phi.value, dt, t), &rows);
+    }
+    let stiff = 2..columns.scale.len();
+    columns.push(&vec![1.0; log.len()], &rows);
+    let first_of_torques = columns.scale.len();
     let (mut driver_late, mut guidance_late) = (0.0_f64, 0.0_f64);
     let mut found = None;
     for _ in 0..ROUNDS {
         let driver = pass(&log.driver_torque_nm, dt, driver_late);
         columns.truncate(first_of_torques);
-        columns.push(driver.rate);
+        columns.push(&driver.rate, &rows);
         if guided {
             let guidance = pass(&held, dt, guidance_late);
-            columns.push(guidance.value);
-            columns.push(guidance.rate);
+            columns.push(&guidance.value, &rows);
+            columns.push(&guidance.rate, &rows);
         }
-        let fit = regress(&driver.value, &columns, &rows, (BLOCK_S / dt) as usize)?;
+        let torque: Vec<f64> = rows.iter().map(|&k| driver.value[k]).collect();
+        let fit = regress(&torque, &mut columns, (BLOCK_S / dt) as usize)?;
         let d = first_of_torques;
         let step = -fit.weights[d];
         driver_late += step.clamp(-0.03, 0.03);
@@ -189,52 +196,87 @@ struct Regression {
     explained: f64,
 }
 
-/// Least squares over `rows`, with errors from the sums over blocks of neighbours.
-fn regress(y: &[f64], columns: &[Vec<f64>], rows: &[usize], block: usize) -> Option<Regression> {
-    let m = columns.len();
-    let scale: Vec<f64> = columns
-        .iter()
-        .map(|c| rows.iter().map(|&k| c[k] * c[k]).sum::<f64>().sqrt().max(1e-300))
-        .collect();
-    let mut gram: DMatrix<f64> = DMatrix::zeros(m, m);
-    let mut right: DVector<f64> = DVector::zeros(m);
-    let mut x = vec![0.0; m];
-    for &k in rows {
-        for i in 0..m {
-            x[i] = columns[i][k] / scale[i];
-            right[i] += x[i] * y[k];
-            for j in 0..=i {
-                gram[(i, j)] += x[i] * x[j];
+/// Columns over the same rows, each of length one.
+#[derive(Default)]
+struct Columns {
+    scaled: Vec<Vec<f64>>,
+    scale: Vec<f64>,
+    /// Products of each with those before it and itself, for as many as they were asked for.
+    gram: Vec<Vec<f64>>,
+}
+
+/// Rows that stay near while all products of them are formed.
+const NEAR: usize = 256;
+
+impl Columns {
+    fn push(&mut self, u: &[f64], rows: &[usize]) {
+        let mut column: Vec<f64> = rows.iter().map(|&k| u[k]).collect();
+        let scale = dot(&column, &column).sqrt().max(1e-300);
+        column.iter_mut().for_each(|x| *x /= scale);
+        self.scaled.push(column);
+        self.scale.push(scale);
+    }
+
+    fn truncate(&mut self, count: usize) {
+        self.scaled.truncate(count);
+        self.scale.truncate(count);
+        self.gram.truncate(count);
+    }
+
+    /// All products of the columns, and those with `y`.
+    fn products(&mut self, y: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        let (m, known) = (self.scaled.len(), self.gram.len());
+        let mut with_y: DVector<f64> = DVector::zeros(m);
+        self.gram.extend((known..m).map(|i| vec![0.0; i + 1]));
+        for (number, y) in y.chunks(NEAR).enumerate() {
+            let here: Vec<&[f64]> = self
+                .scaled
+                .iter()
+                .map(|x| &x[number * NEAR..][..y.len()])
+                .collect();
+            for (sum, x) in with_y.iter_mut().zip(&here) {
+                *sum += dot(x, y);
+            }
+            for (i, sums) in self.gram.iter_mut().enumerate().skip(known) {
+                for (sum, x) in sums.iter_mut().zip(&here) {
+                    *sum += dot(x, here[i]);
+                }
             }
         }
+        let gram = |i: usize, j: usize| self.gram[i.max(j)][i.min(j)];
+        (DMatrix::from_fn(m, m, gram), with_y)
     }
+}
+
+/// Least squares of `y` on the columns, with errors from the sums over blocks of neighbours.
+fn regress(y: &[f64], columns: &mut Columns, block: usize) -> Option<Regression> {
+    let m = columns.scale.len();
+    let (mut gram, with_y) = columns.products(y);
     for i in 0..m {
         gram[(i, i)] += 1e-10;
-        for j in 0..i {
-            gram[(j, i)] = gram[(i, j)];
-        }
     }
     let inverse = gram.cholesky()?.inverse();
-    let scaled: DVector<f64> = &inverse * right;
-    let mean = rows.iter().map(|&k| y[k]).sum::<f64>() / rows.len() as f64;
-    let (mut left, mut spread) = (0.0, 0.0);
+    let weights: DVector<f64> = &inverse * with_y;
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    let spread: f64 = y.iter().map(|y| (y - mean).powi(2)).sum();
     let mut meat: DMatrix<f64> = DMatrix::zeros(m, m);
-    for chunk in rows.chunks(block.max(1)) {
-        let mut sum: DVector<f64> = DVector::zeros(m);
-        for &k in chunk {
-            let e = y[k] - (0..m).map(|i| columns[i][k] / scale[i] * scaled[i]).sum::<f64>();
-            left += e * e;
-            spread += (y[k] - mean).powi(2);
-            for i in 0..m {
-                sum[i] += columns[i][k] / scale[i] * e;
-            }
+    let (mut left, mut squares) = (Vec::new(), 0.0);
+    for (number, y) in y.chunks(block.max(1)).enumerate() {
+        let from = number * block.max(1);
+        left.clear();
+        left.extend_from_slice(y);
+        for (x, w) in columns.scaled.iter().zip(weights.iter()) {
+            add_times(&mut left, -w, &x[from..]);
         }
+        squares += dot(&left, &left);
+        let sum = DVector::from_fn(m, |i, _| dot(&columns.scaled[i][from..], &left));
         meat += &sum * sum.transpose();
     }
     let errors: DMatrix<f64> = &inverse * meat * &inverse;
+    let scale = &columns.scale;
     Some(Regression {
-        weights: DVector::from_fn(m, |i, _| scaled[i] / scale[i]),
+        weights: DVector::from_fn(m, |i, _| weights[i] / scale[i]),
         errors: DMatrix::from_fn(m, m, |i, j| errors[(i, j)] / (scale[i] * scale[j])),
-        explained: if spread > 0.0 { 1.0 - left / spread } else { 0.0 },
+        explained: if spread > 0.0 { 1.0 - squares / spread } else { 0.0 },
     })
 }

@@ -6,6 +6,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::result::{InputCorrelation, Whiteness};
+use super::wide::dot;
 
 /// Lags of the whiteness test.
 const LAGS: usize = 25;
@@ -32,15 +33,8 @@ pub fn fit_percent(measured: &[f64], model: impl Iterator<Item = f64>) -> f64 {
 
 /// Autocorrelation of `residual` at lags 1 to `lags`, about zero.
 pub fn autocorrelation(residual: &[f64], lags: usize) -> Vec<f64> {
-    let power: f64 = residual.iter().map(|e| e * e).sum();
-    let at = |lag: usize| {
-        residual
-            .iter()
-            .zip(&residual[lag..])
-            .map(|(a, b)| a * b)
-            .sum::<f64>()
-            / power
-    };
+    let power = dot(residual, residual);
+    let at = |lag: usize| dot(residual, &residual[lag..]) / power;
     (1..=lags.min(residual.len() / 4))
         .map(|lag| if power > 0.0 { at(lag) } else { 0.0 })
         .collect()
@@ -92,19 +86,20 @@ pub(crate) fn input_correlation(
     dt_s: f64,
 ) -> Vec<InputCorrelation> {
     let stride = ((INPUT_SPAN_S / dt_s) as usize / INPUT_LAGS).max(1);
-    let power: f64 = residual.iter().map(|e| e * e).sum();
+    let power = dot(residual, residual);
     inputs
         .iter()
         .map(|&(input, u)| {
             let mean = u.iter().sum::<f64>() / u.len() as f64;
-            let energy: f64 = u.iter().map(|x| (x - mean).powi(2)).sum();
+            let centred: Vec<f64> = u.iter().map(|x| x - mean).collect();
+            let energy = dot(&centred, &centred);
             let norm = (power * energy).sqrt();
             let mut largest_z: f64 = 0.0;
             for lag in (0..=INPUT_LAGS)
                 .map(|i| i * stride)
                 .filter(|&l| l < residual.len())
             {
-                let cross: f64 = residual[lag..].iter().zip(u).map(|(e, x)| e * (x - mean)).sum();
+                let cross = dot(&residual[lag..], &centred);
                 if norm > 0.0 {
                     let z = cross / norm * (residual.len() as f64).sqrt();
                     if z.abs() > largest_z.abs() {

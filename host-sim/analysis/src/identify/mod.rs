@@ -26,6 +26,7 @@ mod signals;
 mod together;
 mod tracking;
 mod verdict;
+mod wide;
 
 pub use balance::Balance;
 pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};

@@ -257,6 +257,7 @@ impl<'a> Problem<'a> {
                 measured_nm: measured.clone(),
                 simulated_nm: simulated,
                 residual_nm: residual,
+                ..Traces::default()
             },
         }
     }

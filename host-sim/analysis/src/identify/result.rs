@@ -294,7 +294,7 @@ pub struct Start {
     pub loss: f64,
 }
 
-/// Signals to plot: measured and explained torque over the rows used.
+/// Signals to plot: measured and explained torque over the rows used, and what was measured in the others.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Traces {
     /// Time, s.
@@ -306,6 +306,10 @@ pub struct Traces {
     /// Residuals that the loss is made of, N.m: prediction errors of the noise model, measured minus simulated
     /// of the paper's method.
     pub residual_nm: Vec<f64>,
+    /// Time of the rows that were not used, s.
+    pub unused_s: Vec<f64>,
+    /// Measured driver torque of those, N.m.
+    pub unused_nm: Vec<f64>,
 }
 
 /// Result of one identification.

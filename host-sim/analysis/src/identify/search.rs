@@ -101,8 +101,29 @@ pub(crate) fn minimise(
         .zip(bounds)
         .map(|(&p, b)| p.clamp(b.low, b.high))
         .collect();
-    let mut here = evaluate(&mut point);
-    let mut history = vec![here.loss];
+    let quadratic = evaluate(&mut point);
+    let began = Optimum {
+        history: vec![quadratic.loss],
+        point,
+        quadratic,
+        termination: Termination::IterationLimit,
+    };
+    resume(began, bounds, tolerance, evaluate)
+}
+
+/// Goes on from where a search ended, to another `tolerance`.
+pub(crate) fn resume(
+    from: Optimum,
+    bounds: &[Bounds],
+    tolerance: f64,
+    mut evaluate: impl FnMut(&mut [f64]) -> Quadratic,
+) -> Optimum {
+    let Optimum {
+        mut point,
+        quadratic: mut here,
+        mut history,
+        ..
+    } = from;
     let mut damping = 0.0;
     let mut termination = Termination::IterationLimit;
     for _ in 0..MAX_ITERATIONS {

@@ -17,6 +17,9 @@
 
 use super::log::DriveLog;
 
+/// Rows that are read at once.
+pub(crate) const BLOCK: usize = 64;
+
 /// The muscle of equation (8), taken as known (table 4).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Muscle {
@@ -204,12 +207,48 @@ impl Delay {
         (value, (value - input) * self.per_t_nms)
     }
 
+    /// [`Delay::read`] of the [`BLOCK`] of rows from `first` on; those behind the record mean nothing.
+    #[inline(always)]
+    pub(crate) fn read_block(
+        &self,
+        u: &Lagged,
+        first: usize,
+        value: &mut [f64; BLOCK],
+        slope: &mut [f64; BLOCK],
+    ) {
+        let j = first - self.samples;
+        let mut spare = [[0.0; BLOCK]; 3];
+        let [spare_0, spare_1, spare_2] = &mut spare;
+        let lagged = window(&u.lagged, j, spare_0);
+        let (u0, u1) = (window(&u.raw, j, spare_1), window(&u.raw, j + 1, spare_2));
+        for i in 0..BLOCK {
+            value[i] = self.weights.decay * lagged[i] + self.weights.w0 * u0[i] + self.weights.w1 * u1[i];
+            let input = u0[i] + self.fraction * (u1[i] - u0[i]);
+            slope[i] = (value[i] - input) * self.per_t_nms;
+        }
+    }
+
     /// `u(t_k - t_p)` itself and its derivative with respect to t_p.
     #[inline]
     pub(crate) fn read_raw(&self, u: &[f64], k: usize, dt_s: f64) -> (f64, f64) {
         let j = k - self.samples;
         let (u0, u1) = (u[j], u[(j + 1).min(u.len() - 1)]);
         (u0 + self.fraction * (u1 - u0), (u0 - u1) / dt_s)
+    }
+}
+
+/// [`BLOCK`] values of `u` from `from` on, level beyond its end; the `spare` ones where it ends before.
+#[inline(always)]
+pub(crate) fn window<'a>(u: &'a [f64], from: usize, spare: &'a mut [f64; BLOCK]) -> &'a [f64; BLOCK] {
+    let last = u.len() - 1;
+    match u[from.min(last)..].first_chunk() {
+        Some(values) => values,
+        None => {
+            for (i, x) in spare.iter_mut().enumerate() {
+                *x = u[(from + i).min(last)];
+            }
+            spare
+        }
     }
 }
 

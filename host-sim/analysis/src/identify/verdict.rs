@@ -41,6 +41,9 @@ const INDEPENDENT_ENOUGH: f64 = 7.0;
 /// Above this fit, %, what is left over is the error of interpolation, which is neither white nor independent.
 const ALL_BUT_PERFECT: f64 = 98.0;
 
+/// The assumption that a swapped sign refutes.
+pub(crate) const SIGNS: &str = "all torques and angles are positive to the left";
+
 /// What the balance of torques on the column refutes.
 #[expect(
     clippy::too_many_lines,
@@ -61,7 +64,7 @@ pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
     let negative = b.stiffness[0] < 0.0 && sure(b.stiffness[0], b.stiffness[1]);
     let mut sign = |cause: &str, cure: &str, what: String| {
         out.push(Refutation {
-            assumption: "all torques and angles are positive to the left",
+            assumption: SIGNS,
             evidence: evidence(what),
             cause: cause.to_owned(),
             cure: cure.to_owned(),

@@ -13,27 +13,34 @@ use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
 
-/// Highest value of the delay's profile that is drawn.
-const HIGHEST: f64 = 40.0;
+/// Highest value of the delay's profile that is drawn: so that the level of 95 %, 3.84, is seen well above the axis.
+const HIGHEST: f64 = 15.0;
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
 /// # Errors
 /// What could not be written or drawn.
 pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputError> {
-    let figures = [
-        ("torque", torque(&drive.results.identification)),
-        ("residuals", residuals(&drive.results.identification)),
-        ("autocorrelation", correlogram(&drive.results.identification)),
+    let found = &drive.results.identification;
+    let always = [
+        ("torque", torque(found)),
+        ("residuals", residuals(found)),
+        ("autocorrelation", correlogram(found)),
         ("over_time", over_time(drive)),
-        ("delay_profile", delay_profile(&drive.results.identification)),
-        ("intervals", intervals(&drive.results.identification)),
     ];
-    for (name, figure) in &figures {
+    let where_known = [
+        ("delay_profile", delay_profile(found)),
+        ("intervals", intervals(found)),
+    ];
+    let known = where_known
+        .iter()
+        .filter_map(|(name, f)| Some((name, f.as_ref()?)));
+    for (name, figure) in always.iter().map(|(name, f)| (name, f)).chain(known) {
         write_figure(directory, name, figure)?;
     }
     write_json(&directory.join("results.json"), &stamped(drive))?;
-    write_report(directory, &report(drive, figures.map(|f| f.1)))
+    let report = report(drive, always.map(|f| f.1), where_known.map(|f| f.1));
+    write_report(directory, &report)
 }
 
 /// The results as JSON holds them.
@@ -74,17 +81,23 @@ fn broken_line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
     line(label, style, &x, &y)
 }
 
-/// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %.
-fn delay_profile(found: &Identification) -> Figure {
+/// Minus twice the log likelihood over t_p, up to where it no longer matters, with the level of 95 %; none if t_p was given.
+fn delay_profile(found: &Identification) -> Option<Figure> {
     let profile = &found.delay_profile;
-    let (x, y): (Vec<f64>, Vec<f64>) = profile
-        .iter()
-        .map(|&[t_p, d]| (t_p, if d > HIGHEST { f64::NAN } else { d }))
-        .unzip();
-    let ends = [
-        x.first().copied().unwrap_or(0.0),
-        x.last().copied().unwrap_or(1.0),
-    ];
+    let mut x = Vec::new();
+    let mut y = Vec::new();
+    for (k, &[t_p, d]) in profile.iter().enumerate() {
+        // Where the line leaves the picture, and where it comes back.
+        if let Some([before, was]) = k.checked_sub(1).map(|k| profile[k])
+            && (was > HIGHEST) != (d > HIGHEST)
+        {
+            x.push(before + (t_p - before) * (HIGHEST - was) / (d - was));
+            y.push(HIGHEST);
+        }
+        x.push(t_p);
+        y.push(if d > HIGHEST { f64::NAN } else { d });
+    }
+    let ends = [*x.first()?, *x.last()?];
     let mut series = Vec::new();
     if let Some([low, high]) = found.parameters.t_p.interval_95 {
         series.push(Series::interval(
@@ -95,14 +108,15 @@ fn delay_profile(found: &Identification) -> Figure {
         ));
     }
     series.push(line("profile", 0, &x, &y));
-    series.push(line("95 %", 1, &ends, &[3.84, 3.84]));
+    series.push(line("level of 95 %", 1, &ends, &[3.84, 3.84]));
     let mut panel = panel("", "-2 log L above optimum", series);
     panel.y.limits = Some((0.0, HIGHEST));
-    over("t_p (s)", vec![panel])
+    Some(over("t_p (s)", vec![panel]))
 }
 
-/// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed.
-fn intervals(found: &Identification) -> Figure {
+/// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed; none if there
+/// are no intervals.
+fn intervals(found: &Identification) -> Option<Figure> {
     let list: Vec<_> = found
         .parameters
         .list()
@@ -112,6 +126,9 @@ fn intervals(found: &Identification) -> Figure {
             Some((name, at, p.interval_95?))
         })
         .collect();
+    if list.is_empty() {
+        return None;
+    }
     let (mut wide, mut narrow) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
     for (i, (name, at, interval)) in list.iter().enumerate() {
         let place = (i + 1) as f64;
@@ -140,11 +157,11 @@ fn intervals(found: &Identification) -> Figure {
             narrow.0,
         ));
     }
-    Figure {
+    Some(Figure {
         rows: list.iter().map(|l| l.0.to_owned()).collect(),
         panels: vec![panel("", "Share of the estimate", series)],
         ..Figure::default()
-    }
+    })
 }
 
 fn over(x: &str, panels: Vec<Panel>) -> Figure {
@@ -157,10 +174,14 @@ fn over(x: &str, panels: Vec<Panel>) -> Figure {
 
 fn torque(found: &Identification) -> Figure {
     let t = &found.traces;
-    let series = vec![
+    let mut series = vec![
         broken_line("measured", 0, &t.time_s, &t.measured_nm),
         broken_line("simulated", 3, &t.time_s, &t.simulated_nm),
     ];
+    // Whoever reads it can see for themselves whether it was right to leave it out.
+    if !left_out_bands(found).is_empty() {
+        series.push(broken_line("measured, left out", 4, &t.unused_s, &t.unused_nm));
+    }
     let mut figure = over("Time (s)", vec![panel("", "Driver torque (N.m)", series)]);
     figure.bands = left_out_bands(found);
     figure
@@ -242,15 +263,20 @@ fn figure(figure: Figure, caption: &str) -> Block {
 }
 
 /// What is known of the driver, and what it rests on.
-fn verdict_blocks(found: &Identification, delay_profile: Figure, intervals: Figure) -> Vec<Block> {
+fn verdict_blocks(
+    found: &Identification,
+    delay_profile: Option<Figure>,
+    intervals: Option<Figure>,
+) -> Vec<Block> {
     let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
     verdict.extend(verdicts(found).into_iter().map(Block::Text));
     verdict.push(Block::Table(parameters(found)));
-    verdict.push(figure(
+    let shown = |picture: Option<Figure>, caption: &str| picture.map(|f| figure(f, caption));
+    verdict.extend(shown(
         intervals,
         "The 95 % intervals, and what they would be if t_nms were what is assumed.",
     ));
-    verdict.push(figure(
+    verdict.extend(shown(
         delay_profile,
         "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
     ));
@@ -268,16 +294,10 @@ fn verdict_blocks(found: &Identification, delay_profile: Figure, intervals: Figu
     verdict
 }
 
-fn report(drive: &IdentifiedDrive, figures: [Figure; 6]) -> Report {
+fn report(drive: &IdentifiedDrive, always: [Figure; 4], where_known: [Option<Figure>; 2]) -> Report {
     let found = &drive.results.identification;
-    let [
-        torque,
-        residuals,
-        correlogram,
-        over_time,
-        delay_profile,
-        intervals,
-    ] = figures;
+    let [torque, residuals, correlogram, over_time] = always;
+    let [delay_profile, intervals] = where_known;
     let verdict = verdict_blocks(found, delay_profile, intervals);
     let mut sections: Vec<Section> = in_the_log(found)
         .map(|table| Section {

@@ -3,7 +3,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, LONGEST_DELAY_S, Problem, T_NMS, T_P};
+use super::delays::Delays;
+use super::sums::Rows;
+use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, Problem, T_NMS, T_P};
 use crate::identify::search::{Quadratic, covariance, step};
 
 /// Steps of the delay's profile over the whole range.
@@ -47,13 +49,12 @@ impl Problem<'_> {
         delays.extend((-4..=4).map(|i| (p[T_P] + 0.5 * f64::from(i) * error).clamp(0.0, LONGEST_DELAY_S)));
         delays.sort_by(f64::total_cmp);
         delays.dedup();
+        let along = Delays::new(self, p).at(&delays);
         delays
             .into_iter()
-            .map(|t_p| {
-                let mut point = p.to_vec();
-                point[T_P] = t_p;
-                let linear = self.sums::<LINEAR>(&point);
-                let d = step(&point, &self.bounds, &linear, 0.0);
+            .zip(along)
+            .map(|(t_p, linear)| {
+                let d = step(p, &self.bounds, &linear, 0.0);
                 let gain = -linear.gradient.dot(&d) - 0.5 * d.dot(&(&linear.hessian * &d));
                 [t_p, 2.0 * (linear.loss - gain - loss) / variance]
             })
@@ -62,39 +63,33 @@ impl Problem<'_> {
 
     /// Covariance of the estimate from the scatter of the scores over blocks of neighbouring rows, which holds
     /// where the prediction errors are not quite white or even; by `free` parameters.
-    pub(super) fn scattered(&self, p: &[f64], hessian: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
+    pub(super) fn scattered(&self, rows: &Rows, hessian: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
         let size = self.size();
         let block = (BLOCK_S / self.signals.dt_s) as usize;
         let bread = covariance(hessian, free);
         let mut meat = DMatrix::zeros(size, size);
-        let mut sum = DVector::zeros(size);
-        let mut count = 0;
-        let mut stretch = 0;
-        let mut close = |sum: &mut DVector<f64>, count: &mut usize| {
-            if *count > 0 {
-                meat += &*sum * sum.transpose();
+        let mut from = 0;
+        for (number, stretch) in self.stretches.iter().enumerate() {
+            let of = from..from + stretch.len();
+            from = of.end;
+            let blocks = rows.columns[of.clone()].chunks(block);
+            for (columns, errors) in blocks.zip(rows.errors[of].chunks(block)) {
+                let mut sum: DVector<f64> = DVector::zeros(size);
+                for (columns, error) in columns.iter().zip(errors) {
+                    for (i, x) in columns.iter().enumerate() {
+                        sum[i] += error * x;
+                    }
+                    sum[COUNT + number] += error * rows.by_constant;
+                }
+                meat += &sum * sum.transpose();
             }
-            sum.fill(0.0);
-            *count = 0;
-        };
-        self.errors::<CORE>(p, |row| {
-            if count == block || row.stretch != stretch {
-                close(&mut sum, &mut count);
-                stretch = row.stretch;
-            }
-            for i in 0..CORE {
-                sum[i] += row.error * row.slopes[i];
-            }
-            sum[COUNT + row.stretch] += row.error * row.by_offset;
-            count += 1;
-        });
-        close(&mut sum, &mut count);
+        }
         &bread * meat * &bread
     }
 
     /// What freeing each assumption would do: a score test of each, with the `free` parameters following.
     pub(super) fn alternatives(&self, p: &[f64], free: &[usize], variance: f64) -> Vec<Alternative> {
-        let full = self.sums::<COUNT>(p);
+        let full = self.all_sums(p);
         [K_NMS, T_NMS, H_LATE, D_LATE]
             .into_iter()
             .filter(|&x| !(self.is_free(x) || x == H_LATE && p[K_HG] == 0.0))

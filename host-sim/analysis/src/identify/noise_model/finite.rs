@@ -16,29 +16,33 @@
 //!
 //! Regressors are averaged over [`BLOCK_S`]: a driver's error does nothing faster to them.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use super::sums::Rows;
 use super::{CORE, K_HG, Problem, RHO, T_P};
+use crate::identify::wide::{add_times, dot, dots_of_sum};
 
 /// Rows are averaged over so long, s.
 const BLOCK_S: f64 = 0.1;
 /// Longest time after which an error of the driver's is still seen in what the driver sees, s.
 const REMEMBERED_S: f64 = 20.0;
 /// What the errors may move.
-const PLACES: [usize; MOST] = [0, 1, 2, K_HG, T_P, RHO];
-const MOST: usize = 6;
+const PLACES: [usize; 6] = [0, 1, 2, K_HG, T_P, RHO];
 
 /// Means of regressors and errors over blocks of rows of one stretch.
 #[derive(Debug, Clone, Default)]
 struct Blocks {
-    regressors: Vec<[f64; MOST]>,
+    /// By regressor.
+    regressors: Vec<Vec<f64>>,
     errors: Vec<f64>,
 }
 
 impl Problem<'_> {
     /// By how much the estimates are too high in the mean of records like this one; `inverse` is that of H over what is
     /// estimated.
-    pub(super) fn bias(&self, p: &[f64], inverse: &DMatrix<f64>) -> DVector<f64> {
+    pub(super) fn bias(&self, kept: &Rows, inverse: &DMatrix<f64>) -> DVector<f64> {
         let mut bias = DVector::zeros(self.size());
         let estimated = |i: &usize| inverse[(*i, *i)] > 0.0 && inverse[(*i, *i)].is_finite();
         let places: Vec<usize> = PLACES.into_iter().filter(estimated).collect();
@@ -48,7 +52,7 @@ impl Problem<'_> {
         };
         let rows = ((BLOCK_S / self.signals.dt_s).round() as usize).max(1);
         let lags = (REMEMBERED_S / (rows as f64 * self.signals.dt_s)) as usize;
-        let by_place = mean_miss(self.blocks(p, &places, rows), &root.l(), rows, lags);
+        let by_place = mean_miss(self.blocks(kept, &places, rows), &root.l(), rows, lags);
         for (&i, &b) in places.iter().zip(&by_place) {
             bias[i] = b;
         }
@@ -56,29 +60,28 @@ impl Problem<'_> {
     }
 
     /// The regressors at `places` and the errors, by stretch.
-    fn blocks(&self, p: &[f64], places: &[usize], rows: usize) -> Vec<Blocks> {
-        let mut out = vec![Blocks::default(); self.stretches.len()];
-        for (blocks, stretch) in out.iter_mut().zip(&self.stretches) {
-            blocks.regressors.resize(stretch.len() / rows, [0.0; MOST]);
-            blocks.errors.resize(stretch.len() / rows, 0.0);
-        }
-        let share = 1.0 / rows as f64;
-        let (mut stretch, mut row_in) = (usize::MAX, 0);
-        self.errors::<CORE>(p, |row| {
-            if stretch != row.stretch {
-                (stretch, row_in) = (row.stretch, 0);
+    fn blocks(&self, kept: &Rows, places: &[usize], rows: usize) -> Vec<Blocks> {
+        let mut from = 0;
+        let of_stretch = |stretch: &Range<usize>| {
+            let of = from..from + stretch.len();
+            from = of.end;
+            let (columns, errors) = (&kept.columns[of.clone()], &kept.errors[of]);
+            let share = 1.0 / rows as f64;
+            Blocks {
+                regressors: places
+                    .iter()
+                    .map(|&i| {
+                        let mean = |c: &[[f64; CORE]]| share * c.iter().map(|x| x[i]).sum::<f64>();
+                        columns.chunks_exact(rows).map(mean).collect()
+                    })
+                    .collect(),
+                errors: errors
+                    .chunks_exact(rows)
+                    .map(|e| share * e.iter().sum::<f64>())
+                    .collect(),
             }
-            let blocks = &mut out[stretch];
-            let block = row_in / rows;
-            row_in += 1;
-            if let Some(x) = blocks.regressors.get_mut(block) {
-                for (x, &i) in x.iter_mut().zip(places) {
-                    *x += share * row.slopes[i];
-                }
-                blocks.errors[block] += share * row.error;
-            }
-        });
-        out
+        };
+        self.stretches.iter().map(of_stretch).collect()
     }
 }
 
@@ -87,51 +90,49 @@ impl Problem<'_> {
 fn mean_miss(mut stretches: Vec<Blocks>, root: &DMatrix<f64>, rows: usize, lags: usize) -> Vec<f64> {
     let count = root.nrows();
     for s in &mut stretches {
-        without_constant(&mut s.regressors);
+        s.regressors.iter_mut().for_each(|x| without_constant(x));
         // Times the root, H is one.
-        for x in &mut s.regressors {
-            let raw = *x;
-            for j in 0..count {
-                x[j] = (j..count).map(|i| root[(i, j)] * raw[i]).sum();
+        let turned = |j: usize| {
+            let mut column = vec![0.0; s.errors.len()];
+            for (i, x) in s.regressors.iter().enumerate().skip(j) {
+                add_times(&mut column, root[(i, j)], x);
             }
-        }
+            column
+        };
+        s.regressors = (0..count).map(turned).collect();
     }
     let rows = rows as f64;
-    let mut miss = [0.0; MOST];
+    let mut miss: DVector<f64> = DVector::zeros(count);
     for lag in 0..lags {
-        let (mut answer, mut pairs, mut constants) = ([0.0; MOST], 0.0, 0.0);
-        let mut c = [[0.0; MOST]; MOST];
-        for s in stretches.iter().filter(|s| s.errors.len() > lag) {
-            let both = (s.errors.len() - lag) as f64;
-            pairs += both;
-            constants += both / s.errors.len() as f64;
-            for ((now, later), e) in s.regressors.iter().zip(&s.regressors[lag..]).zip(&s.errors) {
-                for (a, x) in answer.iter_mut().zip(later) {
-                    *a += e * x;
-                }
-                for (c, x) in c.iter_mut().zip(now) {
-                    for (c, y) in c.iter_mut().zip(later) {
-                        *c += x * y;
-                    }
-                }
+        let long_enough = || stretches.iter().filter(|s| s.errors.len() > lag);
+        let (mut pairs, mut trace) = (0.0, 0.0);
+        let mut answer: DVector<f64> = DVector::zeros(count);
+        for s in long_enough() {
+            let both = s.errors.len() - lag;
+            pairs += both as f64;
+            trace += both as f64 / s.errors.len() as f64;
+            for (a, x) in answer.iter_mut().zip(&s.regressors) {
+                *a += dot(&s.errors[..both], &x[lag..]);
+                trace += rows * dot(&x[..both], &x[lag..]);
             }
         }
-        let trace = constants + rows * (0..MOST).map(|i| c[i][i]).sum::<f64>();
-        for (j, (miss, a)) in miss.iter_mut().zip(&answer).enumerate() {
-            let through: f64 = rows * (0..MOST).map(|i| c[i][j] * answer[i]).sum::<f64>();
-            *miss -= rows * (a * trace + through) / pairs.max(1.0);
+        miss -= &answer * (rows * trace / pairs.max(1.0));
+        // C_k' times the answer, without C_k: each row's product with the answer, and that with the later rows.
+        for s in long_enough() {
+            let now: Vec<&[f64]> = s.regressors.iter().map(|x| &x[..x.len() - lag]).collect();
+            let later: Vec<&[f64]> = s.regressors.iter().map(|x| &x[lag..]).collect();
+            let through = dots_of_sum(answer.as_slice(), &now, &later);
+            for (miss, t) in miss.iter_mut().zip(&through) {
+                *miss -= rows * rows * t / pairs.max(1.0);
+            }
         }
     }
-    (root * DVector::from_column_slice(&miss[..count]))
-        .as_slice()
-        .to_vec()
+    (root * miss).as_slice().to_vec()
 }
 
-fn without_constant(regressors: &mut [[f64; MOST]]) {
-    for i in 0..MOST {
-        let mean = regressors.iter().map(|x| x[i]).sum::<f64>() / regressors.len().max(1) as f64;
-        regressors.iter_mut().for_each(|x| x[i] -= mean);
-    }
+fn without_constant(x: &mut [f64]) {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    x.iter_mut().for_each(|x| *x -= mean);
 }
 
 #[cfg(test)]
@@ -156,19 +157,20 @@ mod tests {
         };
         let mut mean = 0.0;
         for _ in 0..records {
-            let mut blocks = Blocks::default();
+            let mut blocks = Blocks {
+                regressors: vec![Vec::new()],
+                ..Blocks::default()
+            };
             let mut x = normal() / (1.0_f64 - a * a).sqrt();
             for _ in 0..n {
                 let e = normal();
-                let mut row = [0.0; MOST];
-                row[0] = x;
-                blocks.regressors.push(row);
+                blocks.regressors[0].push(x);
                 blocks.errors.push(e);
                 x = a * x + e;
             }
-            let mut centred = blocks.regressors.clone();
+            let mut centred = blocks.regressors[0].clone();
             without_constant(&mut centred);
-            let h: f64 = centred.iter().map(|x| x[0] * x[0]).sum();
+            let h: f64 = centred.iter().map(|x| x * x).sum();
             let root = DMatrix::from_element(1, 1, 1.0 / h.sqrt());
             mean += mean_miss(vec![blocks], &root, 1, 25)[0] / f64::from(records);
         }

@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::{COUNT, D_LATE, K_HG, Problem, RHO, T_NMS, T_NMS_SD_S, T_P, THETA};
+use super::{COUNT, K_HG, Problem, RHO, T_NMS, T_NMS_SD_S, T_P, THETA};
 use crate::identify::log::DriveLog;
 use crate::identify::options::Options;
 use crate::identify::prepare::prepare;
@@ -58,7 +58,7 @@ pub fn information(log: &DriveLog, options: &Options, truth: &Truth) -> Informat
     (p[K_HG], p[T_P], p[RHO], p[THETA]) = (truth.k_hg, truth.t_p_s, rho, theta);
     (p[super::K_NMS], p[T_NMS]) = (options.muscle.k_nms, options.muscle.t_nms_s);
     problem.assume_muscle(&p);
-    let whole = problem.sums::<{ D_LATE + 1 }>(&p).hessian;
+    let whole = problem.all_sums(&p).hessian;
     let constants: Vec<usize> = (COUNT..problem.size()).collect();
     let inverse = covariance(&whole, &constants);
     let of = |i: usize, j: usize| {

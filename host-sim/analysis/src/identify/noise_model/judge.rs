@@ -6,13 +6,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Alternative;
+use super::sums::Rows;
 use super::{
-    COMPARED, CORE, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
-    T_NMS_SD_S, T_P,
+    COMPARED, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, SMALLEST_ERROR_NM, T_NMS, T_NMS_RANGE_S,
+    T_NMS_SD_S, T_P, VARIATION_WIDTHS,
 };
 use crate::identify::diagnostics;
 use crate::identify::options::Options;
-use crate::identify::result::{AtTNms, Identification, STANDARD_NORMAL_95};
+use crate::identify::result::{AtTNms, Identification, Parameter, STANDARD_NORMAL_95};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict::{self, Refutation};
 
@@ -57,8 +58,9 @@ impl Problem<'_> {
         hessian: &DMatrix<f64>,
         free: &[usize],
         profile: &[[f64; 2]],
+        rows: &Rows,
     ) {
-        let scattered = self.scattered(p, hessian, free);
+        let scattered = self.scattered(rows, hessian, free);
         let mut wider: Vec<f64> = (0..errors.nrows())
             .map(|i| {
                 let (usual, other) = (errors[(i, i)], scattered[(i, i)]);
@@ -148,6 +150,10 @@ impl Problem<'_> {
                 });
             }
         }
+        if refuted.iter().any(|r| r.assumption == verdict::SIGNS) {
+            // All else that is wrong follows from it.
+            refuted.retain(|r| r.assumption == verdict::SIGNS);
+        }
         if !refuted.is_empty() {
             found.parameters.take_back();
         }
@@ -220,20 +226,18 @@ impl Problem<'_> {
         drawn
     }
 
-    /// The 95 % intervals if t_nms is what is assumed, from the standard errors that hold then.
+    /// The 95 % intervals if t_nms is what is assumed, from the standard errors that hold then; at a bound by the likelihood
+    /// ratio, as the wider ones.
     pub(super) fn at_t_nms(&self, p: &[f64], errors: &DMatrix<f64>, pull: &DVector<f64>) -> AtTNms {
         let interval = |i: usize| {
-            let margin = STANDARD_NORMAL_95 * errors[(i, i)].sqrt();
-            let middle = p[i] + pull[i];
-            let ends = [(middle - margin).min(p[i]), (middle + margin).max(p[i])];
-            let Bounds { low, high } = self.bounds[i];
-            ends.map(|x| x.clamp(low, high))
+            let (bounds, width) = (self.bounds[i], VARIATION_WIDTHS[i]);
+            Parameter::estimated(p[i], pull[i], errors[(i, i)], 0.0, bounds, width).interval_95
         };
         AtTNms {
             t_nms_s: p[T_NMS],
             intervals_95: (0..=T_P)
-                .filter(|&i| self.is_free(i) && errors[(i, i)].is_finite())
-                .filter_map(|i| Some((NAMES[i]?, interval(i))))
+                .filter(|&i| self.is_free(i))
+                .filter_map(|i| Some((NAMES[i]?, interval(i)?)))
                 .collect(),
         }
     }
@@ -250,7 +254,7 @@ impl Problem<'_> {
         for i in (0..=T_P).chain([K_NMS, T_NMS, H_LATE, D_LATE]) {
             bounds[i] = Bounds::new(point[i], point[i]);
         }
-        let nothing = minimise(&point, &bounds, COMPARED, |p| self.sums::<CORE>(p));
+        let nothing = minimise(&point, &bounds, COMPARED, |p| self.core_sums(p));
         let variance = 2.0 * optimum.quadratic.loss / self.row_count().max(1) as f64;
         let gain =
             2.0 * (nothing.quadratic.loss - optimum.quadratic.loss) / variance.max(SMALLEST_ERROR_NM.powi(2));
@@ -269,6 +273,8 @@ impl Problem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::log::DriveLog;
+    use crate::identify::prepare::prepare;
 
     /// A parabola of standard error 0.05 about 0.2 passes 3.841 at 0.2 -+ 1.96 * 0.05, whatever the points; cut off at 0.15, it
     /// ends there.
@@ -284,5 +290,34 @@ mod tests {
             "{low} {high}"
         );
         assert_eq!(within_95(&points(0.15)).unwrap()[0], 0.15);
+    }
+
+    /// t_p on its bound 0, where the likelihood would have its top at -0.15 s with a standard error of 0.05 s: 95 % is where the
+    /// deviance above that of the bound is 1.96^2, at -0.15 + sqrt(0.15^2 + (1.96 * 0.05)^2) = 0.02917. What is 1.96
+    /// standard errors from the top would be no more than the bound itself.
+    #[test]
+    fn the_interval_at_t_nms_reaches_from_a_bound_by_the_likelihood_ratio() {
+        let none = vec![0.0; 2400];
+        let log = DriveLog {
+            start_s: 0.0,
+            dt_s: 1.0 / 120.0,
+            e_y_m: none.clone(),
+            e_theta_rad: none.clone(),
+            wheel_angle_rad: none.clone(),
+            guidance_torque_nm: none.clone(),
+            driver_torque_nm: none,
+            resampling: Vec::new(),
+            findings: Vec::new(),
+        };
+        let options = Options::default();
+        let prepared = prepare(&log, &options);
+        let problem = Problem::new(&prepared, &options);
+        let mut errors = DMatrix::zeros(problem.size(), problem.size());
+        errors[(T_P, T_P)] = 0.05 * 0.05;
+        let mut pull = DVector::zeros(problem.size());
+        pull[T_P] = -0.15;
+        let at = problem.at_t_nms(&vec![0.0; problem.size()], &errors, &pull);
+        let (_, [low, high]) = at.intervals_95.iter().find(|i| i.0 == "t_p").unwrap();
+        assert!(*low == 0.0 && (high - 0.02917).abs() < 1e-4, "{low} {high}");
     }
 }

@@ -15,27 +15,30 @@
 //! [`LONGEST_DELAY_S`] + 5 t_nms are not used: there the delayed inputs, or what the muscle still remembers of
 //! the time before them, are not in the record.
 //!
-//! The loss, its gradient and its Gauss-Newton matrix are summed in one pass over the rows, without storing a
+//! The loss, its gradient and its Gauss-Newton matrix are summed in one pass over the rows ([`sums`]), without storing a
 //! Jacobian; the gradient is exact. What is not here: reading logs, the search itself, and the verdict on where it
 //! ended ([`report`]).
 
+mod delays;
 mod evidence;
 mod finite;
 mod information;
 mod judge;
 mod report;
 mod restricted;
+mod rows;
+mod sums;
 
 use std::ops::Range;
 
+use delays::Delays;
 pub use information::{INFORMED, Information, Truth, information};
-use nalgebra::{DMatrix, DVector};
 
 use super::log::DriveLog;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
 use super::result::{Identification, Start};
-use super::search::{Bounds, Optimum, Quadratic, minimise, step};
+use super::search::{Bounds, Optimum, Quadratic, minimise, resume, step};
 use super::signals::{Muscle, Signals};
 
 /// Longest delay that is searched, s: twice table 4's, to hold the paper's inattentive driver (0.5 s).
@@ -150,14 +153,6 @@ struct Problem<'a> {
     corner_restricted: bool,
 }
 
-/// One row of the loss: the prediction error and its negative derivatives.
-struct Row<const N: usize> {
-    stretch: usize,
-    error: f64,
-    slopes: [f64; N],
-    by_offset: f64,
-}
-
 impl<'a> Problem<'a> {
     fn new(prepared: &'a Prepared, options: &Options) -> Self {
         let log = &prepared.log;
@@ -231,93 +226,6 @@ impl<'a> Problem<'a> {
         self.bounds.len()
     }
 
-    /// Hands each row's disturbance `n` and its negative derivatives (the regressors), in the order of the parameters,
-    /// to `visit`. Those of the disturbance are not of a row alone, and are left at zero.
-    #[inline]
-    fn rows<const N: usize>(&self, p: &[f64], mut visit: impl FnMut(usize, f64, [f64; N])) {
-        let s = &self.signals;
-        // T_d is recorded late: all that it answers to is as much longer ago.
-        let delay = s.delay((p[T_P] + p[D_LATE]).max(0.0));
-        let shifted = p[H_LATE] != 0.0 || p[D_LATE] != 0.0;
-        let decay = (-s.dt_s / s.t_nms_s).exp();
-        for (stretch, range) in self.stretches.iter().enumerate() {
-            let offset = p[COUNT + stretch];
-            let mut slow = None;
-            for k in range.clone() {
-                let (m1, d1) = delay.read(&s.visual[0], k);
-                let (m2, d2) = delay.read(&s.visual[1], k);
-                let (m3, d3) = delay.read(&s.visual[2], k);
-                let visual = p[0] * m1 + p[1] * m2 + p[2] * m3;
-                let (mut h, mut w) = (-s.guidance[k], -s.wheel.lagged[k]);
-                if shifted {
-                    h = -at(&s.guidance, k, (p[H_LATE] - p[D_LATE]) / s.dt_s);
-                    w = -at(&s.wheel.lagged, k, -p[D_LATE] / s.dt_s);
-                }
-                let arm = visual + p[K_HG] * h + p[K_NMS] * w;
-                let mut out = [0.0; N];
-                [out[0], out[1], out[2], out[K_HG]] = [m1, m2, m3, h];
-                if N > T_P {
-                    out[T_P] = p[0] * d1 + p[1] * d2 + p[2] * d3;
-                }
-                if N > D_LATE {
-                    let rate = |raw: f64, lagged: f64| (raw - lagged) / s.t_nms_s;
-                    let h_rate = p[K_HG] * rate(s.guidance_raw[k], s.guidance[k]);
-                    let w_rate = p[K_NMS] * rate(s.wheel.raw[k], s.wheel.lagged[k]);
-                    let lagged = slow.map_or(arm, |slow: f64| decay * slow + (1.0 - decay) * arm);
-                    slow = Some(lagged);
-                    out[K_NMS] = w;
-                    out[T_NMS] = -(arm - lagged) / s.t_nms_s;
-                    out[H_LATE] = -h_rate;
-                    out[D_LATE] = out[T_P] + h_rate + w_rate;
-                }
-                visit(stretch, s.torque[k] - arm - offset, out);
-            }
-        }
-    }
-
-    /// Hands the prediction error of each row, with its negative derivatives, to `visit`.
-    #[inline]
-    fn errors<const N: usize>(&self, p: &[f64], mut visit: impl FnMut(&Row<N>)) {
-        let (rho, theta) = (p[RHO], p[THETA]);
-        // What the filters remember.
-        let mut last = [0.0; N];
-        let mut last_n = 0.0;
-        let mut row = Row {
-            stretch: usize::MAX,
-            error: 0.0,
-            slopes: [0.0; N],
-            by_offset: 0.0,
-        };
-        self.rows::<N>(p, |stretch, n, regressors| {
-            if row.stretch != stretch {
-                // The filters start as if the first row had gone on for ever: for the slow signals here that
-                // is nearer to the truth than silence, and the first innovation is not the whole disturbance.
-                row.stretch = stretch;
-                last_n = n;
-                let gain = (1.0 - rho) / (1.0 - theta);
-                for i in 0..N {
-                    last[i] = regressors[i];
-                    row.slopes[i] = gain * regressors[i];
-                }
-                row.error = gain * n;
-                row.by_offset = gain;
-            }
-            let error = row.error;
-            for i in 0..N {
-                row.slopes[i] = match i {
-                    RHO => theta * row.slopes[RHO] + last_n,
-                    THETA => theta * row.slopes[THETA] - error,
-                    _ => theta * row.slopes[i] + regressors[i] - rho * last[i],
-                };
-            }
-            last = regressors;
-            row.by_offset = theta * row.by_offset + 1.0 - rho;
-            row.error = theta * error + n - rho * last_n;
-            last_n = n;
-            visit(&row);
-        });
-    }
-
     /// Makes the signals those of the muscle at `p`.
     fn assume_muscle(&mut self, p: &[f64]) {
         if p[T_NMS] != self.signals.t_nms_s {
@@ -329,53 +237,20 @@ impl<'a> Problem<'a> {
     /// Loss, gradient and Gauss-Newton matrix at `p`, after what is linear was solved for.
     fn evaluate(&mut self, p: &mut [f64]) -> Quadratic {
         self.assume_muscle(p);
-        let linear = self.sums::<LINEAR>(p);
+        let linear = self.light_sums(p, false);
         let solution = step(p, &self.bounds, &linear, 0.0);
         for (x, d) in p.iter_mut().zip(solution.iter()) {
             *x += d;
         }
         if self.extended {
-            self.sums::<COUNT>(p)
+            self.all_sums(p)
         } else {
-            self.sums::<CORE>(p)
+            self.core_sums(p)
         }
     }
 
-    /// One pass over the rows; derivatives by parameters beyond the first `N` are left at zero. By the first
-    /// [`LINEAR`] and the constants alone the quadratic is exact.
-    fn sums<const N: usize>(&self, p: &[f64]) -> Quadratic {
-        let mut loss = 0.0;
-        let mut gradient = [0.0; N];
-        let mut hessian = [[0.0; N]; N];
-        let stretches = self.stretches.len();
-        // Of each stretch's constant: gradient, curvature, and mixed with the parameters.
-        let mut constants = vec![(0.0, 0.0, [0.0; N]); stretches];
-        self.errors::<N>(p, |row| {
-            let (e, slopes) = (row.error, &row.slopes);
-            loss += e * e;
-            let (g, h, mixed) = &mut constants[row.stretch];
-            *g -= e * row.by_offset;
-            *h += row.by_offset * row.by_offset;
-            for i in 0..N {
-                gradient[i] -= e * slopes[i];
-                mixed[i] += row.by_offset * slopes[i];
-                for j in 0..=i {
-                    hessian[i][j] += slopes[i] * slopes[j];
-                }
-            }
-        });
-        let mut quadratic = Quadratic {
-            loss: 0.5 * loss,
-            scale: 0.5 * loss.max(SMALLEST_ERROR_NM.powi(2) * self.row_count() as f64),
-            gradient: DVector::zeros(self.size()),
-            hessian: DMatrix::zeros(self.size(), self.size()),
-        };
-        for i in 0..N {
-            quadratic.gradient[i] = gradient[i];
-            for j in 0..N {
-                quadratic.hessian[(i, j)] = hessian[i.max(j)][i.min(j)];
-            }
-        }
+    /// The loss with what is known of t_nms beside the record, where it is estimated although nobody asked for it.
+    fn with_prior(&self, p: &[f64], mut quadratic: Quadratic) -> Quadratic {
         // As so much more of a likelihood whose variance is the loss's own: L (1 + d^2/rows), d in standard deviations.
         if let Some(sd) = self.t_nms_prior_s {
             let (rows, d) = (
@@ -387,15 +262,6 @@ impl<'a> Problem<'a> {
             quadratic.gradient[T_NMS] += loss * 2.0 * d / (rows * sd);
             quadratic.hessian[(T_NMS, T_NMS)] += loss * 2.0 / (rows * sd * sd);
         }
-        for (s, (g, h, mixed)) in constants.into_iter().enumerate() {
-            let o = COUNT + s;
-            quadratic.gradient[o] = g;
-            quadratic.hessian[(o, o)] = h;
-            for (i, &m) in mixed.iter().enumerate() {
-                quadratic.hessian[(o, i)] = m;
-                quadratic.hessian[(i, o)] = m;
-            }
-        }
         quadratic
     }
 
@@ -404,11 +270,7 @@ impl<'a> Problem<'a> {
     fn search(&mut self) -> (Optimum, Vec<Start>) {
         let bounds = self.bounds.clone();
         let mut ends = START_CORNERS_HZ.map(|corner_hz| {
-            let start = START_DELAYS_S
-                .map(|t_p| self.start(t_p, corner_hz))
-                .into_iter()
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-                .map_or_else(Vec::new, |(_, point)| point);
+            let start = self.start(corner_hz);
             (
                 start[T_P],
                 minimise(&start, &bounds, COMPARED, |p| self.evaluate(p)),
@@ -424,18 +286,17 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let [(_, near), _] = ends;
-        let mut best = minimise(&near.point, &bounds, TOLERANCE, |p| self.evaluate(p));
-        best.history.splice(0..0, near.history);
+        self.assume_muscle(&near.point);
+        let best = resume(near, &bounds, TOLERANCE, |p| self.evaluate(p));
         starts[0].to_t_p_s = best.point[T_P];
         starts[0].loss = best.quadratic.loss;
         (best, starts)
     }
 
-    /// A start, and the loss there after the linear part is solved for.
-    fn start(&mut self, t_p_s: f64, corner_hz: f64) -> (f64, Vec<f64>) {
+    /// The best start of a corner: that of the delay with the least loss after what is linear is solved for.
+    fn start(&mut self, corner_hz: f64) -> Vec<f64> {
         let mut point = vec![0.0; self.size()];
         point[..LINEAR].copy_from_slice(&START);
-        point[T_P] = t_p_s;
         point[K_NMS] = self.muscle.k_nms;
         point[T_NMS] = self.assumed_t_nms_s;
         point[RHO] = (-std::f64::consts::TAU * corner_hz * self.signals.dt_s).exp();
@@ -443,10 +304,21 @@ impl<'a> Problem<'a> {
             *x = x.clamp(b.low, b.high);
         }
         self.assume_muscle(&point);
-        let linear = self.sums::<LINEAR>(&point);
-        let solution = step(&point, &self.bounds, &linear, 0.0);
-        let gain = -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));
-        (linear.loss - gain, point)
+        let Bounds { low, high } = self.bounds[T_P];
+        let delays = START_DELAYS_S.map(|t_p| t_p.clamp(low, high));
+        let best = Delays::new(self, &point)
+            .at(&delays)
+            .into_iter()
+            .map(|linear| {
+                let solution = step(&point, &self.bounds, &linear, 0.0);
+                let gain =
+                    -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));
+                linear.loss - gain
+            })
+            .zip(delays)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        point[T_P] = best.map_or(low, |(_, t_p)| t_p);
+        point
     }
 }
 

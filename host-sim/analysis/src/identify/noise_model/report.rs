@@ -6,9 +6,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::delays::filter;
+use super::sums::Rows;
 use super::{
-    CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P,
-    THETA, VARIATION_WIDTHS,
+    COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA,
+    VARIATION_WIDTHS,
 };
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
@@ -60,12 +62,14 @@ impl Problem<'_> {
             error_variance,
             errors[(T_P, T_P)].sqrt(),
         );
+        let kept = self.kept_rows(p);
         self.widen(
             &mut errors,
             p,
             &optimum.quadratic.hessian,
             &estimated,
             &delay_profile,
+            &kept,
         );
         let core: Vec<usize> = free
             .iter()
@@ -80,7 +84,7 @@ impl Problem<'_> {
             .chain(corner)
             .filter(|&i| i <= RHO || i >= COUNT)
             .collect();
-        let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian);
+        let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian, &kept);
         let trim = self.trim(optimum, &free, &errors, error_variance);
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
         if !options.t_nms_known && !self.is_free(T_NMS) {
@@ -140,7 +144,7 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
-        let (traces, predicted) = self.traces(log, p);
+        let (traces, predicted) = self.traces(log, kept);
         let fit = |model: &[f64]| diagnostics::fit_percent(&traces.measured_nm, model.iter().copied());
         let filtered = |u: &[f64]| self.filtered(p, u);
         let inputs = [
@@ -188,8 +192,8 @@ impl Problem<'_> {
     }
 
     /// The driver's parameters less the bias of a finite record, within their bounds.
-    fn unbiased(&self, p: &[f64], estimated: &[usize], hessian: &DMatrix<f64>) -> Vec<f64> {
-        let bias = self.bias(p, &covariance(hessian, estimated));
+    fn unbiased(&self, p: &[f64], estimated: &[usize], hessian: &DMatrix<f64>, rows: &Rows) -> Vec<f64> {
+        let bias = self.bias(rows, &covariance(hessian, estimated));
         let mut out = p.to_vec();
         for i in estimated.iter().copied().filter(|&i| i <= T_P) {
             out[i] = (p[i] - bias[i]).clamp(self.bounds[i].low, self.bounds[i].high);
@@ -313,11 +317,7 @@ impl Problem<'_> {
     }
 
     /// Traces for plots, and the one-step prediction.
-    fn traces(&self, log: &DriveLog, p: &[f64]) -> (Traces, Vec<f64>) {
-        let mut disturbance = Vec::with_capacity(self.row_count());
-        self.rows::<LINEAR>(p, |_, n, _| disturbance.push(n));
-        let mut residual = Vec::with_capacity(self.row_count());
-        self.errors::<CORE>(p, |row| residual.push(row.error));
+    fn traces(&self, log: &DriveLog, rows: Rows) -> (Traces, Vec<f64>) {
         let measured = self.used(&log.driver_torque_nm);
         let without = |part: &[f64]| {
             measured
@@ -326,7 +326,14 @@ impl Problem<'_> {
                 .map(|(y, d)| y - d)
                 .collect::<Vec<f64>>()
         };
+        let mut is_used = vec![false; log.len()];
+        for stretch in &self.stretches {
+            is_used[stretch.clone()].fill(true);
+        }
+        let unused = || (0..log.len()).filter(|&k| !is_used[k]);
         let traces = Traces {
+            unused_s: unused().map(|k| log.time_s(k)).collect(),
+            unused_nm: unused().map(|k| log.driver_torque_nm[k]).collect(),
             time_s: self
                 .stretches
                 .iter()
@@ -335,8 +342,8 @@ impl Problem<'_> {
                 .map(|k| log.time_s(k))
                 .collect(),
             measured_nm: measured.clone(),
-            simulated_nm: without(&disturbance),
-            residual_nm: residual,
+            simulated_nm: without(&rows.disturbance),
+            residual_nm: rows.errors,
         };
         let predicted = without(&traces.residual_nm);
         (traces, predicted)
@@ -350,18 +357,14 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// `(1 - rho/q)/(1 - theta/q)` applied to `u` over each stretch, begun as in [`Problem::errors`].
+    /// `u` through the filter of the disturbance over each stretch.
     fn filtered(&self, p: &[f64], u: &[f64]) -> Vec<f64> {
-        let (rho, theta) = (p[RHO], p[THETA]);
-        let mut all = Vec::with_capacity(self.row_count());
+        let mut all = self.used(u);
+        let mut rest = all.as_mut_slice();
         for stretch in &self.stretches {
-            let mut last = u[stretch.start];
-            let mut out = (1.0 - rho) / (1.0 - theta) * last;
-            all.extend(u[stretch.clone()].iter().map(|&x| {
-                out = theta * out + x - rho * last;
-                last = x;
-                out
-            }));
+            let (here, behind) = rest.split_at_mut(stretch.len());
+            filter(here, p[RHO], p[THETA]);
+            rest = behind;
         }
         all
     }

@@ -55,7 +55,7 @@ impl Problem<'_> {
     fn restricted(&self, p: &[f64], rho: f64) -> f64 {
         let mut point = p.to_vec();
         point[RHO] = rho;
-        let q = self.sums::<REGRESSORS>(&point);
+        let q = self.light_sums(&point, true);
         let d = step(&point, &self.bounds, &q, 0.0);
         let loss = q.loss + q.gradient.dot(&d) + 0.5 * d.dot(&(&q.hessian * &d));
         let free: Vec<usize> = (0..self.size())

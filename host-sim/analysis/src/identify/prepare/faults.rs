@@ -92,9 +92,20 @@ fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// The median of so many of each number.
+fn median_of_counts(of_number: &[usize]) -> usize {
+    let middle = of_number.iter().sum::<usize>() / 2;
+    let mut below = 0;
+    let reaches = |count: &usize| {
+        below += count;
+        below > middle
+    };
+    of_number.iter().position(reaches).unwrap_or(0)
+}
+
 /// Ends of the runs of equal values.
 fn runs(signal: &[f64]) -> Vec<std::ops::Range<usize>> {
-    let mut out = Vec::new();
+    let mut out = Vec::with_capacity(signal.len());
     let mut from = 0;
     for k in 1..=signal.len() {
         if k == signal.len() || signal[k] != signal[from] {
@@ -146,15 +157,22 @@ impl Examined {
     fn mark_runs(&mut self, least: f64, lane: bool) {
         let n = self.signal.len();
         let runs = runs(&self.signal);
-        let moving: Vec<&std::ops::Range<usize>> = runs.iter().filter(|r| r.len() < n / 10).collect();
-        if moving.len() < 3 {
+        // How many of the runs in which the signal moves have which length.
+        let mut of_length = vec![0; n / 10];
+        for run in &runs {
+            if let Some(count) = of_length.get_mut(run.len()) {
+                *count += 1;
+            }
+        }
+        let moving: usize = of_length.iter().sum();
+        if moving < 3 {
             return;
         }
-        let mut lengths: Vec<f64> = moving.iter().map(|r| r.len() as f64).collect();
-        let usual = median(&mut lengths) as usize;
-        let repeats: usize = moving.iter().map(|r| r.len() - 1).sum();
-        let stepped = repeats as f64 > STEPPED * moving.iter().map(|r| r.len()).sum::<usize>() as f64;
-        let regular = moving.iter().filter(|r| r.len() == usual).count() as f64 > 0.8 * moving.len() as f64;
+        let usual = median_of_counts(&of_length);
+        let rows: usize = of_length.iter().enumerate().map(|(l, count)| l * count).sum();
+        let repeats = rows - moving;
+        let stepped = repeats as f64 > STEPPED * rows as f64;
+        let regular = of_length[usual] as f64 > 0.8 * moving as f64;
         if !lane {
         } else if usual >= 2 && regular {
             // The value is that of the row in which it came.

@@ -58,6 +58,11 @@ impl Preflight {
         for (name, faults) in &self.columns {
             let mut add = |count: usize, found: &str, done: &str| {
                 if count > 0 {
+                    let found = if count == 1 {
+                        found.replacen("values", "value", 1)
+                    } else {
+                        found.to_owned()
+                    };
                     out.push([(*name).to_owned(), format!("{count} {found}"), done.to_owned()]);
                 }
             };
@@ -86,7 +91,8 @@ impl Preflight {
                 ]);
             }
             if noise.outliers > 0 {
-                let found = format!("{} values beyond 5 standard deviations", noise.outliers);
+                let values = if noise.outliers == 1 { "value" } else { "values" };
+                let found = format!("{} {values} beyond 5 standard deviations", noise.outliers);
                 out.push([name.to_owned(), found, "left out".to_owned()]);
             }
         }
