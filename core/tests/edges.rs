@@ -309,6 +309,30 @@ fn a_motor_is_weak_from_the_fifty_first_step_on() {
     assert!(judged[50..].iter().all(|motor| *motor == Motor::Weak));
 }
 
+/// The monitor's test comes with step 512*k + 1, and stands back by three steps at most from a new sample of the column and
+/// from the fiftieth step of a hundred, which may send a line of the fault history.
+#[test]
+fn the_monitor_is_tested_in_a_step_with_little_else_to_do() {
+    // Whether the column's samples come with odd steps, and the step in which a blind monitor is found.
+    for (odd, from, found) in [
+        (false, 1200, 1537),
+        (true, 1200, 1538),
+        (false, 1700, 2049),
+        // 2049 has a sample, 2050 is a fiftieth, 2051 has a sample.
+        (true, 1700, 2052),
+    ] {
+        let mut rig = Rig::paper();
+        if odd {
+            rig.step();
+        }
+        rig.run(from - u32::from(odd));
+        rig.ecu.blind_monitor(|_| true);
+        let (after, _) = rig.run_until(600, |step| step.command.faults.contains(Fault::SelfTest));
+        // Steps are counted from zero.
+        assert_eq!(from + after - 1, found, "{odd}");
+    }
+}
+
 /// Telemetry comes every 20 steps, and stands back from a step with a new sample of the column, by three at most.
 #[test]
 fn telemetry_comes_once_in_twenty_steps_and_beside_new_samples() {

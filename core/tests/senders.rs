@@ -1,4 +1,4 @@
-//! For how long a silent sender is waited for: three of its periods, as `docs/design.md` has it.
+//! What the receivers let pass, and for how long a silent sender is waited for: three of its periods (`docs/safety.md`).
 //!
 //! The period is the longest time between two messages lately. It grows at once and falls by a sixty-fourth of the way with
 //! each message; it is no less than 10 ms and no more than the slowest sender's. The expected times are worked out here in
@@ -6,12 +6,16 @@
 
 mod rig;
 
+use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
 use haptic_core::ecu::Step;
 use haptic_core::faults::Fault;
+use haptic_core::quantity::Metres;
 use rig::Rig;
 
 const LANE: usize = 0;
+const COLUMN: usize = 1;
+const VEHICLE: usize = 2;
 /// What the slowest camera has, ms: 15 pictures a second.
 const SLOWEST_MS: f64 = 1000.0 / 15.0;
 
@@ -71,4 +75,51 @@ fn a_period_grows_at_once_and_falls_slowly() {
     let gaps = [&[50; 5][..], &[140]].concat();
     assert_eq!(waits(&gaps), expected(SLOWEST_MS));
     assert_eq!(waits(&[&gaps[..], &[30]].concat()), expected(30.0));
+}
+
+/// A lane's change at 1.75 m seen by a camera that is wrong once: only two pictures in a row that agree are another line.
+#[test]
+fn another_line_takes_two_pictures_in_a_row_each_time() {
+    let mut rig = Rig::paper();
+    rig.lane.e_y = Metres::from_m(1.75);
+    rig.run(601);
+    rig.silent[LANE] = true;
+    for (e_y_m, expected) in [
+        (-1.75, Err(Reject::Step)),
+        (1.75, Ok(())),
+        (-1.75, Err(Reject::Step)),
+        (-1.75, Ok(())),
+        // No old refusal makes up for the first of two.
+        (1.75, Err(Reject::Step)),
+    ] {
+        rig.lane.e_y = Metres::from_m(e_y_m);
+        let frame = rig.frame(LANE);
+        assert_eq!(rig.send(&frame), expected, "{e_y_m} m");
+        rig.tick();
+    }
+}
+
+#[test]
+fn a_speed_that_is_silent_has_not_jumped() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.silent[VEHICLE] = true;
+    let (_, step) = rig.run_until(60, |step| step.command.faults.contains(Fault::SpeedTimeout));
+    assert!(!step.command.faults.contains(Fault::SpeedStep));
+}
+
+/// Three frames of the column may be lost at once, and as many more as fit into its silence; fourteen at most.
+#[test]
+fn the_column_may_have_lost_what_fits_into_its_silence() {
+    let mut rig = Rig::paper();
+    // The last step has heard a frame.
+    rig.run(601);
+    for (silence_ms, most) in [(1, 3), (2, 4), (10, 8), (20, 13), (22, 14), (29, 14)] {
+        for step in 1..=15_u32 {
+            let mut rig = rig.clone();
+            rig.t_us += 1000 * silence_ms;
+            let frame = (0..step).map(|_| rig.frame(COLUMN)).last().unwrap();
+            let expected = if step <= most { Ok(()) } else { Err(Reject::Jump) };
+            assert_eq!(rig.send(&frame), expected, "{step} after {silence_ms} ms");
+        }
+    }
 }
