@@ -66,7 +66,7 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ("background.rs", &["probe", "ecu", "attacks"]),
     ("estimator.rs", &["probe"]),
     ("estimator/average.rs", &["probe"]),
-    ("bus/frame.rs", &["frame", "dbc"]),
+    ("bus/frame.rs", &["frame", "dbc", "ecu", "e2e"]),
     ("bus/slcan.rs", &["slcan"]),
     ("bus/messages/mod.rs", &["dbc", "ecu"]),
     ("bus/messages/inputs.rs", &["dbc", "ecu", "edges"]),
