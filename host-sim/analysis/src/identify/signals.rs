@@ -16,9 +16,7 @@
 //! `d/dt_p L[u](t - t_p) = -(u - L[u])(t - t_p) / t_nms`.
 
 use super::log::DriveLog;
-
-/// Rows that are read at once.
-pub(crate) const BLOCK: usize = 64;
+use super::wide::{BLOCK, window};
 
 /// The muscle of equation (8), taken as known (table 4).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -234,21 +232,6 @@ impl Delay {
         let j = k - self.samples;
         let (u0, u1) = (u[j], u[(j + 1).min(u.len() - 1)]);
         (u0 + self.fraction * (u1 - u0), (u0 - u1) / dt_s)
-    }
-}
-
-/// [`BLOCK`] values of `u` from `from` on, level beyond its end; the `spare` ones where it ends before.
-#[inline(always)]
-pub(crate) fn window<'a>(u: &'a [f64], from: usize, spare: &'a mut [f64; BLOCK]) -> &'a [f64; BLOCK] {
-    let last = u.len() - 1;
-    match u[from.min(last)..].first_chunk() {
-        Some(values) => values,
-        None => {
-            for (i, x) in spare.iter_mut().enumerate() {
-                *x = u[(from + i).min(last)];
-            }
-            spare
-        }
     }
 }
 

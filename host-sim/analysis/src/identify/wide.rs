@@ -1,4 +1,4 @@
-//! Sums over long records, laid out for the widest registers that the processor has.
+//! Blocks of rows and sums over long records, laid out for the widest registers that the processor has.
 //!
 //! The order of summation is the same on every processor, and products and sums are rounded apart, so that the result
 //! is too.
@@ -9,6 +9,24 @@ use multiversion::multiversion;
 const PARTS: usize = 16;
 /// The same where several sums are formed at once.
 const FEW: usize = 8;
+
+/// Rows that are read at once.
+pub(crate) const BLOCK: usize = 64;
+
+/// [`BLOCK`] values of `u` from `from` on, level beyond its end; the `spare` ones where it ends before.
+#[inline(always)]
+pub(crate) fn window<'a>(u: &'a [f64], from: usize, spare: &'a mut [f64; BLOCK]) -> &'a [f64; BLOCK] {
+    let last = u.len() - 1;
+    match u[from.min(last)..].first_chunk() {
+        Some(values) => values,
+        None => {
+            for (i, x) in spare.iter_mut().enumerate() {
+                *x = u[(from + i).min(last)];
+            }
+            spare
+        }
+    }
+}
 
 /// Sum of the products of `a` and `b`, over the shorter of the two.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -1,8 +1,8 @@
 //! What each way to treat noise on the lane signals is worth: the participants' drives under more and more camera noise,
 //! identified in four ways, beside the information bound.
 //!
-//! *Naive* takes the lane signals as they are. The *plain smoother* takes each as a smooth course under white noise. The
-//! *chosen* one takes the vehicle's answer to the wheel angle out of that course. *Published* is the paper's.
+//! *None* takes the lane signals as they are. The *plain smoother* takes each as a smooth course under white noise. The
+//! *default* takes the vehicle's answer to the wheel angle out of that course. *Published* is the paper's.
 
 use haptic_analysis::identify::{Identification, Options, identify_as_published, identify_with_noise_model};
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::spoiled::{POPULATION, Spoiling, spoiled_log};
 use super::{Plan, chosen, driven};
 
 /// The ways.
-pub const METHODS: [&str; 4] = ["naive", "plain smoother", "chosen", "published"];
+pub const METHODS: [&str; 4] = ["none", "plain smoother", "default", "published"];
 
 /// One way on one level of noise.
 #[derive(Debug, Clone, Serialize)]
@@ -60,7 +60,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Vec<Me
                 .iter()
                 .flat_map(|(_, ways)| {
                     let log = spoiled_log(&log, ways, &plan, number);
-                    let naive = Options {
+                    let none = Options {
                         lane_noise: false,
                         ..Options::default()
                     };
@@ -70,7 +70,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Vec<Me
                     };
                     let ours = |o: &Options| Some(identify_with_noise_model(&log, o));
                     [
-                        ours(&naive),
+                        ours(&none),
                         ours(&plain),
                         ours(&Options::default()),
                         identify_as_published(&log, &Options::default()).ok(),

@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, LINEAR, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA, at};
 use crate::identify::search::Quadratic;
-use crate::identify::signals::{BLOCK, Delay, Lagged};
+use crate::identify::signals::{Delay, Lagged};
+use crate::identify::wide::BLOCK;
 
 /// Partial sums of each product.
 const PARTS: usize = 8;

@@ -14,7 +14,8 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::{CORE, COUNT, K_HG, RHO, T_P, THETA, at};
-use crate::identify::signals::{BLOCK, Delay, Signals, window};
+use crate::identify::signals::{Delay, Signals};
+use crate::identify::wide::{BLOCK, window};
 
 /// Columns side by side, as many as registers hold, for [`CORE`] and for all parameters.
 pub(super) const FEW: usize = 8;

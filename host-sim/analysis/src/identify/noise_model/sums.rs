@@ -10,7 +10,7 @@ use super::rows::{
 };
 use super::{CORE, COUNT, D_LATE, H_LATE, K_HG, K_NMS, Problem, RHO, SMALLEST_ERROR_NM, T_P, THETA};
 use crate::identify::search::Quadratic;
-use crate::identify::signals::BLOCK;
+use crate::identify::wide::BLOCK;
 
 /// Every row at one point: the error, its negative derivatives by the parameters of [`CORE`], and the disturbance.
 pub(super) struct Rows {
