@@ -59,7 +59,7 @@ pub(super) fn driver_yaw_error(
     }));
     let ahead = |k: usize, ahead_s: f64| way_m[k] + ahead_s * speed_m_per_s[k];
     let (mut later, mut out) = (0, Vec::with_capacity(road.len()));
-    for k in 0..road.len() {
+    for (k, now) in direction.iter().enumerate() {
         let place_m = ahead(k, DRIVER_S);
         while later > k && ahead(later, GUIDANCE_S) > place_m {
             later -= 1;
@@ -72,7 +72,7 @@ pub(super) fn driver_yaw_error(
         }
         let [from, to] = [later, later + 1].map(|at| ahead(at, GUIDANCE_S));
         let share = (place_m - from) / (to - from);
-        out.push(road[later] + share * (road[later + 1] - road[later]) - direction[k]);
+        out.push(road[later] + share * (road[later + 1] - road[later]) - now);
     }
     out
 }
