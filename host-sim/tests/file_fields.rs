@@ -28,6 +28,12 @@ impl DocumentedField {
         }
     }
 
+    /// As an error names it: of a list, the value in the second place.
+    fn refused(&self) -> String {
+        let place = if self.table == "speed" { " (point 2)" } else { "" };
+        self.name() + place
+    }
+
     /// The ends of the range, if it is one of numbers.
     fn ends(&self) -> Option<[f64; 2]> {
         let (from, to) = self.range.split_once(" to ")?;
@@ -70,6 +76,10 @@ fn scenario_text(row: &DocumentedField, value: &str) -> String {
     let set = |field: &str| format!("{field} = {value}\n");
     match row.table.as_str() {
         "" => set(&row.field),
+        "speed" => match row.field.as_str() {
+            "kmh" => format!("[speed]\ntime = [0, 1000]\nkmh = [60, {value}]\n"),
+            axis => format!("[speed]\n{axis} = [0, {value}]\nkmh = [60, 60]\n"),
+        },
         "driver_change" => {
             let others = [("time", "1"), ("K_d", "2"), ("K_hg", "0.25")];
             let line = |(field, other): (&str, &str)| {
@@ -143,6 +153,14 @@ fn every_field_of_a_scenario_is_in_the_table_with_its_default() {
             .map(|row| spelling(&row.field));
         assert_eq!(document.collect::<BTreeSet<_>>(), code, "table {table:?}");
     }
+    // A number or a table: the refusal names the fields in words.
+    let refusal = scenario("[speed]\nno_such_field = 1").unwrap_err();
+    let code: BTreeSet<_> = refusal.split('`').skip(1).step_by(2).map(spelling).collect();
+    let document = rows.iter().filter(|row| row.table == "speed");
+    assert_eq!(
+        document.map(|row| spelling(&row.field)).collect::<BTreeSet<_>>(),
+        code
+    );
     for row in &rows {
         match &row.default {
             Some(default) => {
@@ -150,7 +168,8 @@ fn every_field_of_a_scenario_is_in_the_table_with_its_default() {
                 assert_eq!(scenario(&text).as_ref(), Ok(&Scenario::default()), "{text}");
             }
             None => assert!(
-                ["driver_change", "tolerances"].contains(&row.table.as_str()) || row.range == "an id",
+                ["driver_change", "speed", "tolerances"].contains(&row.table.as_str())
+                    || row.range == "an id",
                 "{row:?}"
             ),
         }
@@ -171,13 +190,18 @@ fn every_range_of_a_scenario_is_the_codes() {
             };
             let beyond = 1e-3 * (to - from);
             for value in [from - beyond, to + beyond] {
-                let expected = format!("s: {} = {value}{unit} is outside {}{unit}", row.name(), row.range);
+                let expected = format!(
+                    "s: {} = {value}{unit} is outside {}{unit}",
+                    row.refused(),
+                    row.range
+                );
                 assert_eq!(refusal(&value.to_string()), Some(expected));
             }
             for value in [from, to] {
                 // Another field may have to follow; this one is not refused.
                 let refusal = refusal(&value.to_string()).unwrap_or_default();
-                assert!(!refusal.contains(&format!("{} = ", row.name())), "{refusal}");
+                let outside = format!("{} = {value}{unit} is outside", row.refused());
+                assert!(!refusal.contains(&outside), "{refusal}");
             }
         } else if row.range.starts_with('`') {
             for value in row.range.split(", ") {
@@ -193,7 +217,7 @@ fn every_range_of_a_scenario_is_the_codes() {
             );
         }
     }
-    assert_eq!(numbers, 87, "fields with a range of numbers");
+    assert_eq!(numbers, 90, "fields with a range of numbers");
 }
 
 #[test]

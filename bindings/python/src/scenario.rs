@@ -23,8 +23,9 @@ use crate::errors;
 /// course : str, path or mapping, optional
 ///     ``"paper-course"``, a course file, or its content: ``{"lane_width": 3.6, "segment": [{"length": 100.0}]}``.
 ///     An OpenDRIVE file (.xodr) is one too; ``road`` and ``lane`` choose from it.
-/// speed : float, optional
-///     Constant speed, km/h, 20 to 250.
+/// speed : float or mapping, optional
+///     Constant speed, km/h, 20 to 250; or one that changes through points by time (s) or by place (m):
+///     ``{"time": [0, 10, 15], "kmh": [60, 60, 40]}``, ``{"place": [0, 200, 300], "kmh": [80, 80, 50]}``.
 /// condition : {"manual", "high", "mid", "low"}, optional
 ///     How much the driver relies on the guidance.
 /// sensors : {"paper", "exact"}, optional
@@ -181,7 +182,11 @@ impl Scenario {
         };
         for (name, value) in changes {
             match (merged.get_mut(&name), value) {
-                (Some(Value::Table(old)), Value::Table(new)) if name != "course" => old.extend(new),
+                (Some(Value::Table(old)), Value::Table(new))
+                    if !["course", "speed"].contains(&name.as_str()) =>
+                {
+                    old.extend(new);
+                }
                 (_, value) => {
                     merged.insert(name, value);
                 }
@@ -213,13 +218,13 @@ impl Scenario {
         self.inner.to_toml()
     }
 
-    /// Constant speed, km/h.
+    /// Speed at the start, km/h: that of the whole run unless it changes.
     #[getter]
     fn speed_kmh(&self) -> f64 {
         self.inner.speed_kmh()
     }
 
-    /// Constant speed, m/s.
+    /// Speed at the start, m/s: that of the whole run unless it changes.
     #[getter]
     fn speed_m_per_s(&self) -> f64 {
         self.inner.speed_m_per_s()

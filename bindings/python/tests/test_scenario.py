@@ -31,6 +31,25 @@ def test_numbers_of_numpy_are_numbers():
     assert hg.Scenario(speed=np.float64(80), seed=np.int64(7)) == hg.Scenario(speed=80.0, seed=7)
 
 
+def test_a_speed_that_changes_is_a_mapping_or_a_table():
+    # 20 m/s for 5 s, 2 m/s2 less for 5 s: 100 and 75 m; the far point, 10 m ahead, ends the rest of 300 m at 290.
+    speed = {"time": [5, 10], "kmh": np.array([72.0, 36.0]).tolist()}
+    braking = hg.Scenario(course={"segment": [{"length": 300.0}]}, speed=speed)
+    assert (braking.speed_kmh, braking.speed_m_per_s) == (72.0, 20.0)
+    assert braking.duration_s == pytest.approx(21.5)
+    assert pickle.loads(pickle.dumps(braking)) == braking == hg.Scenario.from_toml(braking.to_toml())
+    run = hg.simulate(braking)
+    assert run["speed_m_per_s"][[0, 1500, -1]] == pytest.approx([20.0, 15.0, 10.0])
+    assert run.metrics["min_speed_m_per_s"] == pytest.approx(10.0)
+    by_place = braking.replace(speed={"place": [50, 200], "kmh": [72, 36]})
+    assert by_place.to_dict()["speed"] == {"place": [50, 200], "kmh": [72, 36]}
+    assert by_place.replace(speed=60) == hg.Scenario(course={"segment": [{"length": 300.0}]})
+    with pytest.raises(hg.RangeError, match="acceleration to point 2 = -11.111 m/s2"):
+        hg.Scenario(speed={"time": [0, 1], "kmh": [100, 60]})
+    with pytest.raises(hg.InputError, match="point 2"):
+        hg.Scenario(speed={"time": [4, 3], "kmh": [60, 60]})
+
+
 def test_a_course_comes_from_a_file_or_as_its_content():
     scenario = hg.Scenario(course=COURSE)
     assert (scenario.course_length_m, scenario.lane_width_m) == (600.0, 3.5)

@@ -36,7 +36,7 @@ pub struct EvaluationResults {
     pub course: String,
     /// Its length, m.
     pub course_length_m: f64,
-    /// Speed, km/h.
+    /// Speed at the start, km/h; the records have the mean, the least and the largest.
     pub speed_kmh: f64,
     /// When the guidance fails in the runs with failure, s.
     pub failure_time_s: f64,

@@ -71,6 +71,8 @@ mod tests {
             (Condition::High, Some(40.0))
         );
         assert!(relying.course().name().ends_with("hill-road.toml"));
+        let braking = load_scenario(&folder.join("braking-into-a-curve.toml")).unwrap();
+        assert!(braking.changes_speed() && braking.speed_kmh() == 100.0);
     }
 
     #[test]

@@ -91,7 +91,7 @@ pub(super) fn failure_notes(time_s: f64, records: &[RunRecord], window: Window) 
         return Vec::new();
     }
     let Window { from_m, to_m } = window;
-    // All runs have one speed: those that last until the failure are at the same place.
+    // All runs have one speed, or one profile: those that last until the failure are at the same place.
     let note = match places.into_iter().flatten().next() {
         None => format!("no run lasts until the failure at {time_s} s: the runs with failure have none"),
         Some(s_m) if s_m > to_m => format!(

@@ -35,7 +35,7 @@ pub struct SingleResults {
     pub course: String,
     /// Its length, m.
     pub course_length_m: f64,
-    /// Speed, km/h.
+    /// Speed at the start, km/h; the record has the mean, the least and the largest.
     pub speed_kmh: f64,
     /// What the controller saw.
     pub sensors: Sensors,

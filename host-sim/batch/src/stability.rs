@@ -152,6 +152,11 @@ pub fn shares(base: &Scenario) -> Result<Vec<Shares>, String> {
 
 /// The scenario at a place of the map.
 fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result<Scenario, String> {
+    if base.changes_speed() {
+        return Err(
+            "speed: a map over speeds has one at each place, and none that changes; leave [speed] out".into(),
+        );
+    }
     let scenario = base
         .to_builder()
         .course(stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?)
@@ -190,7 +195,7 @@ fn drive(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_sim::scenario::GuidanceParameters;
+    use haptic_sim::scenario::{GuidanceParameters, Speed};
 
     /// At 60 km/h the evaluation's table: the stretched curve is its first curve as it is. And what that table says of
     /// delays holds at the ends of the map.
@@ -242,6 +247,18 @@ mod tests {
         assert!((40..60).contains(&judged), "{judged}");
         for row in shares(&base).unwrap() {
             assert_eq!(row.best(), Some(1.0), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_speed_that_changes_has_no_place_on_the_map() {
+        let speed = Speed::ByTime {
+            time: vec![0.0, 10.0],
+            kmh: vec![60.0, 50.0],
+        };
+        let scenario = Scenario::builder().speed(speed).build().unwrap();
+        for error in [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()] {
+            assert!(error.starts_with("speed: a map over speeds"), "{error}");
         }
     }
 

@@ -143,7 +143,12 @@ channels! {
     sideslip_rad: f64, "rad", 7, Vehicle;
     /// Whether a limit held the guidance torque back: 0 or 1.
     guidance_limited: bool, "1", 0, Guidance;
+    /// Speed v of the vehicle.
+    speed_m_per_s: f64, "m/s", 6, Vehicle;
 }
+
+/// What files of earlier versions do not have.
+const LATER_CHANNEL: &str = "speed_m_per_s";
 
 /// A run's samples, evenly spaced in time.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -176,8 +181,9 @@ impl Trace {
         table.finish()
     }
 
-    /// Reads what [`Trace::write_csv`] has written. Columns of other names are passed over; an empty field is NaN. The
-    /// sample rate is that of the first and the last time stamp.
+    /// Reads what [`Trace::write_csv`] has written. Columns of other names are passed over; an empty field is NaN, and so is
+    /// the speed in a file that has none, as they were before it was a channel. The sample rate is that of the first and
+    /// the last time stamp.
     ///
     /// # Errors
     /// What cannot be read, a column that is missing, a field that is no number.
@@ -194,7 +200,10 @@ impl Trace {
         let mut table = TableReader::new(source)?;
         let place = |channel: Channel| {
             let found = table.header().iter().position(|name| *name == channel.name);
-            found.ok_or_else(|| TableError::MissingColumn(channel.name.into()))
+            if found.is_none() && channel.name != LATER_CHANNEL {
+                return Err(TableError::MissingColumn(channel.name.into()));
+            }
+            Ok(found)
         };
         let places = CHANNELS.into_iter().map(place).collect::<Result<Vec<_>, _>>()?;
         let mut samples = Vec::new();
@@ -202,7 +211,7 @@ impl Trace {
             let row = row?;
             let mut sample = Sample::default();
             for (channel, place) in CHANNELS.iter().zip(&places) {
-                let text = row.field(*place);
+                let text = place.map_or("", |place| row.field(place));
                 let value = if text.is_empty() {
                     f64::NAN
                 } else {

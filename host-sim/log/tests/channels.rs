@@ -27,15 +27,16 @@ fn a_trace_is_written_as_the_heading_says() {
         driver_torque_nm: -1e-9,
         guidance_torque_nm: -0.47,
         guidance_limited: true,
+        speed_m_per_s: 16.6666667,
         ..Sample::default()
     };
     assert_eq!(
         written(&trace(vec![sample])),
         "time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm,driver_torque_nm,lateral_error_m,s_m,\
          heading_error_rad,curvature_1pm,guidance_e_y_m,guidance_e_theta_rad,wheel_rate_rad_per_s,\
-         yaw_rate_rad_per_s,sideslip_rad,guidance_limited\n\
+         yaw_rate_rad_per_s,sideslip_rad,guidance_limited,speed_m_per_s\n\
          0.008333,0.125000,0.0000000,,-0.47000,0.00000,-0.250000,12.5000,\
-         0.0000000,0.00000000,0.000000,0.0000000,0.000000,0.0000000,0.0000000,1\n"
+         0.0000000,0.00000000,0.000000,0.0000000,0.000000,0.0000000,0.0000000,1,16.666667\n"
     );
 }
 
@@ -72,6 +73,19 @@ fn what_is_no_trace_is_refused_with_line_and_column() {
     );
 }
 
+/// What was written before speed was a channel.
+#[test]
+fn a_trace_without_speed_is_read() {
+    let text = written(&trace(vec![Sample::default(); 2]));
+    let without: String = text
+        .lines()
+        .map(|line| line.rsplit_once(',').unwrap().0.to_owned() + "\n")
+        .collect();
+    assert!(!without.contains("speed"), "{without}");
+    let read = Trace::read_csv(without.as_bytes()).unwrap();
+    assert!(read.samples.len() == 2 && read.samples.iter().all(|s| s.speed_m_per_s.is_nan()));
+}
+
 /// A unit that is not the end of the channel's name would be a lie in every file.
 #[test]
 fn a_name_ends_with_its_unit() {
@@ -80,6 +94,7 @@ fn a_name_ends_with_its_unit() {
             "s" => "_s",
             "m" => "_m",
             "1/m" => "_1pm",
+            "m/s" => "_m_per_s",
             "rad" => "_rad",
             "rad/s" => "_rad_per_s",
             "N.m" => "_nm",

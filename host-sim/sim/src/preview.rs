@@ -9,6 +9,8 @@ use crate::models::road::{Centreline, Tracker};
 /// A near and a far point along the direction of movement.
 #[derive(Debug, Clone)]
 pub(crate) struct PreviewPoints {
+    /// How far ahead they are, s.
+    times_s: [f64; 2],
     pub(crate) near_m: f64,
     pub(crate) far_m: f64,
     pub(crate) near: Tracker,
@@ -16,13 +18,21 @@ pub(crate) struct PreviewPoints {
 }
 
 impl PreviewPoints {
-    pub(crate) fn new(road: &Centreline, near_m: f64, far_m: f64) -> Self {
+    /// Points as far ahead as these times at a speed.
+    pub(crate) fn new(road: &Centreline, times_s: [f64; 2], v_m_per_s: f64) -> Self {
+        let [near_m, far_m] = times_s.map(|time_s| v_m_per_s * time_s);
         Self {
+            times_s,
             near_m,
             far_m,
             near: road.tracker(near_m),
             far: road.tracker(far_m),
         }
+    }
+
+    /// Moves them to where they are at another speed.
+    pub(crate) fn at_speed(&mut self, v_m_per_s: f64) {
+        [self.near_m, self.far_m] = self.times_s.map(|time_s| v_m_per_s * time_s);
     }
 
     /// The errors and the far point's arc length; `None` where there is no road to look at.

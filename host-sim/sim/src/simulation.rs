@@ -28,7 +28,7 @@ use crate::models::road::{Centreline, Projection, Tracker};
 use crate::models::tolerances::Car;
 use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::{PreviewPoints, wrapped};
-use crate::scenario::{FAILURE_REACTION_S, Failure, FailureKind, Scenario};
+use crate::scenario::{FAILURE_REACTION_S, Failure, FailureKind, Scenario, SpeedProfile};
 use crate::seeds::Stream;
 
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
@@ -111,6 +111,11 @@ pub struct Simulation<G = AnyGuidance> {
     pub(crate) driver_points: PreviewPoints,
     pub(crate) camera: PreviewPoints,
     pub(crate) body: Tracker,
+    /// Speed of the vehicle now, and where along the road it is.
+    speed_m_per_s: f64,
+    place_m: f64,
+    /// The run ends when the driver's far point gets there.
+    pub(crate) end_m: f64,
     /// Step in which something first went wrong.
     failed_at: Option<u32>,
     target_now_rad: f64,
@@ -124,14 +129,17 @@ pub struct Simulation<G = AnyGuidance> {
 /// What the scenario decides for every step.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
-    pub(crate) speed_m_per_s: f64,
+    /// How the speed changes, if it does.
+    speed: Option<SpeedProfile>,
+    /// How far ahead anybody looks, and the driver, s.
+    ahead_s: [f64; 2],
+    duration_s: f64,
     relying: Transition,
     manual: Transition,
     pub(crate) changed: Option<(u32, Transition)>,
     probe: bool,
     failure: FailureKind,
     pub(crate) failure_step: u32,
-    pub(crate) end_m: f64,
 }
 
 impl Simulation {
@@ -148,16 +156,20 @@ impl<G: Guidance> Simulation<G> {
         let v = scenario.speed_m_per_s();
         let driver = scenario.driver();
         let [t_n, t_f] = [scenario.guidance().t_n, scenario.guidance().t_f];
+        let plan = Plan::new(scenario);
         Self {
-            plan: Plan::new(scenario, &road),
+            speed_m_per_s: v,
+            place_m: 0.0,
+            end_m: plan.end_m(&road, v),
+            plan,
             guidance,
             plant: Plant::default(),
             real: real(scenario),
             sensing: Sensing::of(scenario),
             vision: Vision::new(driver),
             remnant: Remnant::new(driver, Stream::Remnant.seed(scenario.seed())),
-            driver_points: PreviewPoints::new(&road, v * driver.t_n, v * driver.t_f),
-            camera: PreviewPoints::new(&road, v * t_n, v * t_f),
+            driver_points: PreviewPoints::new(&road, [driver.t_n, driver.t_f], v),
+            camera: PreviewPoints::new(&road, [t_n, t_f], v),
             body: road.tracker(0.0),
             failed_at: None,
             target_now_rad: 0.0,
@@ -179,7 +191,7 @@ impl<G: Guidance> Simulation<G> {
         let Some((preview, far_s_m)) = self.driver_points.look(&self.road, &self.plant) else {
             return self.diverge();
         };
-        if far_s_m >= self.plan.end_m {
+        if far_s_m >= self.end_m {
             self.ending = Some(Ending::CourseEnd);
             return None;
         }
@@ -205,7 +217,7 @@ impl<G: Guidance> Simulation<G> {
             driver_torque_nm: self.plant.arm_torque_nm() + remnant_nm,
             wheel_angle_rad: self.plant.wheel_angle_rad(),
             motor_torque_nm: self.motor_torque_nm,
-            speed_m_per_s: self.plan.speed_m_per_s,
+            speed_m_per_s: self.speed_m_per_s,
             yaw_rate_rad_per_s: Some(self.plant.yaw_rate_rad_per_s()),
             request: self.plan.request(action),
         };
@@ -225,6 +237,7 @@ impl<G: Guidance> Simulation<G> {
             match self.road.project(x, y, &mut self.body) {
                 Some(projection) if projection.offset_m.abs() <= DIVERGED_M => {
                     self.last_s_m = projection.s_m;
+                    self.place_m = projection.s_m;
                     self.lateral_error_m = Some(projection.offset_m);
                     sample = Some(record(
                         &self.plant,
@@ -266,6 +279,11 @@ impl<G: Guidance> Simulation<G> {
         } else {
             self.plan.transition(self.step, self.failed_at)
         };
+        let now = self.speed_m_per_s;
+        let next = self.plan.speed.as_ref().map_or(now, |speed| {
+            let time_s = f64::from(self.step + 1) * STEP_S;
+            speed.at(time_s, self.place_m + now * STEP_S)
+        });
         self.motor_torque_nm = match &mut self.real {
             None => {
                 self.plant.step(transition, &input);
@@ -273,13 +291,25 @@ impl<G: Guidance> Simulation<G> {
             }
             Some(real) => {
                 let bank_rad = self.road.surface(&self.body).bank_rad;
-                let v = self.plan.speed_m_per_s;
-                real.step(&mut self.plant, v, transition.gains(), &input, bank_rad);
+                real.step(&mut self.plant, [now, next], transition.gains(), &input, bank_rad);
                 real.motor_torque_nm()
             }
         };
+        if next != now {
+            self.change_speed(next);
+        }
+        // Until the next sample projects it.
+        self.place_m += now * STEP_S;
         self.target_now_rad = target_next_rad;
         self.step += 1;
+    }
+
+    /// Whatever is looked at by time is looked at in another place.
+    fn change_speed(&mut self, v_m_per_s: f64) {
+        self.speed_m_per_s = v_m_per_s;
+        self.driver_points.at_speed(v_m_per_s);
+        self.camera.at_speed(v_m_per_s);
+        self.end_m = self.plan.end_m(&self.road, v_m_per_s);
     }
 
     fn diverge(&mut self) -> Option<Outcome<'_>> {
@@ -294,11 +324,11 @@ impl<G: Guidance> Simulation<G> {
 
     /// Drives to the end as the scenario has it; `observe` sees every step.
     pub fn run_observed(mut self, mut observe: impl FnMut(&Outcome)) -> Run {
-        let left_m = self.road.length_m() - self.last_s_m;
-        let samples = left_m / self.plan.speed_m_per_s * f64::from(SAMPLE_RATE_HZ);
+        let left_s = self.plan.duration_s - f64::from(self.step) * STEP_S;
+        let samples = left_s * f64::from(SAMPLE_RATE_HZ);
         let mut trace = Trace {
             sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
-            samples: Vec::with_capacity(samples as usize + 1),
+            samples: Vec::with_capacity(samples as usize + 2),
         };
         while let Some(outcome) = self.step(&Action::default()) {
             observe(&outcome);
@@ -368,13 +398,15 @@ impl<G: Guidance> Simulation<G> {
 }
 
 impl Plan {
-    fn new(scenario: &Scenario, road: &Centreline) -> Self {
+    fn new(scenario: &Scenario) -> Self {
         let v = scenario.speed_m_per_s();
         let (vehicle, driver) = (scenario.car().vehicle, scenario.driver());
         let transition = |gains| Transition::new(v, &vehicle, driver, gains);
         let failure = scenario.failure();
         Self {
-            speed_m_per_s: v,
+            speed: scenario.changes_speed().then(|| scenario.speed_profile().clone()),
+            ahead_s: [scenario.longest_look_ahead_s(), driver.t_f],
+            duration_s: scenario.duration_s(),
             relying: transition(scenario.gains()),
             manual: transition(ArmGains::MANUAL),
             changed: scenario
@@ -383,8 +415,13 @@ impl Plan {
             probe: scenario.guidance().probe,
             failure: failure.kind,
             failure_step: failure.at_s().map_or(u32::MAX, step_of),
-            end_m: road.length_m() - (scenario.look_ahead_m() - v * driver.t_f),
         }
+    }
+
+    /// Where the driver's far point is at a speed when the farthest that anybody looks at gets to the road's end, m.
+    fn end_m(&self, road: &Centreline, v_m_per_s: f64) -> f64 {
+        let [longest_s, driver_s] = self.ahead_s;
+        road.length_m() - (v_m_per_s * longest_s - v_m_per_s * driver_s)
     }
 
     /// What the scenario lets go wrong.
@@ -463,7 +500,8 @@ impl Sensing {
 fn real(scenario: &Scenario) -> Option<Box<RealPlant>> {
     let (car, driver) = (scenario.car(), scenario.driver());
     let Car { world, vehicle, .. } = car;
-    if world.is_ideal() && scenario.course().is_level() {
+    // The paper's plant is linear, and exact, at one speed alone.
+    if world.is_ideal() && scenario.course().is_level() && !scenario.changes_speed() {
         return None;
     }
     let seed = Stream::World.seed(scenario.seed());
@@ -496,6 +534,7 @@ fn record(
         wheel_rate_rad_per_s: plant.wheel_rate_rad_per_s(),
         yaw_rate_rad_per_s: plant.yaw_rate_rad_per_s(),
         sideslip_rad: plant.sideslip_rad(),
+        speed_m_per_s: observation.speed_m_per_s,
         driver_torque_nm: observation.driver_torque_nm,
         guidance_torque_nm: applied.torque_nm,
         guidance_limited: applied.limited,

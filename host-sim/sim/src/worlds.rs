@@ -75,12 +75,14 @@ enum Part {
     Steep,
     /// A camera that sees nothing for half a second, 30 times an hour.
     Blind,
+    /// A speed that falls and rises by up to 3 m/s2.
+    Braking,
 }
 
-use Part::{Assist, Bank, Blind, Camera, Friction, Motor, Slippery, Steep, Wind};
+use Part::{Assist, Bank, Blind, Braking, Camera, Friction, Motor, Slippery, Steep, Wind};
 
 /// Every world, from paper to beyond.
-pub const WORLDS: [WorldKind; 11] = [
+pub const WORLDS: [WorldKind; 12] = [
     world("calibrated", "a calibrated car, flat road, no friction", &[]),
     world(
         "friction",
@@ -116,6 +118,11 @@ pub const WORLDS: [WorldKind; 11] = [
         "camera",
         "everything, and a camera 40 ms late, 10 ms of jitter, 0.03 m and 2 mrad of noise",
         &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Camera],
+    ),
+    world(
+        "braking",
+        "everything, and a speed that falls to 60 % and rises again, by up to 3 m/s2",
+        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Braking],
     ),
     beyond(
         "slippery",
@@ -155,6 +162,11 @@ const fn beyond(name: &'static str, what: &'static str, parts: &'static [Part]) 
 impl WorldKind {
     fn has(&self, part: Part) -> bool {
         self.parts.contains(&part)
+    }
+
+    /// Whether cars brake and accelerate in it.
+    pub fn changes_speed(&self) -> bool {
+        self.has(Braking)
     }
 
     /// How the road lies across.

@@ -55,6 +55,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let world = match &arguments.world {
         None => World::new(),
         Some(name) => match WORLDS.iter().find(|kind| kind.name == name) {
+            Some(kind) if kind.changes_speed() => {
+                return Err(BadInput(format!(
+                    "--world: in {name} the speed changes, and each row of the fault campaign is driven at one speed"
+                )));
+            }
             Some(kind) => World::real(kind),
             None => {
                 let known: Vec<&str> = WORLDS.iter().map(|kind| kind.name).collect();

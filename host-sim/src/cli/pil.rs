@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(path) => haptic_batch::files::load_scenario(path)?,
         None => Scenario::default(),
     };
-    let steps = scenario.course().length_m() / scenario.speed_m_per_s() * 1e3;
+    let steps = scenario.duration_s() * 1e3;
     let bar = progress::bar(steps as u64, "steps");
     let target = match &arguments.can {
         Some(adapter) => Target::Board(adapter.clone()),

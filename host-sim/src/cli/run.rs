@@ -66,9 +66,9 @@ fn readable(single: &SingleRun) -> String {
         "ran to its end".into()
     };
     format!(
-        "{}, {} km/h, t_p {} s, {}, failure {}: {ended}\n{from} to {to} m of {:.0} m\n\n{}",
+        "{}, {}, t_p {} s, {}, failure {}: {ended}\n{from} to {to} m of {:.0} m\n\n{}",
         results.course,
-        results.speed_kmh,
+        single.scenario.speed(),
         record.t_p,
         record.condition,
         record.failure,

@@ -14,7 +14,7 @@ use haptic_sim::input::InputError;
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Scenario file whose guidance with its schedule, driver, vehicle and world are mapped; speed, delay, arm and road are
-    /// the map's; default: the paper's
+    /// the map's, so that a speed that changes is refused; default: the paper's
     #[arg(value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
     /// Directory for figures, the results and a report; default: no files

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, Optional, Union
 
@@ -9,7 +9,7 @@ class Scenario:
         self,
         *,
         course: Union[str, PathLike[str], Mapping[str, Any]] = ...,
-        speed: float = ...,
+        speed: Union[float, Mapping[str, Sequence[float]]] = ...,
         condition: Literal["manual", "high", "mid", "low"] = ...,
         sensors: Literal["paper", "exact"] = ...,
         seed: int = ...,

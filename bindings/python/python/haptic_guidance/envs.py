@@ -49,7 +49,7 @@ REWARD: dict[str, float] = {"error": 1.0, "effort": 0.1, "conflict": 1.0, "off_r
 Drives = Union[Scenario, Callable[[np.random.Generator], Scenario], None]
 
 _CHANNELS = Simulations.channels()
-_SEEN = [_CHANNELS.index(name) for name in OBSERVATION if name != "speed_m_per_s"]
+_SEEN = [_CHANNELS.index(name) for name in OBSERVATION]
 _HIGH = np.array(list(OBSERVATION.values()), dtype=np.float32)
 _INFO = {name: _CHANNELS.index(name) for name in ("time_s", "s_m", "lateral_error_m")}
 _TERMS = ("error", "effort", "conflict")
@@ -93,7 +93,6 @@ class _Loops:
             self.low, self.high = -most, most
         self.action_space = Box(self.low, self.high, (1,), np.float32)
         self.observation_space = Box(-_HIGH, _HIGH, dtype=np.float32)
-        self.speeds = np.zeros(count)
         self.slack: Optional[Scenario] = None
 
     def begin(self, index: int, rng: np.random.Generator, options: Optional[Mapping[str, Any]]) -> np.ndarray:
@@ -103,9 +102,7 @@ class _Loops:
             scenario = scenario(rng)
         if not isinstance(scenario, Scenario):
             raise InputError(f"scenario: a {type(scenario).__name__} is no Scenario")
-        seen = self.loops.begin(index, self.prepared(scenario), int(rng.integers(2**63)))
-        self.speeds[index] = scenario.speed_m_per_s
-        return seen
+        return self.loops.begin(index, self.prepared(scenario), int(rng.integers(2**63)))
 
     def prepared(self, scenario: Scenario) -> Scenario:
         return scenario
@@ -127,8 +124,7 @@ class _Loops:
         return seen, rewards, endings, costs
 
     def observations(self, seen: np.ndarray) -> np.ndarray:
-        rows = np.column_stack((seen[:, _SEEN], self.speeds))
-        return np.clip(rows, -_HIGH, _HIGH).astype(np.float32)
+        return np.clip(seen[:, _SEEN], -_HIGH, _HIGH).astype(np.float32)
 
 
 class _Driver(_Loops):

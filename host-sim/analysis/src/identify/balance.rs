@@ -7,7 +7,8 @@
 //! delay: `T_d(t + d) = T_d + d T_d'`. Shifts are taken out and the regression repeated until none is left.
 //!
 //! What it cannot see: a scale that T_d and T_h share, a delay that all three share, and the camera. A column
-//! that does not answer so (friction, a servo that is not in T_h) leaves much unexplained; then nothing is said.
+//! that does not answer so (friction, a servo that is not in T_h) leaves much unexplained; then nothing is said. Nor is
+//! anything where the speed changes: the vehicle's answer is one at one speed.
 
 use std::ops::Range;
 
@@ -114,6 +115,9 @@ fn held(torque: &[f64], dt: f64) -> Vec<f64> {
 
 /// Weighs the torques of `log` over the `stretches`; none if there is too little of them.
 pub(crate) fn balance(log: &DriveLog, stretches: &[Range<usize>], manual: bool) -> Option<Balance> {
+    if log.changes_speed() {
+        return None;
+    }
     let dt = log.dt_s;
     let settle = (SETTLE_S / dt) as usize;
     let rows: Vec<usize> = stretches

@@ -274,6 +274,7 @@ mod tests {
                 .collect(),
             driver_torque_nm: vec![0.0; 4800],
             resampling: Vec::new(),
+            speeds_m_per_s: None,
             findings: Vec::new(),
         }
     }

@@ -132,6 +132,15 @@ metrics! {
          it, from the failure on. 0: never above it. No value: above it at the end, or the failure comes behind \
          the window.",
         "ours";
+    mean_speed_m_per_s, "Mean speed", "m/s",
+        "Mean of v over time.",
+        "ours";
+    min_speed_m_per_s, "Least speed", "m/s",
+        "Smallest v.",
+        "ours";
+    max_speed_m_per_s, "Largest speed", "m/s",
+        "Largest v.",
+        "ours";
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ pub struct Failure {
 /// What a trace alone does not tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circumstances {
-    /// Constant speed of the run, m/s, above zero.
+    /// Speed, m/s, above zero, wherever a sample has none: a trace of an earlier version.
     pub speed_m_s: f64,
     /// Width of the lane, m.
     pub lane_width_m: f64,
@@ -81,6 +81,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         mut driver_in_conflict,
     ] = [Moments::default(); 5];
     let [mut out_of_lane, mut limited, mut in_conflict] = [0.0; 3];
+    let speeds = || samples.iter().map(|sample| speed_m_s(sample, circumstances));
     let mut times_to_crossing_s = Vec::with_capacity(samples.len());
     for sample in samples {
         let (t_d, t_h) = (sample.driver_torque_nm, sample.guidance_torque_nm);
@@ -94,14 +95,11 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
             in_conflict += 1.0;
             driver_in_conflict.add(t_d);
         }
-        let placement = Placement {
-            offset_m: sample.lateral_error_m,
-            heading_error_rad: sample.heading_error_rad,
-            path_curvature_1pm: sample.yaw_rate_rad_per_s / circumstances.speed_m_s,
-            road_curvature_1pm: sample.curvature_1pm,
-        };
-        times_to_crossing_s
-            .push(distance_to_lane_crossing_m(&placement, half_room_m) / circumstances.speed_m_s);
+        times_to_crossing_s.push(time_to_crossing_s(
+            sample,
+            speed_m_s(sample, circumstances),
+            half_room_m,
+        ));
     }
     let recovery = circumstances
         .failure
@@ -144,7 +142,29 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         guidance_authority: finite(guidance.sum_abs() / (guidance.sum_abs() + driver.sum_abs())),
         peak_lateral_error_after_failure_m: recovery.peak_lateral_error_m,
         time_to_recover_s: recovery.time_to_recover_s,
+        mean_speed_m_per_s: finite(speeds().sum::<f64>() / count),
+        min_speed_m_per_s: speeds().reduce(f64::min),
+        max_speed_m_per_s: speeds().reduce(f64::max),
     }
+}
+
+/// Speed of a sample, m/s.
+fn speed_m_s(sample: &Sample, circumstances: &Circumstances) -> f64 {
+    if sample.speed_m_per_s > 0.0 {
+        sample.speed_m_per_s
+    } else {
+        circumstances.speed_m_s
+    }
+}
+
+fn time_to_crossing_s(sample: &Sample, v: f64, half_room_m: f64) -> f64 {
+    let placement = Placement {
+        offset_m: sample.lateral_error_m,
+        heading_error_rad: sample.heading_error_rad,
+        path_curvature_1pm: sample.yaw_rate_rad_per_s / v,
+        road_curvature_1pm: sample.curvature_1pm,
+    };
+    distance_to_lane_crossing_m(&placement, half_room_m) / v
 }
 
 /// The samples from the first in the window to the last before the run first leaves it.

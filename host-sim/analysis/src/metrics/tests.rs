@@ -107,6 +107,28 @@ fn time_to_lane_crossing_of_a_turn() {
     assert_near(metrics.p15_time_to_lane_crossing_s, want, 1e-9);
 }
 
+/// From 20 m/s on 2 m/s2 less, 500 samples: 10.02 m/s in the last, 15.01 m/s in the mean; R = v/r, and R acos(1 - d/R)/v.
+#[test]
+fn a_speed_that_changes_counts_sample_by_sample() {
+    let trace = drive(5.0, |t| Sample {
+        speed_m_per_s: 20.0 - 2.0 * t,
+        yaw_rate_rad_per_s: 0.08,
+        ..Sample::default()
+    });
+    let metrics = measure(&trace, &ROAD);
+    assert_near(metrics.mean_speed_m_per_s, 15.01, 1e-9);
+    assert_near(metrics.min_speed_m_per_s, 10.02, 1e-9);
+    assert_near(metrics.max_speed_m_per_s, 20.0, 1e-9);
+    let crossing_s = |v: f64| (1.0 - 0.95 / (v / 0.08)).acos() / 0.08;
+    assert_near(metrics.min_time_to_lane_crossing_s, crossing_s(20.0), 1e-9);
+    // Rank 0.15*499 = 74.85 of times that rise.
+    let at = |n: f64| crossing_s(20.0 - 0.02 * n);
+    let p15 = 0.15 * at(74.0) + 0.85 * at(75.0);
+    assert_near(metrics.p15_time_to_lane_crossing_s, p15, 1e-9);
+    let old = drive(5.0, |_| Sample::default());
+    assert_near(measure(&old, &ROAD).mean_speed_m_per_s, 20.0, 1e-9);
+}
+
 /// 101 samples that drift at 0.1 m/s from 0 m: TLC falls from 9.5 s to 8.5 s, 15 % of the way up at 8.65 s.
 #[test]
 fn fifteenth_percentile_of_a_drift() {

@@ -6,6 +6,7 @@ use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_sim::guidance::{NoGuidance, OverBus};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::scenario::Speed;
 use haptic_sim::seeds::Stream;
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Outcome, Scenario, Simulation};
@@ -13,6 +14,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
+use super::roads::falling_and_rising;
 use super::{CARS, LEG_S, Road, WorldKind};
 
 /// The driver asks for guidance again so long after it has left, ms.
@@ -46,7 +48,7 @@ pub struct Leg {
     pub number: u32,
     /// Which car.
     pub car: u64,
-    /// How fast, km/h.
+    /// How fast at the start, km/h; nowhere faster.
     pub speed_kmh: f64,
     /// How long, s.
     pub driven_s: f64,
@@ -138,9 +140,14 @@ impl LegNumber {
         let lateral = world.lateral_m_per_s2().unwrap_or(road.lateral_m_per_s2);
         let course = road.course(speed_kmh / 3.6, lateral, world.surface(), &mut rng);
         let car = (root << 16).wrapping_add((number % CARS).into());
+        let speed = if world.changes_speed() {
+            falling_and_rising(speed_kmh, &mut rng)
+        } else {
+            Speed::Constant(speed_kmh)
+        };
         let scenario = Scenario::builder()
             .course(course)
-            .speed_kmh(speed_kmh)
+            .speed(speed)
             .driver(DriverParameters {
                 t_p,
                 remnant_sd_nm: road.remnant_sd_nm,
@@ -163,7 +170,7 @@ impl LegNumber {
     pub fn drive(&self, root: u64) -> Result<Leg, String> {
         let scenario = self.scenario(root)?;
         let mut simulation = Simulation::with(&scenario, OverBus::new(scenario.setup()));
-        let mut watch = Watch::new(scenario.speed_m_per_s());
+        let mut watch = Watch::new();
         while watch.steps < (LEG_S * 1e3) as u32 && watch.mode != Mode::Fault {
             let action = watch.action();
             let Some(outcome) = simulation.step(&action) else {
@@ -239,7 +246,6 @@ fn arm(v_m_per_s: f64, reliance: f64) -> ArmGains {
 
 /// Driver, host and listener of a leg.
 struct Watch {
-    v_m_per_s: f64,
     receiver: ReceiverState,
     mode: Mode,
     faults: FaultSet,
@@ -247,7 +253,8 @@ struct Watch {
     away: Option<u32>,
     steps: u32,
     active: u32,
-    curvature_1pm: f64,
+    /// Lateral acceleration of the road, left positive.
+    lateral_m_per_s2: f64,
     samples: f64,
     sum_m: f64,
     squares_m2: f64,
@@ -256,16 +263,15 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(v_m_per_s: f64) -> Self {
+    fn new() -> Self {
         Self {
-            v_m_per_s,
             receiver: ReceiverState::TRUSTED,
             mode: Mode::Active,
             faults: FaultSet::NONE,
             away: None,
             steps: 0,
             active: 0,
-            curvature_1pm: 0.0,
+            lateral_m_per_s2: 0.0,
             samples: 0.0,
             sum_m: 0.0,
             squares_m2: 0.0,
@@ -291,7 +297,8 @@ impl Watch {
     fn observe(&mut self, outcome: &Outcome) {
         self.steps += 1;
         if let Some(sample) = outcome.sample {
-            self.curvature_1pm = sample.curvature_1pm;
+            let v = sample.speed_m_per_s;
+            self.lateral_m_per_s2 = sample.curvature_1pm * v * v;
             let error_m = sample.lateral_error_m;
             self.samples += 1.0;
             self.sum_m += error_m;
@@ -310,7 +317,7 @@ impl Watch {
                     } else {
                         named
                     }),
-                    lateral_m_per_s2: self.curvature_1pm * self.v_m_per_s * self.v_m_per_s,
+                    lateral_m_per_s2: self.lateral_m_per_s2,
                 });
             }
             (self.mode, self.faults) = (guidance.mode, guidance.faults);

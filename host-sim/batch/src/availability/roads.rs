@@ -1,6 +1,7 @@
 //! Roads as they are built: straights and curves in turn, clothoids between them, a crossfall, superelevated curves.
 
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
+use haptic_sim::scenario::Speed;
 use haptic_sim::worlds::Surface;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -40,6 +41,25 @@ pub const ROADS: [Road; 2] = [
 const LEAST_LATERAL_M_PER_S2: f64 = 0.3;
 /// Room behind the leg for the points that are looked at, s.
 const AHEAD_S: f64 = 3.0;
+
+/// A speed that is held for some seconds, falls to as little as 60 % of the first, and rises again: never beyond the first,
+/// for which the curves are built.
+pub(super) fn falling_and_rising(first_kmh: f64, rng: &mut Xoshiro256PlusPlus) -> Speed {
+    let (mut time, mut kmh) = (vec![0.0], vec![first_kmh]);
+    let (mut now_s, mut now_kmh) = (0.0, first_kmh);
+    while now_s < LEG_S + AHEAD_S {
+        now_s += rng.random_range(3.0..12.0);
+        time.push(now_s);
+        kmh.push(now_kmh);
+        let next_kmh = first_kmh * rng.random_range(0.6..1.0);
+        let m_per_s2 = rng.random_range(0.5..3.0);
+        now_s += (f64::abs(next_kmh - now_kmh) / 3.6 / m_per_s2).max(0.001);
+        now_kmh = next_kmh;
+        time.push(now_s);
+        kmh.push(now_kmh);
+    }
+    Speed::ByTime { time, kmh }
+}
 
 impl Road {
     /// A course for a leg: a curve about every 20 s, to either side, as sharp as is drawn.

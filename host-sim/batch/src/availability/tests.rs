@@ -1,3 +1,4 @@
+use haptic_sim::scenario::Speed;
 use haptic_sim::worlds::WORLDS;
 
 use super::*;
@@ -196,4 +197,27 @@ fn thirty_cars_drive() {
         all.legs().iter().map(|leg| leg.number).collect::<Vec<_>>(),
         [7, 31, 7, 31]
     );
+}
+
+/// The lateral acceleration of the road at a declaration is v^2 times its curvature; here nobody declares anything: cars that
+/// brake and accelerate as people do, in the world in which all else is real too.
+#[test]
+fn braking_in_a_real_world_is_no_fault() {
+    let world = WORLDS.iter().find(|world| world.name == "braking").unwrap();
+    let mut active_s = 0.0;
+    for road in &ROADS {
+        for number in 0..3 {
+            let number = LegNumber { world, road, number };
+            let scenario = number.scenario(1).unwrap();
+            let Speed::ByTime { kmh, .. } = scenario.speed() else {
+                panic!("one speed");
+            };
+            let least = kmh.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(kmh.len() > 40 && least < 0.7 * kmh[0] && kmh.iter().all(|v| *v <= kmh[0]));
+            let leg = number.drive(1).unwrap();
+            assert_eq!((leg.ended, &leg.declarations), (Ended::Whole, &vec![]), "{leg:?}");
+            active_s += leg.active_s;
+        }
+    }
+    assert!(active_s > 1790.0, "{active_s}");
 }

@@ -41,6 +41,7 @@ impl Recorder {
             guidance_torque_nm: Vec::new(),
             driver_torque_nm: Vec::new(),
             resampling: Vec::new(),
+            speeds_m_per_s: None,
             findings: Vec::new(),
         };
         Self {

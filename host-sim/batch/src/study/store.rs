@@ -152,7 +152,7 @@ fn check(session: &Session, trace: &Trace) -> Result<(), String> {
         ));
     }
     let speed = (last.s_m - first.s_m) / lasts_s;
-    let wanted = session.scenario.speed_m_per_s();
+    let wanted = session.scenario.mean_speed_m_per_s(first.time_s, last.time_s);
     if (speed / wanted - 1.0).abs() > SPEED_WITHIN {
         return Err(format!(
             "driven at {:.1} km/h, and condition {} is at {:.1} km/h",

@@ -191,6 +191,11 @@ fn label(condition: Condition) -> &'static str {
 
 fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) -> Report {
     let results = &evaluation.results;
+    // All runs have the same.
+    let speed = evaluation
+        .runs
+        .first()
+        .map_or_else(String::new, |(scenario, _)| scenario.speed().to_string());
     let course = if results.course == PAPER_COURSE {
         "The course is this project's own: the paper prints no numbers for its own. "
     } else {
@@ -246,10 +251,10 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
     Report {
         title: "Evaluation of shared steering control".into(),
         summary: format!(
-            "Three drivers under four conditions on {}, {} km/h, the shipping controller in the loop, sensors: \
+            "Three drivers under four conditions on {}, {}, the shipping controller in the loop, sensors: \
              {}. {course}Metrics are taken over {from} to {to} m of the road. {}",
             results.course,
-            results.speed_kmh,
+            speed,
             format!("{:?}", results.sensors).to_lowercase(),
             notes(&results.notes),
         ),

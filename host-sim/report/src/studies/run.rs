@@ -97,6 +97,9 @@ fn figure(single: &SingleRun) -> Figure {
         panel("Driver torque (N.m)", |s| s.driver_torque_nm),
         panel("Guidance torque (N.m)", |s| s.guidance_torque_nm),
     ];
+    if single.scenario.changes_speed() {
+        panels.push(panel("Speed (km/h)", |s| 3.6 * s.speed_m_per_s));
+    }
     if single.scenario.guidance().probe {
         let place = |time_s: f64| {
             let next = samples.partition_point(|s| s.time_s < time_s);
@@ -149,9 +152,9 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
     Report {
         title: "A run under shared steering control".into(),
         summary: format!(
-            "{}, {} km/h, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
+            "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
             scenario.course().name(),
-            scenario.speed_kmh(),
+            scenario.speed(),
             scenario.driver().t_p,
             scenario.gains().k_d,
             scenario.gains().k_hg,

@@ -12,6 +12,8 @@ use crate::scenario::{Condition, FailureKind, Scenario, Sensors};
 pub enum Reason {
     /// A world that is not the paper's: wind, tyres, a real column, a road that is not level.
     World,
+    /// A speed that changes.
+    ChangingSpeed,
     /// Sensors with errors.
     SensorErrors,
     /// Exact sensors, past the bus.
@@ -30,6 +32,7 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::World => "a world that is not the paper's",
+            Self::ChangingSpeed => "a speed that changes",
             Self::SensorErrors => "sensors with errors",
             Self::ExactSensors => "exact sensors, past the bus",
             Self::Probe => "a probe",
@@ -58,6 +61,7 @@ pub fn why_not(scenario: &Scenario) -> Option<Reason> {
     let failure = scenario.failure();
     let reasons = [
         (!world.is_ideal() || !scenario.course().is_level(), Reason::World),
+        (scenario.changes_speed(), Reason::ChangingSpeed),
         (sensor_errors != SensorErrors::default(), Reason::SensorErrors),
         (
             guided && scenario.sensors() == Sensors::Exact,

@@ -30,6 +30,7 @@ struct Slot {
     /// The scenario's number, while its run is under way or not yet handed on.
     scenario: Option<usize>,
     plan: Option<Plan>,
+    speed_m_per_s: f64,
     remnant: Option<Remnant>,
     run: Run,
     /// Whether the run came to its end without suspicion.
@@ -68,6 +69,7 @@ impl<const N: usize> Lanes<N> {
             slots: std::array::from_fn(|_| Slot {
                 scenario: None,
                 plan: None,
+                speed_m_per_s: 0.0,
                 remnant: None,
                 run: Run {
                     trace: Trace {
@@ -109,6 +111,7 @@ impl<const N: usize> Lanes<N> {
         }
         slot.remnant = (simulation.remnant.scale_nm != 0.0).then_some(simulation.remnant);
         slot.plan = Some(simulation.plan);
+        slot.speed_m_per_s = scenario.speed_m_per_s();
         self.happen(lane);
     }
 
@@ -305,6 +308,7 @@ impl<const N: usize> Lanes<N> {
                 wheel_rate_rad_per_s: state[WHEEL_RATE][l],
                 yaw_rate_rad_per_s: state[YAW_RATE][l],
                 sideslip_rad: state[BETA][l],
+                speed_m_per_s: slot.speed_m_per_s,
                 driver_torque_nm: driver_nm[l],
                 guidance_torque_nm: torque_nm[l],
                 guidance_limited: self.ecus.is_limited(l),

@@ -138,7 +138,7 @@ impl<const N: usize> Worlds<N> {
         self.driver.begin(lane, road, &simulation.driver_points);
         self.camera.begin(lane, road, &simulation.camera);
         self.body.begin(lane, road, &simulation.body);
-        self.end[lane] = simulation.plan.end_m;
+        self.end[lane] = simulation.end_m;
         (self.alive[lane], self.suspect[lane]) = (ALIVE, 0);
     }
 

@@ -6,8 +6,8 @@ use haptic_core::config::Setup;
 
 use super::guidance_file::in_words_of_the_file;
 use super::{
-    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, SPEED_KMH, Scenario,
-    Sensors, Values, file,
+    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, Scenario, Sensors,
+    Speed, Values, file,
 };
 use crate::input::{InputError, RangeError, in_range};
 use crate::models::disturbances::SensorErrors;
@@ -32,6 +32,8 @@ pub enum ScenarioError {
     Range(RangeError),
     /// An instant outside the run.
     AfterTheEnd(RangeError),
+    /// Points of a speed that do not go together.
+    Speed(String),
     /// A manual driver with something that takes guidance.
     ManualWith {
         /// The field, with its value.
@@ -45,9 +47,11 @@ pub enum ScenarioError {
         course: String,
         /// Its length, m.
         length_m: f64,
+        /// The length that it needs, m.
+        needed_m: f64,
         /// Speed, km/h.
         speed_kmh: f64,
-        /// Look-ahead, m.
+        /// Look-ahead at that speed, m.
         look_ahead_m: f64,
         /// The same as time, s.
         look_ahead_s: f64,
@@ -65,20 +69,21 @@ impl fmt::Display for ScenarioError {
         match self {
             Self::Range(error) => error.fmt(f),
             Self::AfterTheEnd(error) => write!(f, "{error}: the run ends there"),
+            Self::Speed(message) => f.write_str(message),
             Self::ManualWith { what, cure } => {
                 write!(f, "condition = \"manual\" has no guidance, but {what}; {cure}")
             }
             Self::CourseTooShort {
                 course,
                 length_m,
+                needed_m,
                 speed_kmh,
                 look_ahead_m,
                 look_ahead_s,
             } => write!(
                 f,
-                "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {:.1} m: \
-                 {look_ahead_m:.1} m of look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive",
-                look_ahead_m + speed_kmh / 3.6 * LEAST_DURATION_S,
+                "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {needed_m:.1} m: \
+                 {look_ahead_m:.1} m of look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive"
             ),
         }
     }
@@ -114,7 +119,13 @@ impl ScenarioBuilder {
 
     /// Constant speed, km/h: 20 to 250.
     pub fn speed_kmh(mut self, speed_kmh: f64) -> Self {
-        self.values.speed_kmh = speed_kmh;
+        self.values.speed = Speed::Constant(speed_kmh);
+        self
+    }
+
+    /// How fast the vehicle goes.
+    pub fn speed(mut self, speed: Speed) -> Self {
+        self.values.speed = speed;
         self
     }
 
@@ -209,7 +220,7 @@ impl ScenarioBuilder {
     pub fn build(self) -> Result<Scenario, ScenarioError> {
         let values = self.values;
         let within = |table: &'static str| move |e: RangeError| e.within(table);
-        in_range("speed", values.speed_kmh, SPEED_KMH, "km/h")?;
+        let speed = values.speed.profile()?;
         values.driver.check().map_err(within("driver"))?;
         check_gains(values.gains).map_err(within("driver"))?;
         values.vehicle.check().map_err(within("vehicle"))?;
@@ -225,7 +236,7 @@ impl ScenarioBuilder {
         values.world.check().map_err(within("world"))?;
         values.sensor_errors.check().map_err(within("sensor_errors"))?;
         values.tolerances.check().map_err(within("tolerances"))?;
-        let scenario = Scenario { values, setup };
+        let scenario = Scenario { values, setup, speed };
         scenario.check_length()?;
         scenario.check_manual()?;
         Ok(scenario)
@@ -237,12 +248,28 @@ impl Scenario {
         if self.duration_s() >= LEAST_DURATION_S {
             return Ok(());
         }
+        let ahead_s = self.longest_look_ahead_s();
+        // While the vehicle brakes, the farthest point may come back: what counts is how far it ever was.
+        let (mut needed_m, mut v) = (0.0, 0.0);
+        for tenth in 0..=10 {
+            let time_s = 0.1 * f64::from(tenth) * LEAST_DURATION_S;
+            let way_m = self.speed.way_m(time_s);
+            let then = self.speed.at(time_s, way_m);
+            if way_m + then * ahead_s > needed_m {
+                (needed_m, v) = (way_m + then * ahead_s, then);
+            }
+        }
         Err(ScenarioError::CourseTooShort {
             course: self.course().name().into(),
             length_m: self.course().length_m(),
-            speed_kmh: self.speed_kmh(),
-            look_ahead_m: self.look_ahead_m(),
-            look_ahead_s: self.longest_look_ahead_s(),
+            needed_m,
+            speed_kmh: if self.changes_speed() {
+                (36.0 * v).round() / 10.0
+            } else {
+                self.speed_kmh()
+            },
+            look_ahead_m: v * ahead_s,
+            look_ahead_s: ahead_s,
         })
     }
 

@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::guidance_file::GuidanceFile;
-use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors};
+use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors, Speed};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
@@ -58,7 +58,7 @@ pub(super) fn parse(
     };
     Ok(Scenario::builder()
         .course(course)
-        .speed_kmh(file.speed)
+        .speed(file.speed)
         .condition(file.condition)
         .driver(DriverParameters {
             a_1,
@@ -89,7 +89,7 @@ pub(super) fn parse(
 pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
     let super::Values {
         course,
-        speed_kmh,
+        speed,
         manual: _,
         driver: d,
         gains,
@@ -112,7 +112,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         },
         road: None,
         lane: None,
-        speed: *speed_kmh,
+        speed: speed.clone(),
         condition: match scenario.condition() {
             // The gains say the rest.
             Condition::Custom => Condition::Mid,
@@ -251,7 +251,7 @@ struct ScenarioFile {
     road: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     lane: Option<i32>,
-    speed: f64,
+    speed: Speed,
     condition: Condition,
     sensors: Sensors,
     seed: u64,
@@ -274,7 +274,7 @@ impl Default for ScenarioFile {
             course: CourseField::Named(PAPER_COURSE.into()),
             road: None,
             lane: None,
-            speed: DEFAULT_SPEED_KMH,
+            speed: Speed::Constant(DEFAULT_SPEED_KMH),
             condition: Condition::Mid,
             sensors: Sensors::default(),
             seed: 1,

@@ -8,6 +8,7 @@
 mod builder;
 mod file;
 mod guidance_file;
+mod speed;
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +19,8 @@ use haptic_core::params::{Params, VehicleParams};
 use serde::{Deserialize, Serialize};
 
 pub use builder::{ScenarioBuilder, ScenarioError};
+pub(crate) use speed::SpeedProfile;
+pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_KMH, SPEED_KMH, Speed};
 
 use crate::input::{InputError, in_range};
 use crate::models::disturbances::SensorErrors;
@@ -28,8 +31,6 @@ use crate::models::tolerances::{Car, Tolerances};
 use crate::models::vehicle::VehicleParameters;
 use crate::seeds::Stream;
 
-/// Speeds that a scenario may have, km/h. The controller guides from 5 m/s on.
-pub const SPEED_KMH: std::ops::RangeInclusive<f64> = 20.0..=250.0;
 /// Speed of the paper's experiment and evaluation, km/h.
 pub const DEFAULT_SPEED_KMH: f64 = 60.0;
 /// When the paper lets the guidance fail, s.
@@ -200,15 +201,16 @@ impl Default for GuidanceParameters {
 #[derive(Debug, Clone)]
 pub struct Scenario {
     values: Values,
-    /// Follows from the values.
+    /// These follow from the values.
     setup: Setup,
+    speed: SpeedProfile,
 }
 
 /// The values that a person chooses.
 #[derive(Debug, Clone, PartialEq)]
 struct Values {
     course: Course,
-    speed_kmh: f64,
+    speed: Speed,
     manual: bool,
     driver: DriverParameters,
     gains: ArmGains,
@@ -227,7 +229,7 @@ impl Default for Values {
     fn default() -> Self {
         Self {
             course: Course::paper(),
-            speed_kmh: DEFAULT_SPEED_KMH,
+            speed: Speed::Constant(DEFAULT_SPEED_KMH),
             manual: false,
             driver: DriverParameters::default(),
             gains: Condition::Mid.gains(),
@@ -256,6 +258,7 @@ impl Default for Scenario {
         Self {
             values: Values::default(),
             setup: Setup::PAPER,
+            speed: SpeedProfile::constant(DEFAULT_SPEED_KMH),
         }
     }
 }
@@ -328,9 +331,24 @@ impl Scenario {
         &self.values.course
     }
 
-    /// Constant speed, km/h.
+    /// How fast the vehicle goes.
+    pub fn speed(&self) -> &Speed {
+        &self.values.speed
+    }
+
+    /// Whether the speed changes in the run.
+    pub fn changes_speed(&self) -> bool {
+        !self.speed.is_constant()
+    }
+
+    /// Speed at the start, km/h: that of the whole run unless it changes.
     pub fn speed_kmh(&self) -> f64 {
-        self.values.speed_kmh
+        self.values.speed.start_kmh()
+    }
+
+    /// Speed over the run.
+    pub(crate) fn speed_profile(&self) -> &SpeedProfile {
+        &self.speed
     }
 
     /// How the driver drives: follows from the gains and from whether there is guidance.
@@ -430,15 +448,24 @@ impl Scenario {
         self.values.controller_params()
     }
 
-    /// Speed, m/s.
+    /// Speed at the start, m/s: that of the whole run unless it changes.
     pub fn speed_m_per_s(&self) -> f64 {
-        self.values.speed_kmh / 3.6
+        self.speed.start_m_per_s()
     }
 
-    /// Distance of the farthest point that anybody looks at, m: the run ends when it reaches the end of the
-    /// course. With table 8 it is the driver's far point.
+    /// Mean speed between two times of a run that follows the road, m/s.
+    pub fn mean_speed_m_per_s(&self, from_s: f64, to_s: f64) -> f64 {
+        if self.speed.is_constant() {
+            return self.speed_m_per_s();
+        }
+        (self.speed.way_m(to_s) - self.speed.way_m(from_s)) / (to_s - from_s)
+    }
+
+    /// Distance of the farthest point that anybody looks at when the run ends, m: it ends because that point reaches
+    /// the end of the course. With table 8 it is the driver's far point.
     pub fn look_ahead_m(&self) -> f64 {
-        self.speed_m_per_s() * self.longest_look_ahead_s()
+        let (_, v) = self.end();
+        v * self.longest_look_ahead_s()
     }
 
     /// Arc length that the centre of gravity reaches in a run that does not diverge, m: the course's, less the
@@ -450,10 +477,16 @@ impl Scenario {
     /// How long a run lasts that does not diverge, s. In curves the points ahead lie a little further along
     /// the road than their distance, so a run may end some hundredths of a second earlier.
     pub fn duration_s(&self) -> f64 {
-        self.reach_m() / self.speed_m_per_s()
+        self.end().0
     }
 
-    fn longest_look_ahead_s(&self) -> f64 {
+    /// When the run ends that does not diverge, s, and the speed then, m/s.
+    fn end(&self) -> (f64, f64) {
+        let length_m = self.values.course.length_m();
+        self.speed.end(length_m, self.longest_look_ahead_s())
+    }
+
+    pub(crate) fn longest_look_ahead_s(&self) -> f64 {
         let DriverParameters { t_n, t_f, .. } = self.values.driver;
         let guidance = &self.values.guidance;
         t_n.max(t_f).max(guidance.t_n).max(guidance.t_f)

@@ -7,8 +7,8 @@
 //!
 //! The signals are put on an even grid at the pace of the camera: T_h as held at each instant, the others on the line
 //! between their neighbours. Frames with a wrong CRC are not used and those that are lost are counted ([`protection`]);
-//! where a signal pauses or the preview is not valid, it is missing, and the preflight bridges or cuts the drive there. A
-//! speed that changes is refused with its line.
+//! where a signal pauses or the preview is not valid, it is missing, and the preflight bridges or cuts the drive there. So
+//! it is where the vehicle is slower than its model goes.
 
 mod far_point;
 mod protection;
@@ -30,18 +30,18 @@ pub const HAPTIC_DBC: &str = include_str!("../../../../../core/haptic.dbc");
 const RATE_HZ: f64 = 120.0;
 /// Longest pause of a signal, s: the age at which the ECU no longer trusts it.
 const LONGEST_PAUSE_S: f64 = 0.03;
-/// The speed's largest share of deviation from its mean: the vehicle model is one of constant speed.
-const SPEED_TOLERANCE: f64 = 0.03;
+/// Below it the vehicle model's equations, which divide by the speed, are not used, m/s.
+const TOO_SLOW_M_PER_S: f64 = 2.5;
 /// Slowest mean speed, m/s, at which the guidance works.
 const SLOWEST_M_PER_S: f64 = 5.0;
 
 /// Said of every log that comes from a trace, of the vehicle of table 9 and of another.
 const NOTE: &str = "From a bus trace: e_theta at the driver's far point (1.0 s) is computed from the guidance's far point \
-                    (0.7 s), 0.3 s later, and the turn that the vehicle of table 9 makes until then with the recorded wheel angle. The \
+                    (0.7 s) when it is there, some 0.3 s later, and the turn that the vehicle of table 9 makes until then with the recorded wheel angle. The \
                     estimates are as good as that vehicle's parameters.";
 
 const NOTE_OF_OTHER: &str = "From a bus trace: e_theta at the driver's far point (1.0 s) is computed from the guidance's \
-                             far point (0.7 s), 0.3 s later, and the turn that the vehicle given makes until then with the recorded \
+                             far point (0.7 s) when it is there, some 0.3 s later, and the turn that the vehicle given makes until then with the recorded \
                              wheel angle. The estimates are as good as that vehicle's parameters.";
 
 /// How a recording is to be understood.
@@ -145,7 +145,8 @@ fn read_trace(
     } else {
         Some(course("Guidance_Torque")?)
     };
-    let speed_m_per_s = course("Vehicle_Speed1")?.steady()?;
+    let speed = course("Vehicle_Speed1")?;
+    speed.guided()?;
     let mut findings: Vec<[String; 3]> = audits.iter().filter_map(Audit::finding).collect();
     let not_valid = valid.value.iter().filter(|&&v| v == 0.0).count();
     if not_valid > 0 {
@@ -177,8 +178,13 @@ fn read_trace(
     let at = |k: usize| start_s + k as f64 * dt_s;
     let on_grid = |c: &Course| -> Vec<f64> { sampled(c, (0..rows).map(at), Hold::Line) };
     let wheel_angle_rad = on_grid(&angle);
-    let e_theta_rad =
-        far_point::driver_yaw_error(&on_grid(&e_theta), &wheel_angle_rad, vehicle, speed_m_per_s, dt_s);
+    let (speed_m_per_s, slow) = speed.on((0..rows).map(at));
+    findings.extend(speed.slow(&slow));
+    let mut seen_rad = on_grid(&e_theta);
+    for (seen, slow) in seen_rad.iter_mut().zip(&slow) {
+        *seen = if *slow { f64::NAN } else { *seen };
+    }
+    let e_theta_rad = far_point::driver_yaw_error(&seen_rad, &wheel_angle_rad, vehicle, &speed_m_per_s, dt_s);
     let rows = e_theta_rad.len();
     let cut = |mut values: Vec<f64>| {
         values.truncate(rows);
@@ -202,6 +208,7 @@ fn read_trace(
     )
     .map_err(|e| e.to_string())?;
     log.findings = findings;
+    log.tell_speed(&speed.value);
     Ok(log)
 }
 
@@ -316,8 +323,8 @@ impl Course {
         ])
     }
 
-    /// The mean of a speed that does not change.
-    fn steady(&self) -> Result<f64, String> {
+    /// Whether it is a speed at which there is guidance, in the mean.
+    fn guided(&self) -> Result<(), String> {
         let mean = self.value.iter().sum::<f64>() / self.value.len() as f64;
         if mean < SLOWEST_M_PER_S {
             return Err(format!(
@@ -325,16 +332,32 @@ impl Course {
                 self.name
             ));
         }
-        let off = self
-            .value
-            .iter()
-            .position(|v| (v - mean).abs() > SPEED_TOLERANCE * mean);
-        off.map_or(Ok(mean), |k| {
-            Err(format!(
-                "line {}: {} is {:.2} m/s where the mean is {mean:.2}: e_theta at the driver's far point can be computed \
-                 for a constant speed only",
-                self.line[k], self.name, self.value[k]
-            ))
+        Ok(())
+    }
+
+    /// A speed at these instants, the last one where it is missing, and whether each was too slow for the vehicle model.
+    fn on(&self, at_s: impl Iterator<Item = f64>) -> (Vec<f64>, Vec<bool>) {
+        let within = at_s.map(|t| t.clamp(self.time_s[0], self.last_s()));
+        let mut last = self.value[0];
+        let held = sampled(self, within, Hold::Line).into_iter().map(|v| {
+            last = if v.is_finite() { v } else { last };
+            (last.max(TOO_SLOW_M_PER_S), last < TOO_SLOW_M_PER_S)
+        });
+        held.unzip()
+    }
+
+    /// How often it was too slow, in words.
+    fn slow(&self, slow: &[bool]) -> Option<[String; 3]> {
+        let count = slow.iter().filter(|slow| **slow).count();
+        (count > 0).then(|| {
+            [
+                self.name.to_owned(),
+                format!(
+                    "{:.1} s below {TOO_SLOW_M_PER_S} m/s, where e_theta at the driver's far point cannot be computed",
+                    count as f64 / RATE_HZ
+                ),
+                "bridged if short, else cut".to_owned(),
+            ]
         })
     }
 }

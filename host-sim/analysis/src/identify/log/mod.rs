@@ -73,9 +73,16 @@ pub struct DriveLog {
     /// Autocorrelation, from lag 1 on, that white noise has here because the signals were read off between rows; empty
     /// where the rows are as recorded.
     pub resampling: Vec<f64>,
+    /// The least and the largest speed, m/s, if the record tells it.
+    pub speeds_m_per_s: Option<[f64; 2]>,
     /// What was found when the log was read: what, found, done.
     pub findings: Vec<[String; 3]>,
 }
+
+/// The column of a time series that tells the speed; a log may lack it.
+const SPEED_COLUMN: &str = "speed_m_per_s";
+/// The largest speed over the least that passes for one speed.
+const ONE_SPEED: f64 = 1.06;
 
 /// Why a log was refused. The text names the line (1 is the header) and the column.
 #[derive(Debug, Clone, PartialEq)]
@@ -153,6 +160,7 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
             resampling: Vec::new(),
+            speeds_m_per_s: None,
             findings,
         })
     }
@@ -176,10 +184,17 @@ impl DriveLog {
     pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
         let mut table = TableReader::new(source)?;
         let index = find_columns(table.header(), table.header_line(), manual)?;
+        let speed = table
+            .header()
+            .iter()
+            .position(|name| name.eq_ignore_ascii_case(SPEED_COLUMN));
+        let mut speeds = Vec::new();
         let mut lines = Vec::new();
         let mut columns: [Vec<f64>; 6] = Default::default();
         for row in table.rows() {
             let row = row?;
+            // Not needed: what is no number tells nothing.
+            speeds.extend(speed.and_then(|i| row.field(i).parse::<f64>().ok()));
             lines.push(row.line);
             for (c, column) in columns.iter_mut().enumerate() {
                 column.push(match index[c] {
@@ -192,7 +207,31 @@ impl DriveLog {
                 });
             }
         }
-        Self::from_table(&lines, columns, manual)
+        let mut log = Self::from_table(&lines, columns, manual)?;
+        log.tell_speed(&speeds);
+        Ok(log)
+    }
+
+    /// Keeps what the record says of the speed.
+    pub(crate) fn tell_speed(&mut self, speeds_m_per_s: &[f64]) {
+        let known = || speeds_m_per_s.iter().copied().filter(|v| v.is_finite());
+        self.speeds_m_per_s = known()
+            .reduce(f64::min)
+            .zip(known().reduce(f64::max))
+            .map(Into::into);
+        if let Some([least, most]) = self.speeds_m_per_s.filter(|_| self.changes_speed()) {
+            self.findings.push([
+                "speed".to_owned(),
+                format!("{least:.1} to {most:.1} m/s"),
+                "the balance of torques on the column, which takes one speed, is not judged".to_owned(),
+            ]);
+        }
+    }
+
+    /// Whether the record says that the speed changed by more than a few per cent: the aligning torque then does too.
+    pub(crate) fn changes_speed(&self) -> bool {
+        self.speeds_m_per_s
+            .is_some_and(|[least, most]| most > ONE_SPEED * least)
     }
 
     /// A log of columns in memory, in the order of [`COLUMNS`] and of equal lengths; a value that is missing is NaN. Rows
@@ -268,6 +307,7 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
             resampling: grid.autocorrelation(&time),
+            speeds_m_per_s: None,
             findings: grid.finding.into_iter().collect(),
         })
     }

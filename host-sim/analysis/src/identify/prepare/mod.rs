@@ -184,6 +184,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         guidance_torque_nm: t_h.signal,
         driver_torque_nm: t_d.signal,
         resampling: log.resampling.clone(),
+        speeds_m_per_s: log.speeds_m_per_s,
         findings: Vec::new(),
     };
     preflight.lane_noise = lane_noise;

@@ -48,7 +48,8 @@ pub struct RealPlant<V = SingleTrack, C = SteeringColumn> {
 
 /// What is held during a step.
 struct Held {
-    v_m_per_s: f64,
+    /// Speed at the start and at the end of the step.
+    v_m_per_s: [f64; 2],
     gains: ArmGains,
     input: PlantInput,
     surroundings: Surroundings,
@@ -75,11 +76,12 @@ impl RealPlant {
 }
 
 impl<V: Vehicle, C: Column> RealPlant<V, C> {
-    /// Advances by one step at a speed, on a road with a bank (rad, left edge higher: positive).
+    /// Advances by one step on a road with a bank (rad, left edge higher: positive). The speed changes evenly from its
+    /// start to its end; the lateral velocity has its own equation, and the side-slip angle follows from both.
     pub fn step(
         &mut self,
         plant: &mut Plant,
-        v_m_per_s: f64,
+        v_m_per_s: [f64; 2],
         gains: ArmGains,
         input: &PlantInput,
         bank_rad: f64,
@@ -98,7 +100,7 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         };
         let before = plant.state();
         let x = [
-            v_m_per_s * before.sideslip_rad.tan(),
+            v_m_per_s[0] * before.sideslip_rad.tan(),
             before.yaw_rate_rad_s,
             before.wheel_rad,
             before.wheel_rate_rad_s,
@@ -122,14 +124,14 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         };
         plant.set_state(
             PlantState {
-                sideslip_rad: next[0].atan2(v_m_per_s),
+                sideslip_rad: next[0].atan2(v_m_per_s[1]),
                 yaw_rate_rad_s: next[1],
                 wheel_rad: next[2],
                 wheel_rate_rad_s: next[3],
                 arm_nm: next[5],
                 yaw_rad: next[7],
             },
-            next[0].hypot(v_m_per_s) * STEP_S,
+            next[0].hypot(0.5 * (v_m_per_s[0] + v_m_per_s[1])) * STEP_S,
         );
     }
 
@@ -150,11 +152,12 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
             _,
         ] = *x;
         let Held {
-            v_m_per_s,
+            v_m_per_s: [from, to],
             gains,
             input,
             ..
         } = held;
+        let v_m_per_s = from + share * (to - from);
         let world = &self.world;
         let lagging = world.motor_lag > 0.0;
         let torque = if lagging { motor } else { input.guidance_torque_nm };
@@ -168,9 +171,9 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
 
         let response =
             self.vehicle
-                .respond(*v_m_per_s, [lateral_m_per_s, yaw_rate], wheel, &held.surroundings);
+                .respond(v_m_per_s, [lateral_m_per_s, yaw_rate], wheel, &held.surroundings);
         let hands = arm + input.remnant_nm;
-        let assist = world.assist_nm(hands, *v_m_per_s);
+        let assist = world.assist_nm(hands, v_m_per_s);
         let torque = hands + acting + assist + response.aligning_nm;
         let [wheel_acceleration, deflection_rate] = self.column.respond(wheel_rate, deflection, torque);
 

@@ -20,7 +20,7 @@ fn largest_difference(world: WorldParameters, target_rad: f64) -> [f64; 5] {
             remnant_nm: 0.0,
         };
         linear.step(&transition, &input);
-        real.step(&mut plant, V, gains, &input, 0.0);
+        real.step(&mut plant, [V; 2], gains, &input, 0.0);
         let [a, b] = [&linear, &plant].map(Plant::state);
         let pairs = [
             [a.sideslip_rad, b.sideslip_rad],
@@ -76,7 +76,7 @@ fn steady(world: WorldParameters, lateral_m_per_s2: f64, v: f64, gains: ArmGains
             remnant_nm,
             ..PlantInput::default()
         };
-        real.step(&mut plant, v, gains, &input, bank);
+        real.step(&mut plant, [v; 2], gains, &input, bank);
     }
     plant.state()
 }
@@ -130,7 +130,7 @@ fn friction_holds_the_wheel_until_it_is_overcome() {
                 guidance_torque_nm: torque_nm * (f64::from(step) / 4000.0).min(1.0),
                 ..PlantInput::default()
             };
-            real.step(&mut plant, V, ArmGains { k_d: 0.0, k_hg: 0.0 }, &input, 0.0);
+            real.step(&mut plant, [V; 2], ArmGains { k_d: 0.0, k_hg: 0.0 }, &input, 0.0);
         }
         plant.state().wheel_rad.to_degrees()
     };
@@ -231,5 +231,87 @@ fn the_vehicle_is_that_of_commonroad() {
                 assert!(share < bounds[i], "{tyres:?} {manoeuvre} {i}: {share}");
             }
         }
+    }
+}
+
+/// The equations of the paper in the form in which the lateral velocity w is a state, solved for the derivatives one by one,
+/// with the speed v of the instant.
+fn derivatives(x: &[f64; 8], v: f64, target: f64, t_h: f64, gains: ArmGains) -> [f64; 8] {
+    let p = VehicleParameters::default();
+    let [w, r, phi, phi_dot, t_d, psi, ..] = *x;
+    let delta = p.k_t * phi;
+    let front = 2.0 * p.k_f * (delta - (w + p.l_f * r) / v);
+    let rear = -2.0 * p.k_r * (w - p.l_r * r) / v;
+    let k_aln = 2.0 * p.e_t * p.k_f * p.k_t / (1.0 + 2.0 * p.e_t * p.k_f / p.k_s);
+    let t_a = k_aln * ((w + p.l_f * r) / v - delta);
+    [
+        (front + rear) / p.m - v * r,
+        (p.l_f * front - p.l_r * rear) / p.i,
+        phi_dot,
+        (t_d + t_h + t_a - p.b_s * phi_dot) / p.j_s,
+        (gains.k_d * target + 1.0 * (target - phi) - gains.k_hg * t_h - t_d) / 0.1,
+        r,
+        v * psi.cos() - w * psi.sin(),
+        v * psi.sin() + w * psi.cos(),
+    ]
+}
+
+/// 30 m/s for a second, -8 m/s2 for 2.5 s, +4 m/s2 for 2.5 s, 20 m/s for 2 s, the wheel turned to and fro.
+#[test]
+fn under_braking_a_step_is_as_exact_as_a_fine_runge_kutta() {
+    let speed = |t: f64| 30.0 - 8.0 * (t - 1.0).clamp(0.0, 2.5) + 4.0 * (t - 3.5).clamp(0.0, 2.5);
+    let target = |t: f64| 0.5 * (1.5 * t).sin() + 0.2;
+    let gains = ArmGains { k_d: 3.0, k_hg: 0.5 };
+    let (vehicle, driver) = (VehicleParameters::default(), DriverParameters::default());
+    let mut real = RealPlant::new(WorldParameters::default(), &vehicle, &driver, 1);
+    let (mut plant, mut x) = (Plant::default(), [0.0; 8]);
+    for step in 0..8000_u32 {
+        let [from, to] = [step, step + 1].map(|step| f64::from(step) * STEP_S);
+        let (now, next, t_h) = (target(from), target(to), 0.3 * f64::from(step / 100).sin());
+        let input = PlantInput {
+            target_now_rad: now,
+            target_next_rad: next,
+            guidance_torque_nm: t_h,
+            remnant_nm: 0.0,
+        };
+        real.step(&mut plant, [speed(from), speed(to)], gains, &input, 0.0);
+        let h = STEP_S / 10.0;
+        for i in 0..10_u32 {
+            let at = |x: &[f64; 8], part: f64| {
+                let share = (f64::from(i) + part) / 10.0;
+                derivatives(
+                    x,
+                    speed(from + share * STEP_S),
+                    now + (next - now) * share,
+                    t_h,
+                    gains,
+                )
+            };
+            let plus = |k: &[f64; 8], h: f64| std::array::from_fn(|j| x[j] + h * k[j]);
+            let k1 = at(&x, 0.0);
+            let k2 = at(&plus(&k1, h / 2.0), 0.5);
+            let k3 = at(&plus(&k2, h / 2.0), 0.5);
+            let k4 = at(&plus(&k3, h), 1.0);
+            x = std::array::from_fn(|j| x[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]));
+        }
+        let (state, v) = (plant.state(), speed(to));
+        let found = [
+            v * state.sideslip_rad.tan(),
+            state.yaw_rate_rad_s,
+            state.wheel_rad,
+            state.wheel_rate_rad_s,
+            state.arm_nm,
+            state.yaw_rad,
+        ];
+        for (i, (found, wanted)) in found.iter().zip(&x).enumerate() {
+            assert!(
+                (found - wanted).abs() < 1e-7,
+                "step {step}, state {i}: {found}, not {wanted}"
+            );
+        }
+    }
+    assert!(x[7].abs() > 20.0 && x[5].abs() > 0.2, "the oracle moved: {x:?}");
+    for (found, wanted) in plant.position_m().iter().zip(&x[6..]) {
+        assert!((found - wanted).abs() < 1e-4, "{found}, not {wanted}");
     }
 }

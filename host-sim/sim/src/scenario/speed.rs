@@ -1,0 +1,270 @@
+//! How fast the vehicle goes: at one speed, or through points by time or by place.
+//!
+//! Between two points the acceleration is constant, whatever the points are of; before the first and behind the last the
+//! speed is theirs. So speed is linear in time, and its square linear in place. A profile by place is then one by time too,
+//! on a road that is followed exactly, and how long a run lasts is a sum over stretches.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use serde::{Deserialize, Serialize};
+
+use super::ScenarioError;
+use crate::input::in_range;
+
+/// Speeds that a scenario may have all the time, km/h. The controller guides from 5 m/s on.
+pub const SPEED_KMH: RangeInclusive<f64> = 20.0..=250.0;
+/// Speeds that one may go through, km/h: below what is guided, and no standstill, whose equations are others.
+pub const CHANGING_SPEED_KMH: RangeInclusive<f64> = 10.0..=250.0;
+/// Accelerations between two points, m/s2: full braking on a dry road, and more than most cars can accelerate.
+pub const ACCELERATION_M_PER_S2: RangeInclusive<f64> = -8.0..=5.0;
+/// Where the points of a profile may lie.
+const TIMES_S: RangeInclusive<f64> = 0.0..=1e6;
+const PLACES_M: RangeInclusive<f64> = 0.0..=1e6;
+
+/// Speed as a scenario says it, not yet checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "expected a number, the speed in km/h, or a table [speed] with either `time` (s) or `place` (m) and \
+                 `kmh`, each a list of numbers"
+)]
+pub enum Speed {
+    /// The same all the time, km/h.
+    Constant(f64),
+    /// Through points by time.
+    ByTime {
+        /// Seconds since the start.
+        time: Vec<f64>,
+        /// Speeds there, km/h.
+        kmh: Vec<f64>,
+    },
+    /// Through points by place.
+    ByPlace {
+        /// Arc length along the centreline, m.
+        place: Vec<f64>,
+        /// Speeds there, km/h.
+        kmh: Vec<f64>,
+    },
+}
+
+impl Speed {
+    /// What it is at the start, km/h.
+    pub(super) fn start_kmh(&self) -> f64 {
+        match self {
+            Self::Constant(kmh) => *kmh,
+            Self::ByTime { kmh, .. } | Self::ByPlace { kmh, .. } => kmh.first().copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Checks everything.
+    pub(super) fn profile(&self) -> Result<SpeedProfile, ScenarioError> {
+        match self {
+            Self::Constant(kmh) => {
+                in_range("speed", *kmh, SPEED_KMH, "km/h")?;
+                Ok(SpeedProfile::constant(*kmh))
+            }
+            Self::ByTime { time, kmh } => SpeedProfile::through(Axis::Time, time, kmh),
+            Self::ByPlace { place, kmh } => SpeedProfile::through(Axis::Place, place, kmh),
+        }
+    }
+}
+
+impl fmt::Display for Speed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kmh, by) = match self {
+            Self::Constant(kmh) => return write!(f, "{kmh} km/h"),
+            Self::ByTime { kmh, .. } => (kmh, "time"),
+            Self::ByPlace { kmh, .. } => (kmh, "place"),
+        };
+        let least = kmh.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = kmh.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        write!(f, "{least} to {most} km/h by {by}")
+    }
+}
+
+/// What the points are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    Time,
+    Place,
+}
+
+/// A point, and how it goes on from there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Point {
+    time_s: f64,
+    place_m: f64,
+    v_m_per_s: f64,
+    acceleration_m_per_s2: f64,
+}
+
+/// A speed over a run, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SpeedProfile {
+    axis: Axis,
+    /// The first is the start; behind the last the speed stays.
+    points: Vec<Point>,
+}
+
+impl SpeedProfile {
+    pub(super) fn constant(kmh: f64) -> Self {
+        Self {
+            axis: Axis::Time,
+            points: vec![Point {
+                time_s: 0.0,
+                place_m: 0.0,
+                v_m_per_s: kmh / 3.6,
+                acceleration_m_per_s2: 0.0,
+            }],
+        }
+    }
+
+    fn through(axis: Axis, at: &[f64], kmh: &[f64]) -> Result<Self, ScenarioError> {
+        let (field, unit, range) = match axis {
+            Axis::Time => ("speed.time", "s", TIMES_S),
+            Axis::Place => ("speed.place", "m", PLACES_M),
+        };
+        let refused = |message: String| Err(ScenarioError::Speed(message));
+        if at.len() != kmh.len() {
+            return refused(format!(
+                "{field} has {} and speed.kmh {} values: each point takes one of both",
+                at.len(),
+                kmh.len()
+            ));
+        }
+        if at.len() < 2 {
+            return refused(format!(
+                "{field}: a speed that changes takes two points at least, not {}; one that does not is `speed = 60`",
+                at.len()
+            ));
+        }
+        let mut profile = Self::constant(kmh[0]);
+        profile.axis = axis;
+        for (i, (at, kmh)) in at.iter().zip(kmh).enumerate() {
+            let number = i + 1;
+            in_range(&format!("{field} (point {number})"), *at, range.clone(), unit)?;
+            in_range(
+                &format!("speed.kmh (point {number})"),
+                *kmh,
+                CHANGING_SPEED_KMH,
+                "km/h",
+            )?;
+            profile.go_on(number, *at, kmh / 3.6, (field, unit))?;
+        }
+        Ok(profile)
+    }
+
+    /// Appends a point.
+    fn go_on(
+        &mut self,
+        number: usize,
+        at: f64,
+        v: f64,
+        (field, unit): (&str, &str),
+    ) -> Result<(), ScenarioError> {
+        let last = self.points.len() - 1;
+        let from = &mut self.points[last];
+        let u = from.v_m_per_s;
+        let stretch = match self.axis {
+            Axis::Time => at - from.time_s,
+            Axis::Place => at - from.place_m,
+        };
+        if stretch <= 0.0 {
+            if number == 1 {
+                return Ok(());
+            }
+            return Err(ScenarioError::Speed(format!(
+                "{field} (point {number}) = {at} {unit} is not behind point {}: the points have to follow each other",
+                number - 1
+            )));
+        }
+        let (lasts_s, length_m) = match self.axis {
+            Axis::Time => (stretch, 0.5 * (u + v) * stretch),
+            Axis::Place => (2.0 * stretch / (u + v), stretch),
+        };
+        let acceleration = (v - u) / lasts_s;
+        let name = format!("speed: acceleration to point {number}");
+        // Whole thousandths, for people to read.
+        let rounded = (1e3 * acceleration).round() / 1e3;
+        in_range(&name, rounded, ACCELERATION_M_PER_S2, "m/s2")?;
+        from.acceleration_m_per_s2 = acceleration;
+        let (time_s, place_m) = (from.time_s + lasts_s, from.place_m + length_m);
+        self.points.push(Point {
+            time_s,
+            place_m,
+            v_m_per_s: v,
+            acceleration_m_per_s2: 0.0,
+        });
+        Ok(())
+    }
+
+    /// Whether nothing changes.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.points.len() == 1
+    }
+
+    /// Speed at the start, m/s.
+    pub(crate) fn start_m_per_s(&self) -> f64 {
+        self.points[0].v_m_per_s
+    }
+
+    /// Speed at a time at which the vehicle is at some place, m/s.
+    pub(crate) fn at(&self, time_s: f64, place_m: f64) -> f64 {
+        match self.axis {
+            Axis::Time => {
+                let point = self.last_before(|p| p.time_s, time_s);
+                point.v_m_per_s + point.acceleration_m_per_s2 * (time_s - point.time_s)
+            }
+            Axis::Place => {
+                let point = self.last_before(|p| p.place_m, place_m);
+                let behind_m = (place_m - point.place_m).max(0.0);
+                (point.v_m_per_s * point.v_m_per_s + 2.0 * point.acceleration_m_per_s2 * behind_m).sqrt()
+            }
+        }
+    }
+
+    /// Way along a road that is followed exactly until a time, m.
+    pub(crate) fn way_m(&self, time_s: f64) -> f64 {
+        let point = self.last_before(|p| p.time_s, time_s);
+        let after_s = time_s - point.time_s;
+        point.place_m + after_s * (point.v_m_per_s + 0.5 * point.acceleration_m_per_s2 * after_s)
+    }
+
+    /// When a point that lies some seconds ahead first comes to the end of a road, s, and the speed then, m/s.
+    pub(crate) fn end(&self, length_m: f64, ahead_s: f64) -> (f64, f64) {
+        let ends_s = self.points.iter().skip(1).map(|p| p.time_s);
+        for (point, end_s) in self.points.iter().zip(ends_s.chain([f64::INFINITY])) {
+            let (v, a) = (point.v_m_per_s, point.acceleration_m_per_s2);
+            // (a/2)*t^2 + slope*t = missing_m, its first root in the form that does not cancel.
+            let missing_m = length_m - point.place_m - v * ahead_s;
+            let slope = v + a * ahead_s;
+            if missing_m <= 0.0 {
+                return (point.time_s, v);
+            }
+            let root = slope * slope + 2.0 * a * missing_m;
+            if slope <= 0.0 || root < 0.0 {
+                continue;
+            }
+            let after_s = if a == 0.0 {
+                missing_m / slope
+            } else {
+                2.0 * missing_m / (slope + root.sqrt())
+            };
+            if point.time_s + after_s <= end_s {
+                return (point.time_s + after_s, v + a * after_s);
+            }
+        }
+        // The last point has no end: not reached.
+        (f64::INFINITY, self.points[self.points.len() - 1].v_m_per_s)
+    }
+
+    fn last_before(&self, key: impl Fn(&Point) -> f64, x: f64) -> &Point {
+        let after = self.points.partition_point(|point| key(point) <= x);
+        &self.points[after.saturating_sub(1)]
+    }
+}
+
+#[cfg(test)]
+mod tests;
