@@ -306,6 +306,7 @@ mod tests {
             wheel_angle_rad: none.clone(),
             guidance_torque_nm: none.clone(),
             driver_torque_nm: none,
+            speeds_m_per_s: None,
             resampling: Vec::new(),
             findings: Vec::new(),
         };
