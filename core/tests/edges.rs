@@ -7,15 +7,15 @@ mod rig;
 use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
-use haptic_core::bus::messages::{Column, Guidance, Message};
+use haptic_core::bus::messages::{Column, Guidance, Identity, Message, Telemetry};
 use haptic_core::config::Setup;
 use haptic_core::controller::Motion;
 use haptic_core::ecu::Step;
 use haptic_core::ecu::injection::Region;
-use haptic_core::estimator::Sample;
+use haptic_core::estimator::{Reading, Sample};
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
-use haptic_core::quantity::{Instant, Micros, Radians, Speed, Torque, TurningRate};
+use haptic_core::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rig::Rig;
 
 const LANE: usize = 0;
@@ -331,6 +331,41 @@ fn the_monitor_is_tested_in_a_step_with_little_else_to_do() {
         // Steps are counted from zero.
         assert_eq!(from + after - 1, found, "{odd}");
     }
+}
+
+/// 2^11 in place of the largest count of eleven bits: the sign would turn.
+#[test]
+fn telemetry_beyond_its_fields_stays_at_their_ends() {
+    let beyond = Telemetry {
+        probe: Some(Torque::from_nm(0.6)),
+        k_hg: Some(Reading {
+            k_hg: Ratio::from_si(5.0),
+            deviation: Ratio::from_si(3.0),
+        }),
+    };
+    let frame = beyond.encode(0);
+    let word = u64::from_le_bytes(frame.data().try_into().unwrap());
+    let read = Telemetry::unpack(word).unwrap();
+    // Of the fields of core/haptic.dbc: 2047 counts of 2^-12 N.m, 4, 2047 counts of 2^-10.
+    assert_eq!(read.probe.unwrap().nm(), 2047.0 / 4096.0);
+    let reading = read.k_hg.unwrap();
+    assert_eq!(
+        (reading.k_hg.si(), reading.deviation.si()),
+        (4.0, 2047.0 / 1024.0)
+    );
+}
+
+/// The largest number of a vehicle is the largest of its field.
+#[test]
+fn the_largest_number_of_a_vehicle_arrives_whole() {
+    let sent = Identity {
+        vehicle: Identity::VEHICLE_MAX,
+        hardware: u32::MAX,
+    };
+    let frame = sent.encode(0);
+    let word = u64::from_le_bytes(frame.data().try_into().unwrap());
+    assert_eq!(Identity::unpack(word), Some(sent));
+    assert_eq!(sent.vehicle, 0xF_FFFF);
 }
 
 /// Telemetry comes every 20 steps, and stands back from a step with a new sample of the column, by three at most.
