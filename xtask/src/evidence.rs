@@ -59,7 +59,14 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ("quantity/arithmetic.rs", &["quantity", "law_oracle", "ecu"]),
     (
         "config.rs",
-        &["params", "monitor", "schedule", "plausibility", "probe"],
+        &[
+            "params",
+            "monitor",
+            "schedule",
+            "plausibility",
+            "probe",
+            "law_oracle",
+        ],
     ),
     ("params.rs", &["params", "stored"]),
     ("rejections.rs", &["attacks", "dbc"]),
