@@ -88,6 +88,34 @@ fn a_law_that_the_monitor_cannot_follow_is_refused() {
     assert!(error.value > error.max && error.max == 5.0, "{error}");
 }
 
+/// Half of it is what law and monitor differ by: rates of 4 m/s2 and 1 rad/s2 times the difference of their delays (the filter's
+/// tau against 20 to 60 ms), noise of 15 mm and 1.5 mrad, and a sample of 30 ms that goes on at rates of as much; 1.5 m/s and
+/// 0.3 rad/s for those 30 ms come once. Worked out apart from this program.
+#[test]
+fn the_band_of_the_monitor_is_that_of_its_reasons() {
+    for ([k_1, a_1, a_2, a_3, a_4], rate_corner_hz, band_nm) in [
+        ([0.5, 60.0, 20.0, 50.0, 30.0], 10.0, 28.149_068_745),
+        ([0.4, 70.0, 30.0, 20.0, 60.0], 60.0, 68.987_543_719),
+        ([2.0, 15.0, 4.0, 10.0, 14.0], 0.5, 41.320_851_282),
+        ([0.8, 10.0, 12.0, 35.0, 20.0], 3.0, 12.537_482_610),
+    ] {
+        let params = Params {
+            k_1,
+            a_1,
+            a_2,
+            a_3,
+            a_4,
+            rate_corner_hz,
+            ..Params::PAPER
+        };
+        let error = Setup::new(&params).map(|_| ()).unwrap_err();
+        assert!(
+            (error.value / band_nm - 1.0).abs() < 1e-8,
+            "{error}, not {band_nm}"
+        );
+    }
+}
+
 #[test]
 fn the_default_is_the_paper() {
     // Table 8 and section 3.2.

@@ -66,6 +66,7 @@ const MUTATED: [(&str, &[&str]); 36] = [
             "plausibility",
             "probe",
             "law_oracle",
+            "road",
         ],
     ),
     ("params.rs", &["params", "stored"]),
