@@ -502,4 +502,51 @@ mod tests {
             assert!((found - learnt).abs() < 0.01, "{ms}: {found} {learnt}");
         }
     }
+
+    /// A line that drifts aside by 0.1 m/s where the yaw rate says nothing of it.
+    #[test]
+    fn a_drift_of_the_line_is_learnt_within_sixteen_seconds() {
+        let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+        CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), Some(TurningRate::ZERO));
+        for step in 0..1600_u32 {
+            let now = Instant::from_us(10_000 * step);
+            let seconds = 0.01 * f64::from(step);
+            let sample = LaneSample {
+                e_y: Metres::from_m(0.1 * seconds - 0.8),
+                e_theta: Radians::ZERO,
+                at: now,
+            };
+            assert!(CHECKS.lane(&mut state, &mut past, now, sample));
+            // A first-order lag of 16 s, once the line is known for 0.4 s.
+            let learnt = 0.1 * (1.0 - (-(seconds - 0.4).max(0.0) / 16.0).exp());
+            let found = state.lane.bias.m_per_s();
+            assert!((found - learnt).abs() < 0.001, "{seconds}: {found} {learnt}");
+        }
+    }
+
+    /// At its margin a movement may be missing, and half of it has to be predicted; a count further it is not honest.
+    #[test]
+    fn the_lane_check_keeps_its_margins_to_the_count() {
+        let margin = CHECKS.lane_margin.bits();
+        let unreal = i32::try_from(UNREAL).unwrap();
+        let judged = |predicted: i32, seen: i32, yaw_rate: Option<TurningRate>| {
+            let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+            CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), yaw_rate);
+            state.lane.predicted = Metres::from_bits(predicted);
+            state.lane.seen = Metres::from_bits(seen);
+            let sample = LaneSample {
+                e_y: Metres::ZERO,
+                e_theta: Radians::ZERO,
+                at: Instant::from_us(0),
+            };
+            CHECKS.lane(&mut state, &mut past, sample.at, sample)
+        };
+        assert!(judged(2 * margin, margin, None));
+        assert!(!judged(2 * margin + 1, margin, None));
+        assert!(judged(margin / 2, -margin, None));
+        assert!(!judged(margin / 2 + 1, -margin, None));
+        assert!(judged(0, unreal, Some(TurningRate::ZERO)));
+        assert!(!judged(0, unreal + 1, Some(TurningRate::ZERO)));
+        assert!(judged(0, unreal + 1, None));
+    }
 }
