@@ -13,7 +13,7 @@ use haptic_log::recording::{Group, Recording, Series};
 use haptic_log::units;
 
 use super::bus_trace;
-use super::log::{COLUMNS, DriveLog, LogError};
+use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 
 const UNITS: [&str; 6] = ["s", "m", "rad", "rad", "N.m", "N.m"];
 const LANE: [usize; 2] = [1, 2];
@@ -162,8 +162,19 @@ fn of_channels(
     } else {
         at_the_torque(&columns, &mut notes)?
     };
-    let log = DriveLog::from_rows(time_s, values, manual).map_err(|e| e.to_string())?;
+    let mut log = DriveLog::from_rows(time_s, values, manual).map_err(|e| e.to_string())?;
+    tell_speed(&mut log, recording);
     Ok((log, notes))
+}
+
+/// What the recording says of the speed, if it does: not needed, so that another unit or name tells nothing.
+fn tell_speed(log: &mut DriveLog, recording: &Recording) {
+    let factor = |unit: &str| units::factor(if unit.is_empty() { "m/s" } else { unit }, "m/s");
+    let found = recording.find(SPEED_COLUMN).ok();
+    if let Some((speed, factor)) = found.and_then(|(_, speed)| Some((speed, factor(&speed.unit)?))) {
+        let speeds: Vec<f64> = speed.values.iter().map(|v| v * factor).collect();
+        log.tell_speed(&speeds);
+    }
 }
 
 type Values = [Option<Vec<f64>>; 6];
@@ -306,6 +317,7 @@ mod tests {
                 group("Assist", "N.m", 0.0, 0.04, |k| 0.01 * k as f64),
                 group("Offset", "cm", 0.0, 0.04, |k| 100.0 * zigzag(k)),
                 group("Heading", "rad", 0.0, 0.01, zigzag),
+                group(SPEED_COLUMN, "km/h", 0.0, 0.01, |k| 36.0 + 0.09 * k as f64),
             ],
         };
         let map = |text: &str| text.parse::<Mapping>().unwrap();
@@ -319,6 +331,8 @@ mod tests {
         .map(map);
         let (log, _) = of_channels(&recording, &maps, false).unwrap();
         assert!((log.dt_s - 0.01).abs() < 1e-12, "{}", log.dt_s);
+        let [least, most] = log.speeds_m_per_s.unwrap();
+        assert!((least - 10.0).abs() < 1e-9 && (most - 39.975).abs() < 1e-9 && log.changes_speed());
         for k in 0..800 {
             let near =
                 |value: f64, wanted: f64| assert!((value - wanted).abs() < 1e-9, "{k}: {value} {wanted}");
