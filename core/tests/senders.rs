@@ -9,7 +9,7 @@ mod rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
 use haptic_core::ecu::Step;
-use haptic_core::faults::Fault;
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::quantity::Metres;
 use rig::Rig;
 
@@ -105,6 +105,19 @@ fn a_speed_that_is_silent_has_not_jumped() {
     rig.silent[VEHICLE] = true;
     let (_, step) = rig.run_until(60, |step| step.command.faults.contains(Fault::SpeedTimeout));
     assert!(!step.command.faults.contains(Fault::SpeedStep));
+}
+
+#[test]
+fn a_speed_that_jumps_once_is_refused_and_no_fault() {
+    let mut rig = Rig::active_in_curve(1.0);
+    rig.run(5);
+    rig.speeds = [rig::SPEED + 1.5; 2];
+    let jumped = rig.frame(VEHICLE);
+    assert_eq!(rig.send(&jumped), Err(Reject::Step));
+    rig.speeds = [rig::SPEED; 2];
+    for _ in 0..60 {
+        assert_eq!(rig.tick().command.faults, FaultSet::NONE);
+    }
 }
 
 /// Three frames of the column may be lost at once, and as many more as fit into its silence; fourteen at most.
