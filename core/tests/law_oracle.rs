@@ -187,6 +187,27 @@ fn held_errors_have_no_rate() {
     }
 }
 
+/// From 1.75 m on one side to as much on the other: k_1 * a_1 of it, as if the line had always been there.
+#[test]
+fn a_line_chosen_anew_goes_on_at_the_rates_of_the_old_one() {
+    let law = Config::PAPER.law;
+    let mut state = LawState::NEW;
+    let at = |ms: u32, e_y: f64| LaneSample {
+        e_y: Metres::from_m(e_y),
+        e_theta: Radians::ZERO,
+        at: Instant::from_us(1000 * ms),
+    };
+    for ms in [0, 8] {
+        let sample = at(ms, 1.75);
+        let torque = law.step(&mut state, sample.at, sample, &Since::NOTHING).nm();
+        assert!((torque - 0.25 * 2.0 * 1.75).abs() < 1e-4, "{torque}");
+    }
+    let anew = at(16, -1.75);
+    state.relocate(anew);
+    let torque = law.step(&mut state, anew.at, anew, &Since::NOTHING).nm();
+    assert!((torque + 0.25 * 2.0 * 1.75).abs() < 1e-4, "{torque}");
+}
+
 #[test]
 fn extremes_saturate() {
     let mut pair = Pair::new(Params {
