@@ -388,8 +388,11 @@ fn telemetry_comes_once_in_twenty_steps_and_beside_new_samples() {
                     assert!(is_heard || *step < 3, "{step}");
                 }
                 rig.telemetry = None;
+                let counter = rig.telemetry_counter;
                 rig.tick();
-                rig.telemetry.is_some()
+                let came = rig.telemetry.is_some();
+                assert!(!came || *step < 20 || rig.telemetry_counter == (counter + 1) % 16);
+                came
             })
             .collect();
         let expected: Vec<u64> = (0..400).step_by(20).map(|turn| turn + place).collect();

@@ -57,6 +57,8 @@ pub(crate) struct Rig {
     pub(crate) applied: f64,
     /// The last telemetry.
     pub(crate) telemetry: Option<Telemetry>,
+    /// Its counter.
+    pub(crate) telemetry_counter: u8,
     pub(crate) heard: Heard,
     /// Rejections by the ECU since they were last taken.
     pub(crate) rejects: Vec<Reject>,
@@ -88,6 +90,7 @@ impl Rig {
             silent: [false; 4],
             applied: 0.0,
             telemetry: None,
+            telemetry_counter: 0,
             heard: Heard::default(),
             rejects: Vec::new(),
         }
@@ -200,6 +203,7 @@ impl Rig {
         if let Some(frame) = self.ecu.background_step() {
             let data: [u8; 8] = frame.data().try_into().unwrap();
             assert!(frame.id() == Telemetry::ID && Telemetry::PROTECTION.is_intact(&data));
+            self.telemetry_counter = data[1] & 0x0F;
             self.telemetry = Telemetry::unpack(u64::from_le_bytes(data));
         }
         step
