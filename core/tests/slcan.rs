@@ -64,3 +64,14 @@ fn nonsense_is_invalid_and_the_next_line_is_good() {
         );
     }
 }
+
+/// Some clients end a line with both characters; what is too long is no line, whatever it begins with.
+#[test]
+fn a_line_feed_belongs_to_no_line_and_too_much_is_none() {
+    let mut parser = Parser::default();
+    let mut lines = |text: &str| -> Vec<Line> { text.bytes().filter_map(|byte| parser.push(byte)).collect() };
+    assert_eq!(lines("C\r\nO\r\n"), [Line::Close, Line::Open]);
+    let long = format!("s{}\r", "0".repeat(60));
+    assert_eq!(lines(&long), [Line::Invalid]);
+    assert_eq!(lines("O\r"), [Line::Open]);
+}
