@@ -280,3 +280,22 @@ fn a_late_sample_is_made_up_for() {
         );
     }
 }
+
+/// A camera 100 ms late sees a straight road while the vehicle begins to turn to the left at 0.1 rad/s. After 100 ms it points
+/// 0.01 rad away from what the picture says, so that the near point, 5 m ahead, lies 0.05 m aside and the vehicle itself 0.008 m.
+/// By K_1 times a1' to a4': -0.029 N.m, -0.008 N.m (0.67 m/s), -0.1 N.m and -0.025 N.m.
+#[test]
+fn what_a_late_camera_did_not_see_yet_is_made_up_for() {
+    let mut rig = Rig::paper();
+    rig.lane.age = Micros::from_ms(100);
+    rig.yaw_rate = Some(0.0);
+    rig.run(600);
+    rig.engage = true;
+    rig.run(1000);
+    assert_eq!((mode(&rig), rig.applied), (Mode::Active, 0.0));
+    rig.yaw_rate = Some(0.1);
+    rig.run(100);
+    assert_eq!(mode(&rig), Mode::Active);
+    // Half of a period of the vehicle's message, 5 ms, is 2.5 % of it.
+    assert!((rig.applied + 0.162).abs() < 0.005, "{} N.m", rig.applied);
+}
