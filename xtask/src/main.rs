@@ -22,6 +22,7 @@ mod qemu;
 mod seal;
 mod size;
 mod speed;
+mod sweep;
 mod tool;
 mod trace;
 mod web;
@@ -132,6 +133,8 @@ enum Bench {
     Speed(speed::Options),
     /// The identification of a recorded drive: ours and SciPy's, to the same loss.
     Identify,
+    /// Large sweeps: time, memory and size over the number of drives, and what a second thread gives.
+    Sweep(sweep::Options),
 }
 
 fn main() -> ExitCode {
@@ -160,6 +163,10 @@ fn main() -> ExitCode {
             what: Some(Bench::Identify),
             ..
         } => identify::run(),
+        Command::Bench {
+            what: Some(Bench::Sweep(options)),
+            ..
+        } => sweep::run(&options),
         Command::Bench {
             board: Some(board), ..
         } => boards::bench(board),
