@@ -3,7 +3,7 @@
 /// Everything from outside in one step. The default lets the scenario have its way.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Action {
-    /// Whether the host asks for guidance; `None`: it does.
+    /// Whether the host asks for guidance; `None`: it does, but not where a speed that changes is less than is guided.
     pub engage: Option<bool>,
     /// Share of the guidance torque that the host allows, 0 to 1; `None`: all of it. Beyond 0 to 1 it is the nearer
     /// end; NaN is 0.

@@ -34,6 +34,11 @@ use crate::seeds::Stream;
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
 pub(crate) const DIVERGED_M: f64 = 10.0;
 
+/// So far below the least speed that is guided the driver stops asking, m/s: behind the ECU, which leaves there by itself.
+const STOPS_ASKING_M_PER_S: f64 = 0.5;
+/// So long at that speed or faster the driver asks again, in steps: the ECU wants half a second of good inputs first.
+const ASKS_AGAIN_STEPS: u32 = STEPS_PER_SECOND;
+
 /// Samples per second of a trace.
 pub const SAMPLE_RATE_HZ: u32 = 200;
 /// Steps from one sample of a trace to the next.
@@ -114,6 +119,8 @@ pub struct Simulation<G = AnyGuidance> {
     /// Speed of the vehicle now, and where along the road it is.
     speed_m_per_s: f64,
     place_m: f64,
+    /// Who asks for guidance, if the host does not say.
+    request: AskingDriver,
     /// The run ends when the driver's far point gets there.
     pub(crate) end_m: f64,
     /// Step in which something first went wrong.
@@ -124,6 +131,38 @@ pub struct Simulation<G = AnyGuidance> {
     lateral_error_m: Option<f64>,
     step: u32,
     ending: Option<Ending>,
+}
+
+/// A driver whose speed changes: the ECU leaves where it is slower than is guided, and takes only a request that rises.
+#[derive(Debug, Clone)]
+struct AskingDriver {
+    least_m_per_s: f64,
+    asks: bool,
+    /// Steps at the least speed or faster, since the last slower one.
+    fast: u32,
+}
+
+impl AskingDriver {
+    fn new(least_m_per_s: f64) -> Self {
+        Self {
+            least_m_per_s,
+            asks: true,
+            fast: ASKS_AGAIN_STEPS,
+        }
+    }
+
+    fn step(&mut self, v_m_per_s: f64) {
+        self.fast = if v_m_per_s < self.least_m_per_s {
+            0
+        } else {
+            self.fast.saturating_add(1)
+        };
+        self.asks = if self.asks {
+            v_m_per_s >= self.least_m_per_s - STOPS_ASKING_M_PER_S
+        } else {
+            self.fast >= ASKS_AGAIN_STEPS
+        };
+    }
 }
 
 /// What the scenario decides for every step.
@@ -161,6 +200,7 @@ impl<G: Guidance> Simulation<G> {
             speed_m_per_s: v,
             place_m: 0.0,
             end_m: plan.end_m(&road, v),
+            request: AskingDriver::new(scenario.controller_params().least_speed_m_per_s),
             plan,
             guidance,
             plant: Plant::default(),
@@ -219,7 +259,7 @@ impl<G: Guidance> Simulation<G> {
             motor_torque_nm: self.motor_torque_nm,
             speed_m_per_s: self.speed_m_per_s,
             yaw_rate_rad_per_s: Some(self.plant.yaw_rate_rad_per_s()),
-            request: self.plan.request(action),
+            request: self.plan.request(action, self.request.asks),
         };
         let seen = match &mut self.sensing {
             None => observation,
@@ -280,10 +320,14 @@ impl<G: Guidance> Simulation<G> {
             self.plan.transition(self.step, self.failed_at)
         };
         let now = self.speed_m_per_s;
-        let next = self.plan.speed.as_ref().map_or(now, |speed| {
-            let time_s = f64::from(self.step + 1) * STEP_S;
-            speed.at(time_s, self.place_m + now * STEP_S)
-        });
+        let next = match &self.plan.speed {
+            None => now,
+            Some(speed) => {
+                self.request.step(now);
+                let time_s = f64::from(self.step + 1) * STEP_S;
+                speed.at(time_s, self.place_m + now * STEP_S)
+            }
+        };
         self.motor_torque_nm = match &mut self.real {
             None => {
                 self.plant.step(transition, &input);
@@ -433,9 +477,9 @@ impl Plan {
         }
     }
 
-    fn request(&self, action: &Action) -> Request {
+    fn request(&self, action: &Action, asks: bool) -> Request {
         Request {
-            engage: action.engage.unwrap_or(true),
+            engage: action.engage.unwrap_or(asks),
             authority: action.authority.map_or(1.0, |share| {
                 if share.is_nan() {
                     0.0

@@ -8,6 +8,7 @@ use haptic_log::trace::Sample;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::lanes::{Reason, why_not};
 use haptic_sim::models::disturbances::SensorErrors;
+use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::{Course, LaneChoice};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Sensors, Speed};
 use haptic_sim::simulation::{Ending, Run, observe, simulate};
@@ -288,16 +289,24 @@ fn honest_braking_is_no_fault() {
     assert!(guided > 15 * 40_000, "{guided}");
 }
 
-/// Below 5 m/s nothing is guided: the ECU leaves by itself, calls it no fault, waits for a new request, and the driver goes
-/// on.
+/// Below 5 m/s nothing is guided: the ECU leaves by itself, calls it no fault, and the driver goes on. After a second at
+/// 5 m/s or faster the driver asks anew.
 #[test]
 fn a_drive_goes_through_the_least_speed_that_is_guided() {
     let speed = by_time(&[(10.0, 40.0), (16.0, 10.0), (26.0, 10.0), (32.0, 40.0)]);
     for condition in Condition::ALL {
-        let builder = Scenario::builder().course(curve()).condition(condition);
+        // Without a remnant the second stay in a steady bend passes for hands off the wheel.
+        let driver = DriverParameters {
+            remnant_sd_nm: 0.1,
+            ..DriverParameters::default()
+        };
+        let builder = Scenario::builder()
+            .course(curve())
+            .condition(condition)
+            .driver(driver);
         let scenario = builder.speed(speed.clone()).build().unwrap();
         let (mut receiver, mut modes) = (ReceiverState::TRUSTED, Vec::new());
-        let mut slowest_guided = f64::INFINITY;
+        let (mut slowest_guided, mut again) = (f64::INFINITY, None);
         let run = observe(&scenario, |outcome| {
             let Some(frame) = outcome.frames_out.first() else {
                 return;
@@ -309,12 +318,17 @@ fn a_drive_goes_through_the_least_speed_that_is_guided() {
             }
             if modes.last() != Some(&guidance.mode) {
                 modes.push(guidance.mode);
+                if modes[..] == [Mode::Active, Mode::Fade, Mode::Standby, Mode::Active] {
+                    again = Some(outcome.observation.speed_m_per_s);
+                }
             }
         });
         if condition != Condition::Manual {
-            assert_eq!(modes, [Mode::Active, Mode::Fade, Mode::Standby]);
-            // A Vehicle frame comes every 10 ms, in which 1.39 m/s2 make 0.014 m/s.
+            assert_eq!(modes.len(), 4, "{modes:?}");
+            // Vehicle and Demand come every 10 ms, in which 1.39 m/s2 make 0.014 m/s.
             close(slowest_guided, 5.0, 0.02, "slowest that is guided");
+            // A second after 5 m/s, at 1.39 m/s2.
+            close(again.unwrap(), 6.39, 0.03, "speed of the second engagement");
         }
         assert_eq!(run.ending, Ending::CourseEnd);
         let errors = run.trace.samples.iter().map(|s| s.lateral_error_m.abs());
