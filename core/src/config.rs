@@ -228,3 +228,28 @@ impl Monitor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Worked out apart from this program: times to the nearest microsecond, 1/(2*pi*corner) to the nearest 2^-8 us.
+    #[test]
+    fn times_are_rounded_to_the_nearest_count() {
+        for (far_time_s, near_time_s, between_us, rate_corner_hz, tau) in [
+            (0.7, 0.3, 400_000, 10.0, 4_074_367),
+            (1.234_567_6, 0.1, 1_134_568, 0.5, 81_487_331),
+            (1.0, 0.25, 750_000, 7.3, 5_581_324),
+            (0.3, 0.7, 0, 60.0, 679_061),
+        ] {
+            let mut params = Params {
+                rate_corner_hz,
+                ..Params::PAPER
+            };
+            (params.vehicle.far_time_s, params.vehicle.near_time_s) = (far_time_s, near_time_s);
+            let config = Config::new(&params).unwrap();
+            assert_eq!(config.plausibility.between, Micros::from_us(between_us));
+            assert_eq!(config.law.tau, tau, "{rate_corner_hz}");
+        }
+    }
+}

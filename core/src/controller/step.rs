@@ -458,3 +458,31 @@ pub(super) fn without(torque: Torque, probe: Option<Torque>) -> Torque {
 fn common_part(part: Torque, whole: Torque) -> Torque {
     part.max(whole.min(Torque::ZERO)).min(whole.max(Torque::ZERO))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each new value is checked once, in the step after it; where there is one in every step, in every other step.
+    #[test]
+    fn a_value_is_checked_in_the_step_after_it() {
+        let mut due = false;
+        let inputs = [
+            (Input::Lost, None),
+            (Input::Held(1), None),
+            (Input::New(2), None),
+            (Input::Held(2), Some(2)),
+            (Input::Held(2), None),
+            (Input::New(3), None),
+            (Input::New(4), Some(4)),
+            (Input::New(5), None),
+            (Input::New(6), Some(6)),
+            (Input::New(7), None),
+            (Input::Lost, None),
+            (Input::Held(8), None),
+        ];
+        for (step, (input, checked)) in inputs.into_iter().enumerate() {
+            assert_eq!(to_check(&input, &mut due), checked, "{step}");
+        }
+    }
+}

@@ -483,3 +483,53 @@ const fn is_own(id: u16) -> bool {
             | Identity::ID
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a preview of this age that comes `apart` after one that was not late.
+    fn taken(apart: Micros, age: Micros) -> Result<(), Reject> {
+        let start = Instant::from_us(1_000_000);
+        let sample = LaneSample {
+            at: start,
+            ..LaneSample::default()
+        };
+        let mut slot = Slot::new(ReceiverState::NEW, sample, start);
+        slot.put(sample, start, LANE_PERIOD);
+        let mut refused = Redundant::new(Refused {
+            is_there: 0,
+            moved: 0,
+            sample,
+        });
+        let lane = LanePreview {
+            valid: true,
+            age,
+            ..LanePreview::default()
+        };
+        take_preview(&mut slot, &mut refused, &lane, start.after(apart)).unwrap()
+    }
+
+    #[test]
+    fn a_sample_is_too_old_beyond_150_ms() {
+        let apart = Micros::from_ms(500);
+        assert_eq!(taken(apart, Micros::from_us(150_000)), Ok(()));
+        assert_eq!(taken(apart, Micros::from_us(150_001)), Err(Reject::Older));
+    }
+
+    /// The clock has 2^32 microseconds: up to 2^31 - 1 on is later, everything else before.
+    #[test]
+    fn a_sample_before_the_last_one_is_older() {
+        let age = Micros::from_us(0);
+        for later in [0, 1, 8_333, (1 << 31) - 1] {
+            assert_eq!(taken(Micros::from_us(later), age), Ok(()), "{later}");
+        }
+        for before in [1 << 31, u32::MAX - 8_333, u32::MAX] {
+            assert_eq!(
+                taken(Micros::from_us(before), age),
+                Err(Reject::Older),
+                "{before}"
+            );
+        }
+    }
+}
