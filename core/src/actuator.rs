@@ -14,7 +14,7 @@
 //! silent column into a faulty motor. Not kept twice: a flip here raises a fault or hides one until the next few
 //! samples; fixed arrays, so that it can do nothing else.
 
-use crate::quantity::Torque;
+use crate::quantity::{Torque, upper_product};
 
 /// Sensor error and ripple of a motor torque.
 const MARGIN: Torque = Torque::from_nm(0.1);
@@ -110,6 +110,7 @@ impl Actuator {
 
 /// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms.
 fn lagging(end: Torque, command: Torque) -> Torque {
-    let way = i64::from(command.bits()).saturating_sub(i64::from(end.bits()));
-    end.plus(Torque::from_wide(way.saturating_mul(3) >> 6))
+    const SHARE: i32 = 3 << (32 - 6);
+    let way = command.plus(end.opposite());
+    end.plus(Torque::from_bits(upper_product(way.bits(), SHARE)))
 }
