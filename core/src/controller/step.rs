@@ -12,7 +12,7 @@ use crate::modes::{Event, Events, Mode};
 use crate::past::Past;
 use crate::probe::ProbeState;
 use crate::quantity::{
-    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, saturate,
+    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
 use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
@@ -434,8 +434,9 @@ impl<I: Injection> Step<'_, I> {
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ZERO, share);
-        let share = saturate(product(authority.bits(), v.share.bits()));
-        Torque::from_wide(product(share, asked.bits()))
+        // Neither is more than one.
+        let share = share_of(authority.bits(), v.share.bits());
+        Torque::from_bits(share_of(share, asked.bits()))
     }
 }
 

@@ -12,7 +12,12 @@ pub(crate) const fn product(a: i32, b: i32) -> i64 {
         >> FRAC_BITS
 }
 
-/// The same rounded down, saturating.
+/// A share of a value, rounded to nearest. `share` is 0 to 1, so that the result is no larger than the value.
+pub(crate) const fn share_of(share: i32, value: i32) -> i32 {
+    product(share, value) as i32
+}
+
+/// [`product`] rounded down, saturating.
 pub(crate) const fn product_below(a: i32, b: i32) -> i32 {
     saturate((a as i64).wrapping_mul(b as i64) >> FRAC_BITS)
 }
@@ -196,6 +201,10 @@ mod tests {
             let exact = i128::from(narrow) * i128::from(factor);
             let rounded = (exact + (1 << 23)).div_euclid(1 << 24);
             assert_eq!(i128::from(product(narrow, factor)), rounded, "{narrow} {factor}");
+            let share = narrow.clamp(0, 1 << 24);
+            let exact_share = i128::from(share) * i128::from(factor);
+            let rounded = (exact_share + (1 << 23)).div_euclid(1 << 24);
+            assert_eq!(i128::from(share_of(share, factor)), rounded, "{share} {factor}");
             let below = exact.div_euclid(1 << 24);
             let below = below.clamp(i32::MIN.into(), i32::MAX.into());
             assert_eq!(
