@@ -5,6 +5,8 @@
 
 mod step;
 
+use core::hint::black_box;
+
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason};
 use crate::faults::{Fault, FaultSet};
@@ -376,19 +378,28 @@ impl Controller {
         applied: Torque,
         inputs: &Inputs,
     ) -> Command {
-        self.step_with(state, now, applied, inputs, &NoInjection)
+        self.step_with(state, false, now, applied, inputs, &NoInjection)
     }
 
+    /// Whether configuration and state are whole.
+    #[inline(always)]
+    pub(crate) fn is_whole(&self, state: &ControllerState) -> bool {
+        // As in `are_whole`.
+        black_box(&self.config).agrees() && black_box(&state.memory).agrees()
+    }
+
+    /// `found_whole`: [`Self::is_whole`] was true in this step already.
     #[inline]
     pub(crate) fn step_with<I: Injection>(
         &self,
         state: &mut ControllerState,
+        found_whole: bool,
         now: Instant,
         applied: Torque,
         inputs: &Inputs,
         injection: &I,
     ) -> Command {
-        if !are_whole(&self.config, &state.memory) {
+        if !found_whole && !are_whole(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
         let memory = state.memory.value_mut();
