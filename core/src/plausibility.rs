@@ -53,10 +53,6 @@ words! {
         /// t'_n, s, and how long before the far point is where the near point is now.
         pub(crate) near_time: Seconds,
         pub(crate) between: Micros,
-        /// Margin of the lane check, m.
-        pub(crate) lane_margin: Metres,
-        /// Margin of the column check, N.m.s.
-        pub(crate) column_margin: AngularImpulse,
     }
 }
 
@@ -252,6 +248,9 @@ pub fn speeds_agree(a: Speed, b: Speed) -> bool {
     a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
+/// Margins of the checks.
+const LANE_MARGIN: Metres = Metres::from_m(0.4);
+const COLUMN_MARGIN: AngularImpulse = AngularImpulse::from_nm_s(0.6);
 /// So far within a second no vehicle goes beyond what its yaw rate says, 2^-24 m.
 const UNREAL: i32 = Metres::from_m(0.8).bits();
 /// Power assist: all that acts on the column is at most so many times the driver's torque.
@@ -348,7 +347,7 @@ impl Plausibility {
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
         let sum = state.column.sum.bits();
-        let above = sum.saturating_abs().saturating_sub(self.column_margin.bits());
+        let above = sum.saturating_abs().saturating_sub(COLUMN_MARGIN.bits());
         // Inertia times way over time is the wheel's momentum, in the direction of the sum.
         let along = if sum.is_negative() {
             moved.saturating_neg()
@@ -396,7 +395,7 @@ impl Plausibility {
         }
         (state.lane.is_known, state.lane.last) = (1, sample);
         let (predicted, missing) = state.missing();
-        let margin = self.lane_margin.bits();
+        let margin = LANE_MARGIN.bits();
         // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. Where the yaw
         // rate is measured, a large one is: no vehicle goes there.
         let is_missing = missing > margin && predicted.saturating_abs() > margin >> 1;
@@ -446,8 +445,6 @@ mod tests {
         far_time: Seconds::from_s(0.7),
         near_time: Seconds::from_s(0.3),
         between: Micros::from_us(400_000),
-        lane_margin: Metres::from_m(0.4),
-        column_margin: AngularImpulse::from_nm_s(0.6),
     };
 
     #[test]
@@ -522,7 +519,7 @@ mod tests {
     /// At its margin a movement may be missing, and half of it has to be predicted; a count further it is not honest.
     #[test]
     fn the_lane_check_keeps_its_margins_to_the_count() {
-        let margin = CHECKS.lane_margin.bits();
+        let margin = LANE_MARGIN.bits();
         let judged = |predicted: i32, seen: i32, yaw_rate: Option<TurningRate>| {
             let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
             CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), yaw_rate);
