@@ -169,10 +169,8 @@ words! {
         last_step: Instant,
         /// How long the inputs have been valid in Standby.
         ready: Micros,
-        /// [`Fault`] bits of inputs that were implausible when last new.
-        implausible: u32,
-        /// Class C faults stay until the next power-up.
-        latched: u32,
+        /// [`Fault`] bits that stay: of inputs that were implausible when last new, and of class C until the next power-up.
+        kept: u32,
         /// The rate of turn when the last lane sample was true, and what the vehicle has turned since.
         rate_then: TurningRate,
         turned: Radians,
@@ -272,8 +270,7 @@ impl Memory {
                 },
                 last_step: now,
                 ready: Micros::from_us(0),
-                implausible: 0,
-                latched: 0,
+                kept: 0,
                 rate_then: TurningRate::ZERO,
                 turned: Radians::ZERO,
                 probe_applied: Torque::ZERO,
@@ -295,7 +292,7 @@ impl Memory {
     }
 
     fn faults(&self) -> FaultSet {
-        FaultSet::from_bits(self.hot.implausible | self.hot.latched)
+        FaultSet::from_bits(self.hot.kept)
     }
 }
 
@@ -335,7 +332,7 @@ impl ControllerState {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         let mut memory = Memory::new(Mode::Fault, now);
-        memory.hot.latched = faults.bits();
+        memory.hot.kept = faults.bits();
         self.memory.set(memory);
         Command {
             torque: Torque::ZERO,
