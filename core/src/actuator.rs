@@ -73,12 +73,12 @@ impl Actuator {
         let (low, high) = (commanded.min(before), commanded.max(before));
         // An end moves out at once, and back with a lag.
         self.high = if self.high > high {
-            high.max(lagging(self.high, high))
+            lagging(self.high, high)
         } else {
             high
         };
         self.low = if self.low < low {
-            low.min(lagging(self.low, low))
+            lagging(self.low, low)
         } else {
             low
         };
@@ -108,7 +108,8 @@ impl Actuator {
     }
 }
 
-/// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms.
+/// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms. Rounded down, so that it
+/// never passes the command.
 fn lagging(end: Torque, command: Torque) -> Torque {
     const SHARE: i32 = 3 << (32 - 6);
     let way = command.plus(end.opposite());
