@@ -112,6 +112,7 @@ impl Actuator {
 /// never passes the command.
 fn lagging(end: Torque, command: Torque) -> Torque {
     const SHARE: i32 = 3 << (32 - 6);
-    let way = command.plus(end.opposite());
-    end.plus(Torque::from_bits(upper_product(way.bits(), SHARE)))
+    // Nothing wraps: a frame has room for commands of 5 N.m, and the ends lie between commands.
+    let way = command.bits().wrapping_sub(end.bits());
+    Torque::from_bits(end.bits().wrapping_add(upper_product(way, SHARE)))
 }

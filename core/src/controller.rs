@@ -5,8 +5,6 @@
 
 mod step;
 
-use core::hint::black_box;
-
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason};
 use crate::faults::{Fault, FaultSet};
@@ -381,8 +379,7 @@ impl Controller {
     /// Whether configuration and state are whole.
     #[inline(always)]
     pub(crate) fn is_whole(&self, state: &ControllerState) -> bool {
-        // As in `are_whole`.
-        black_box(&self.config).agrees() && black_box(&state.memory).agrees()
+        self.config.agrees_apart() && state.memory.agrees_apart()
     }
 
     /// `found_whole`: [`Self::is_whole`] was true in this step already.

@@ -270,11 +270,11 @@ impl Ecu {
         self.background.step()
     }
 
-    /// Whether all that is kept twice is whole. A function of its own, and with black boxes, as [`are_whole`].
+    /// Whether all that is kept twice is whole. A function of its own, for the reasons of `redundant::are_whole`.
     #[inline(never)]
     fn is_whole(&self) -> bool {
-        black_box(&self.memory).agrees()
-            && black_box(&self.monitor).agrees()
+        self.memory.agrees_apart()
+            && self.monitor.agrees_apart()
             && self.receivers.are_whole()
             && self.controller.is_whole(&self.state)
     }

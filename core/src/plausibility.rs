@@ -33,7 +33,8 @@ use crate::past::Past;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
-    per_second, product, product_below, saturate, signed_quotient, upper_product, wide_product,
+    per_second, product, product_below, product_within, saturate, signed_quotient, upper_product,
+    wide_product,
 };
 use crate::redundant::words;
 
@@ -257,6 +258,12 @@ const UNREAL: i32 = Metres::from_m(0.8).bits();
 pub const ASSIST: i32 = 5;
 /// Friction of the column, and what else holds it without a sign.
 const FRICTION: Torque = Torque::from_nm(0.5);
+/// What is beyond these is as wrong as they are: driver and aligning torque, and what damping takes in the time between two
+/// checks. With them, and a guidance of 5 N.m that its frame has room for, no sum of the column check reaches 128, the end
+/// of an `i32`: 100 + 5 + 16.3 at most before the time, which at least halves it, and 60.7 + 60 + 0.3 + 2.7 after.
+const MOST_DRIVER: Torque = Torque::from_nm(20.0);
+const MOST_ALIGNING: i32 = Torque::from_nm(16.0).bits();
+const MOST_DAMPED: i32 = AngularImpulse::from_nm_s(60.0).bits();
 /// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank, 2^-24 N.m.
 const PUSHED: i32 = Torque::from_nm(0.3).bits();
 /// So much of the aligning torque may be wrong, in 2^-32: 77/256, 30 %.
@@ -306,48 +313,44 @@ impl Plausibility {
             // Steady-state aligning torque: c_a * v * chi_dot.
             let aligning_at = |turning: TurningRate| {
                 let lateral = saturate(product(state.motion.speed.bits(), turning.bits()));
-                product_below(lateral, self.aligning_gain.bits())
+                product_within(lateral, self.aligning_gain.bits(), MOST_ALIGNING)
             };
             let aligning = aligning_at(state.turning());
             let by_wheel = aligning_at(state.turning_by_wheel())
-                .max(aligning.saturating_sub(PUSHED))
-                .min(aligning.saturating_add(PUSHED));
+                .max(aligning.wrapping_sub(PUSHED))
+                .min(aligning.wrapping_add(PUSHED));
             let applied = applied.bits();
             // What driver and assist may give together.
-            let driver = driver.bits();
-            let assisted = driver.saturating_mul(ASSIST);
+            let driver = driver.min(MOST_DRIVER).max(MOST_DRIVER.opposite()).bits();
+            let assisted = driver.wrapping_mul(ASSIST);
             let least = applied
-                .saturating_add(driver.min(assisted))
-                .saturating_sub(aligning.max(by_wheel));
+                .wrapping_add(driver.min(assisted))
+                .wrapping_sub(aligning.max(by_wheel));
             let most = applied
-                .saturating_add(driver.max(assisted))
-                .saturating_sub(aligning.min(by_wheel));
-            let damped = product_below(moved, self.column_damping.bits());
+                .wrapping_add(driver.max(assisted))
+                .wrapping_sub(aligning.min(by_wheel));
+            let damped = product_within(moved, self.column_damping.bits(), MOST_DAMPED);
             // All times dt, for the wheel's movement is that of dt.
             let impulse = |torque: i32| per_second(torque, dt);
             let (least, most) = (
-                impulse(least).saturating_sub(damped),
-                impulse(most).saturating_sub(damped),
+                impulse(least).wrapping_sub(damped),
+                impulse(most).wrapping_sub(damped),
             );
             let learnt = impulse(state.column.bias.bits());
-            let change = beyond(least, most, 0).saturating_sub(learnt) >> BIAS_SHIFT;
-            let bias = state.column.bias.bits().saturating_add(change);
+            let change = beyond(least, most, 0).wrapping_sub(learnt) >> BIAS_SHIFT;
+            let bias = state.column.bias.bits().wrapping_add(change);
             state.column.bias = Torque::from_bits(bias)
                 .min(COLUMN_BIAS)
                 .max(COLUMN_BIAS.opposite());
-            let tolerance = upper_product(aligning.saturating_abs(), ALIGNING_ERROR);
-            let tolerance = impulse(tolerance.saturating_add(FRICTION.bits()));
-            let change = beyond(
-                least.saturating_sub(learnt),
-                most.saturating_sub(learnt),
-                tolerance,
-            );
+            let tolerance = upper_product(aligning.wrapping_abs(), ALIGNING_ERROR);
+            let tolerance = impulse(tolerance.wrapping_add(FRICTION.bits()));
+            let change = beyond(least.wrapping_sub(learnt), most.wrapping_sub(learnt), tolerance);
             state.column.sum = AngularImpulse::from_bits(leak(state.column.sum.bits(), change, dt));
         }
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
         let sum = state.column.sum.bits();
-        let above = sum.saturating_abs().saturating_sub(COLUMN_MARGIN.bits());
+        let above = sum.saturating_abs().wrapping_sub(COLUMN_MARGIN.bits());
         // Inertia times way over time is the wheel's momentum, in the direction of the sum.
         let along = if sum.is_negative() {
             moved.saturating_neg()
@@ -421,13 +424,14 @@ impl Plausibility {
 
 /// How far an interval is from zero, beside a tolerance; positive where all of it is above.
 fn beyond(least: i32, most: i32, tolerance: i32) -> i32 {
-    let (low, high) = (least.saturating_sub(tolerance), most.saturating_add(tolerance));
-    low.max(0).saturating_add(high.min(0))
+    let (low, high) = (least.wrapping_sub(tolerance), most.wrapping_add(tolerance));
+    low.max(0).wrapping_add(high.min(0))
 }
 
 /// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.
 fn leak(sum: i32, change: i32, dt: Micros) -> i32 {
-    sum.saturating_sub(per_second(sum, dt)).saturating_add(change)
+    // What leaks is at most half of the sum.
+    sum.wrapping_sub(per_second(sum, dt)).saturating_add(change)
 }
 
 #[cfg(test)]

@@ -22,6 +22,18 @@ pub(crate) const fn product_below(a: i32, b: i32) -> i32 {
     saturate((a as i64).wrapping_mul(b as i64) >> FRAC_BITS)
 }
 
+/// The same, held within +-`most`.
+pub(crate) const fn product_within(a: i32, b: i32, most: i32) -> i32 {
+    let (wide, most) = ((a as i64).wrapping_mul(b as i64) >> FRAC_BITS, most as i64);
+    if wide > most {
+        most as i32
+    } else if wide < most.wrapping_neg() {
+        most.wrapping_neg() as i32
+    } else {
+        wide as i32
+    }
+}
+
 /// The upper half of `a * b`, which a 32-bit core has in one instruction.
 pub(crate) const fn upper_product(a: i32, b: i32) -> i32 {
     ((a as i64).wrapping_mul(b as i64) >> 32) as i32
@@ -210,6 +222,13 @@ mod tests {
             assert_eq!(
                 i128::from(product_below(narrow, factor)),
                 below,
+                "{narrow} {factor}"
+            );
+            let most = numbers.any() as i32 & i32::MAX;
+            let within = below.clamp(-i128::from(most), most.into());
+            assert_eq!(
+                i128::from(product_within(narrow, factor, most)),
+                within,
                 "{narrow} {factor}"
             );
             let upper = exact.div_euclid(1 << 32);
