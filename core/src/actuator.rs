@@ -14,7 +14,7 @@
 //! silent column into a faulty motor. Not kept twice: a flip here raises a fault or hides one until the next few
 //! samples; fixed arrays, so that it can do nothing else.
 
-use crate::quantity::Torque;
+use crate::quantity::{Torque, upper_product};
 
 /// Sensor error and ripple of a motor torque.
 const MARGIN: Torque = Torque::from_nm(0.1);
@@ -73,12 +73,12 @@ impl Actuator {
         let (low, high) = (commanded.min(before), commanded.max(before));
         // An end moves out at once, and back with a lag.
         self.high = if self.high > high {
-            high.max(lagging(self.high, high))
+            lagging(self.high, high)
         } else {
             high
         };
         self.low = if self.low < low {
-            low.min(lagging(self.low, low))
+            lagging(self.low, low)
         } else {
             low
         };
@@ -108,8 +108,11 @@ impl Actuator {
     }
 }
 
-/// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms.
+/// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms. Rounded down, so that it
+/// never passes the command.
 fn lagging(end: Torque, command: Torque) -> Torque {
-    let way = i64::from(command.bits()).saturating_sub(i64::from(end.bits()));
-    end.plus(Torque::from_wide(way.saturating_mul(3) >> 6))
+    const SHARE: i32 = 3 << (32 - 6);
+    // Nothing wraps: a frame has room for commands of 5 N.m, and the ends lie between commands.
+    let way = command.bits().wrapping_sub(end.bits());
+    Torque::from_bits(end.bits().wrapping_add(upper_product(way, SHARE)))
 }

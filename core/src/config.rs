@@ -19,8 +19,8 @@ use crate::params::{ParamError, Params, in_range};
 use crate::plausibility::Plausibility;
 use crate::probe::Probe;
 use crate::quantity::{
-    AngularImpulse, CurvaturePerAngle, Metres, Micros, Seconds, Speed, StabilityFactor, Torque,
-    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    CurvaturePerAngle, Micros, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
+    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::redundant::words;
 use crate::schedule::Schedule;
@@ -111,8 +111,6 @@ impl Config {
                 far_time: Seconds::from_s(v.far_time_s),
                 near_time: Seconds::from_s(v.near_time_s),
                 between: Micros::from_us((f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32),
-                lane_margin: Metres::from_m(0.4),
-                column_margin: AngularImpulse::from_nm_s(0.6),
             },
             least_speed: Speed::from_m_per_s(p.least_speed_m_per_s),
             probe: Probe {

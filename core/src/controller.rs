@@ -167,10 +167,8 @@ words! {
         last_step: Instant,
         /// How long the inputs have been valid in Standby.
         ready: Micros,
-        /// [`Fault`] bits of inputs that were implausible when last new.
-        implausible: u32,
-        /// Class C faults stay until the next power-up.
-        latched: u32,
+        /// [`Fault`] bits that stay: of inputs that were implausible when last new, and of class C until the next power-up.
+        kept: u32,
         /// The rate of turn when the last lane sample was true, and what the vehicle has turned since.
         rate_then: TurningRate,
         turned: Radians,
@@ -270,8 +268,7 @@ impl Memory {
                 },
                 last_step: now,
                 ready: Micros::from_us(0),
-                implausible: 0,
-                latched: 0,
+                kept: 0,
                 rate_then: TurningRate::ZERO,
                 turned: Radians::ZERO,
                 probe_applied: Torque::ZERO,
@@ -293,7 +290,7 @@ impl Memory {
     }
 
     fn faults(&self) -> FaultSet {
-        FaultSet::from_bits(self.hot.implausible | self.hot.latched)
+        FaultSet::from_bits(self.hot.kept)
     }
 }
 
@@ -333,7 +330,7 @@ impl ControllerState {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         let mut memory = Memory::new(Mode::Fault, now);
-        memory.hot.latched = faults.bits();
+        memory.hot.kept = faults.bits();
         self.memory.set(memory);
         Command {
             torque: Torque::ZERO,
@@ -376,19 +373,27 @@ impl Controller {
         applied: Torque,
         inputs: &Inputs,
     ) -> Command {
-        self.step_with(state, now, applied, inputs, &NoInjection)
+        self.step_with(state, false, now, applied, inputs, &NoInjection)
     }
 
+    /// Whether configuration and state are whole.
+    #[inline(always)]
+    pub(crate) fn is_whole(&self, state: &ControllerState) -> bool {
+        self.config.agrees_apart() && state.memory.agrees_apart()
+    }
+
+    /// `found_whole`: [`Self::is_whole`] was true in this step already.
     #[inline]
     pub(crate) fn step_with<I: Injection>(
         &self,
         state: &mut ControllerState,
+        found_whole: bool,
         now: Instant,
         applied: Torque,
         inputs: &Inputs,
         injection: &I,
     ) -> Command {
-        if !are_whole(&self.config, &state.memory) {
+        if !found_whole && !are_whole(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
         let memory = state.memory.value_mut();

@@ -23,7 +23,7 @@ use crate::injection::{Injection, NoInjection};
 use crate::modes::Mode;
 use crate::monitor::{Evidence, Monitor, MonitorState};
 use crate::quantity::{Instant, Torque};
-use crate::redundant::{Redundant, are_whole, words};
+use crate::redundant::{Redundant, words};
 use receivers::{Accepted, Receivers};
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -189,9 +189,9 @@ impl Ecu {
         if injection.lane_never_ages() {
             self.receivers.renew_lane(now);
         }
-        let both = are_whole(&self.memory, &self.monitor);
+        let whole = self.is_whole();
         let mut inputs = Inputs::lost();
-        if (both || self.memory.get().is_some()) && self.receivers.is_whole() {
+        if whole || (self.memory.get().is_some() && self.receivers.are_whole()) {
             self.receivers.take(now, &mut inputs);
         } else {
             self.begin_anew(now);
@@ -201,7 +201,7 @@ impl Ecu {
         let elapsed_us = now.since(last.at).us();
         let mut faults = FaultSet::from_bits(last.faults);
         // One whose limits are damaged permits nothing.
-        let monitor = if both {
+        let monitor = if whole {
             Some(self.monitor.value())
         } else {
             self.monitor.get()
@@ -217,7 +217,7 @@ impl Ecu {
         inputs.faults = inputs.faults.union(faults);
         let mut command = self
             .controller
-            .step_with(&mut self.state, now, applied, &inputs, injection);
+            .step_with(&mut self.state, whole, now, applied, &inputs, injection);
         command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
@@ -268,6 +268,15 @@ impl Ecu {
     /// is its turn. In f32, and without effect on any torque.
     pub fn background_step(&mut self) -> Option<Frame> {
         self.background.step()
+    }
+
+    /// Whether all that is kept twice is whole. A function of its own, for the reasons of `redundant::are_whole`.
+    #[inline(never)]
+    fn is_whole(&self) -> bool {
+        self.memory.agrees_apart()
+            && self.monitor.agrees_apart()
+            && self.receivers.are_whole()
+            && self.controller.is_whole(&self.state)
     }
 
     /// The redundant state is damaged: nothing of it can be used. What comes in its place knows nothing but the

@@ -202,8 +202,14 @@ impl Law {
         let age = now.since(state.last.at);
         match since {
             None => self.torque(state, age),
-            Some(since) => self.torque(&state.moved_on(age, since), age),
+            Some(since) => self.asked_late(state, age, since),
         }
+    }
+
+    /// The same from a sample that was old when it came. A function of its own, out of the way of the usual case.
+    #[inline(never)]
+    fn asked_late(&self, state: &LawState, age: Micros, since: &Since) -> Torque {
+        self.torque(&state.moved_on(age, since), age)
     }
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two

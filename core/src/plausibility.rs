@@ -33,7 +33,8 @@ use crate::past::Past;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
-    per_second_times, product, signed_quotient, wide_product,
+    per_second, product, product_below, product_within, saturate, signed_quotient, upper_product,
+    wide_product,
 };
 use crate::redundant::words;
 
@@ -53,10 +54,6 @@ words! {
         /// t'_n, s, and how long before the far point is where the near point is now.
         pub(crate) near_time: Seconds,
         pub(crate) between: Micros,
-        /// Margin of the lane check, m.
-        pub(crate) lane_margin: Metres,
-        /// Margin of the column check, N.m.s.
-        pub(crate) column_margin: AngularImpulse,
     }
 }
 
@@ -180,9 +177,9 @@ impl PlausibilityState {
 
     /// The movement predicted, and what of it was not seen, positive in its direction; negative where more was seen than was
     /// predicted. 2^-24 m.
-    fn missing(&self) -> (i64, i64) {
-        let predicted = i64::from(self.lane.predicted.bits());
-        let missing = predicted.saturating_sub(i64::from(self.lane.seen.bits()));
+    fn missing(&self) -> (i32, i32) {
+        let predicted = self.lane.predicted.bits();
+        let missing = predicted.saturating_sub(self.lane.seen.bits());
         let missing = if predicted.is_negative() {
             missing.saturating_neg()
         } else {
@@ -252,16 +249,25 @@ pub fn speeds_agree(a: Speed, b: Speed) -> bool {
     a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
+/// Margins of the checks.
+const LANE_MARGIN: Metres = Metres::from_m(0.4);
+const COLUMN_MARGIN: AngularImpulse = AngularImpulse::from_nm_s(0.6);
 /// So far within a second no vehicle goes beyond what its yaw rate says, 2^-24 m.
-#[expect(clippy::as_conversions, reason = "widened at compile time")]
-const UNREAL: i64 = Metres::from_m(0.8).bits() as i64;
+const UNREAL: i32 = Metres::from_m(0.8).bits();
 /// Power assist: all that acts on the column is at most so many times the driver's torque.
-pub const ASSIST: i64 = 5;
+pub const ASSIST: i32 = 5;
 /// Friction of the column, and what else holds it without a sign.
 const FRICTION: Torque = Torque::from_nm(0.5);
+/// What is beyond these is as wrong as they are: driver and aligning torque, and what damping takes in the time between two
+/// checks. With them, and a guidance of 5 N.m that its frame has room for, no sum of the column check reaches 128, the end
+/// of an `i32`: 100 + 5 + 16.3 at most before the time, which at least halves it, and 60.7 + 60 + 0.3 + 2.7 after.
+const MOST_DRIVER: Torque = Torque::from_nm(20.0);
+const MOST_ALIGNING: i32 = Torque::from_nm(16.0).bits();
+const MOST_DAMPED: i32 = AngularImpulse::from_nm_s(60.0).bits();
 /// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank, 2^-24 N.m.
-#[expect(clippy::as_conversions, reason = "widened at compile time")]
-const PUSHED: i64 = Torque::from_nm(0.3).bits() as i64;
+const PUSHED: i32 = Torque::from_nm(0.3).bits();
+/// So much of the aligning torque may be wrong, in 2^-32: 77/256, 30 %.
+const ALIGNING_ERROR: i32 = 77 << (32 - 8);
 /// Inertia of column and wheel: 2^-3 kg.m2, a little more than the 0.11 of table 9.
 const INERTIA_SHIFT: u32 = 3;
 /// Bounds of what is learnt slowly: a bank of 5 %, or a pull; 5 mrad of camera and yaw rate at 30 m/s.
@@ -301,62 +307,57 @@ impl Plausibility {
         wheel: Radians,
         applied: Torque,
     ) -> bool {
-        let moved = i64::from(wheel.bits()).saturating_sub(i64::from(state.column.checked.bits()));
+        let moved = wheel.bits().saturating_sub(state.column.checked.bits());
         let dt = now.since(state.column.at);
         if state.column.is_known != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
             let aligning_at = |turning: TurningRate| {
-                let lateral = product(state.motion.speed.bits(), turning.bits());
-                wide_product(lateral, self.aligning_gain.bits()) >> FRAC_BITS
+                let lateral = saturate(product(state.motion.speed.bits(), turning.bits()));
+                product_within(lateral, self.aligning_gain.bits(), MOST_ALIGNING)
             };
             let aligning = aligning_at(state.turning());
             let by_wheel = aligning_at(state.turning_by_wheel())
-                .max(aligning.saturating_sub(PUSHED))
-                .min(aligning.saturating_add(PUSHED));
-            let applied = i64::from(applied.bits());
+                .max(aligning.wrapping_sub(PUSHED))
+                .min(aligning.wrapping_add(PUSHED));
+            let applied = applied.bits();
             // What driver and assist may give together.
-            let driver = i64::from(driver.bits());
-            let assisted = driver.saturating_mul(ASSIST);
+            let driver = driver.min(MOST_DRIVER).max(MOST_DRIVER.opposite()).bits();
+            let assisted = driver.wrapping_mul(ASSIST);
             let least = applied
-                .saturating_add(driver.min(assisted))
-                .saturating_sub(aligning.max(by_wheel));
+                .wrapping_add(driver.min(assisted))
+                .wrapping_sub(aligning.max(by_wheel));
             let most = applied
-                .saturating_add(driver.max(assisted))
-                .saturating_sub(aligning.min(by_wheel));
-            let damped = wide_product(moved, self.column_damping.bits()) >> FRAC_BITS;
+                .wrapping_add(driver.max(assisted))
+                .wrapping_sub(aligning.min(by_wheel));
+            let damped = product_within(moved, self.column_damping.bits(), MOST_DAMPED);
             // All times dt, for the wheel's movement is that of dt.
-            let impulse = |torque: i64| per_second_times(torque, dt);
+            let impulse = |torque: i32| per_second(torque, dt);
             let (least, most) = (
-                impulse(least).saturating_sub(damped),
-                impulse(most).saturating_sub(damped),
+                impulse(least).wrapping_sub(damped),
+                impulse(most).wrapping_sub(damped),
             );
-            let learnt = impulse(i64::from(state.column.bias.bits()));
-            let change = beyond(least, most, 0).saturating_sub(learnt) >> BIAS_SHIFT;
-            let bias = i64::from(state.column.bias.bits()).saturating_add(change);
-            state.column.bias = Torque::from_wide(bias)
+            let learnt = impulse(state.column.bias.bits());
+            let change = beyond(least, most, 0).wrapping_sub(learnt) >> BIAS_SHIFT;
+            let bias = state.column.bias.bits().wrapping_add(change);
+            state.column.bias = Torque::from_bits(bias)
                 .min(COLUMN_BIAS)
                 .max(COLUMN_BIAS.opposite());
-            // 77/256: 30 % of the aligning torque.
-            let tolerance = aligning.abs().saturating_mul(77) >> 8;
-            let tolerance = impulse(tolerance.saturating_add(i64::from(FRICTION.bits())));
-            let change = beyond(
-                least.saturating_sub(learnt),
-                most.saturating_sub(learnt),
-                tolerance,
-            );
-            state.column.sum = AngularImpulse::from_wide(leak(state.column.sum.bits(), change, dt));
+            let tolerance = upper_product(aligning.wrapping_abs(), ALIGNING_ERROR);
+            let tolerance = impulse(tolerance.wrapping_add(FRICTION.bits()));
+            let change = beyond(least.wrapping_sub(learnt), most.wrapping_sub(learnt), tolerance);
+            state.column.sum = AngularImpulse::from_bits(leak(state.column.sum.bits(), change, dt));
         }
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
-        let sum = i64::from(state.column.sum.bits());
-        let above = sum.abs().saturating_sub(i64::from(self.column_margin.bits()));
+        let sum = state.column.sum.bits();
+        let above = sum.saturating_abs().wrapping_sub(COLUMN_MARGIN.bits());
         // Inertia times way over time is the wheel's momentum, in the direction of the sum.
         let along = if sum.is_negative() {
             moved.saturating_neg()
         } else {
             moved
         };
-        above <= 0 || per_second_times(above, dt) <= along >> INERTIA_SHIFT
+        above <= 0 || per_second(above, dt) <= along >> INERTIA_SHIFT
     }
 
     /// Takes a new lane sample that came now; `false` when its error did not move as it must have. Apart, as
@@ -373,67 +374,64 @@ impl Plausibility {
         past.see(now, sample.at, sample.e_theta);
         let dt = sample.at.since(state.lane.last.at);
         if state.lane.is_known != 0 && dt.us() != 0 {
-            let seen = i64::from(sample.e_y.bits()).saturating_sub(i64::from(state.lane.last.e_y.bits()));
+            let seen = sample.e_y.bits().saturating_sub(state.lane.last.e_y.bits());
             let measured = state.motion.has_yaw_rate != 0;
             let rate = if measured {
                 self.line_rate(state, past, now, state.lane.last.at)
             } else {
-                let heading = product(state.motion.speed.bits(), state.lane.last.e_theta.bits());
-                let far = product(self.far_time.bits(), state.motion.speed.bits());
-                let turned = wide_product(far, state.turning().bits()) >> FRAC_BITS;
-                Some(heading.saturating_sub(turned))
+                let heading = saturate(product(state.motion.speed.bits(), state.lane.last.e_theta.bits()));
+                let far = saturate(product(self.far_time.bits(), state.motion.speed.bits()));
+                Some(heading.saturating_sub(product_below(far, state.turning().bits())))
             };
             // Where the line is not known for long enough, nothing is predicted.
-            let predicted = rate.map_or(seen, |rate| per_second_times(rate, dt));
-            let bias = i64::from(state.lane.bias.bits());
-            let predicted = predicted.saturating_add(per_second_times(bias, dt));
+            let predicted = rate.map_or(seen, |rate| per_second(rate, dt));
+            let bias = state.lane.bias.bits();
+            let predicted = predicted.saturating_add(per_second(bias, dt));
             if measured {
                 let learnt = bias.saturating_add(seen.saturating_sub(predicted) >> BIAS_SHIFT);
-                state.lane.bias = Speed::from_wide(learnt)
+                state.lane.bias = Speed::from_bits(learnt)
                     .min(LANE_BIAS)
-                    .max(Speed::from_wide(i64::from(LANE_BIAS.bits()).saturating_neg()));
+                    .max(Speed::from_bits(LANE_BIAS.bits().saturating_neg()));
             }
-            state.lane.predicted = Metres::from_wide(leak(state.lane.predicted.bits(), predicted, dt));
-            state.lane.seen = Metres::from_wide(leak(state.lane.seen.bits(), seen, dt));
+            state.lane.predicted = Metres::from_bits(leak(state.lane.predicted.bits(), predicted, dt));
+            state.lane.seen = Metres::from_bits(leak(state.lane.seen.bits(), seen, dt));
         }
         (state.lane.is_known, state.lane.last) = (1, sample);
         let (predicted, missing) = state.missing();
-        let margin = i64::from(self.lane_margin.bits());
+        let margin = LANE_MARGIN.bits();
         // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. Where the yaw
         // rate is measured, a large one is: no vehicle goes there.
-        let is_missing = missing > margin && predicted.abs() > margin >> 1;
-        let is_unreal = missing.abs() > UNREAL && state.motion.has_yaw_rate != 0;
+        let is_missing = missing > margin && predicted.saturating_abs() > margin >> 1;
+        let is_unreal = missing.saturating_abs() > UNREAL && state.motion.has_yaw_rate != 0;
         !is_missing && !is_unreal
     }
 
     /// How fast the near-point error must move at an instant, 2^-24 m/s, by the measured yaw rate.
-    fn line_rate(&self, state: &PlausibilityState, past: &Past, now: Instant, at: Instant) -> Option<i64> {
+    fn line_rate(&self, state: &PlausibilityState, past: &Past, now: Instant, at: Instant) -> Option<i32> {
         let near = past.line(now, at, self.between)?;
         let turning = past.heading(now, at).rate;
-        let along = product(state.motion.speed.bits(), near.bits());
-        let reach = product(self.near_time.bits(), state.motion.speed.bits());
-        let across = wide_product(reach, turning.bits()) >> FRAC_BITS;
-        Some(along.saturating_sub(across))
+        let along = saturate(product(state.motion.speed.bits(), near.bits()));
+        let reach = saturate(product(self.near_time.bits(), state.motion.speed.bits()));
+        Some(along.saturating_sub(product_below(reach, turning.bits())))
     }
 
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
     pub fn used(state: &PlausibilityState) -> (Metres, AngularImpulse) {
-        (Metres::from_wide(state.missing().1), state.column.sum)
+        (Metres::from_bits(state.missing().1), state.column.sum)
     }
 }
 
 /// How far an interval is from zero, beside a tolerance; positive where all of it is above.
-fn beyond(least: i64, most: i64, tolerance: i64) -> i64 {
-    let (low, high) = (least.saturating_sub(tolerance), most.saturating_add(tolerance));
-    low.max(0).saturating_add(high.min(0))
+fn beyond(least: i32, most: i32, tolerance: i32) -> i32 {
+    let (low, high) = (least.wrapping_sub(tolerance), most.wrapping_add(tolerance));
+    low.max(0).wrapping_add(high.min(0))
 }
 
 /// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.
-fn leak(sum: i32, change: i64, dt: Micros) -> i64 {
-    let sum = i64::from(sum);
-    let kept = sum.saturating_sub(per_second_times(sum, dt));
-    kept.saturating_add(change)
+fn leak(sum: i32, change: i32, dt: Micros) -> i32 {
+    // What leaks is at most half of the sum.
+    sum.wrapping_sub(per_second(sum, dt)).saturating_add(change)
 }
 
 #[cfg(test)]
@@ -451,8 +449,6 @@ mod tests {
         far_time: Seconds::from_s(0.7),
         near_time: Seconds::from_s(0.3),
         between: Micros::from_us(400_000),
-        lane_margin: Metres::from_m(0.4),
-        column_margin: AngularImpulse::from_nm_s(0.6),
     };
 
     #[test]
@@ -527,8 +523,7 @@ mod tests {
     /// At its margin a movement may be missing, and half of it has to be predicted; a count further it is not honest.
     #[test]
     fn the_lane_check_keeps_its_margins_to_the_count() {
-        let margin = CHECKS.lane_margin.bits();
-        let unreal = i32::try_from(UNREAL).unwrap();
+        let margin = LANE_MARGIN.bits();
         let judged = |predicted: i32, seen: i32, yaw_rate: Option<TurningRate>| {
             let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
             CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), yaw_rate);
@@ -545,8 +540,8 @@ mod tests {
         assert!(!judged(2 * margin + 1, margin, None));
         assert!(judged(margin / 2, -margin, None));
         assert!(!judged(margin / 2 + 1, -margin, None));
-        assert!(judged(0, unreal, Some(TurningRate::ZERO)));
-        assert!(!judged(0, unreal + 1, Some(TurningRate::ZERO)));
-        assert!(judged(0, unreal + 1, None));
+        assert!(judged(0, UNREAL, Some(TurningRate::ZERO)));
+        assert!(!judged(0, UNREAL + 1, Some(TurningRate::ZERO)));
+        assert!(judged(0, UNREAL + 1, None));
     }
 }

@@ -110,9 +110,7 @@ pub(crate) use words;
 /// the start of what holds them, it would load no two words at once.
 #[inline(never)]
 pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
-    #[cfg(target_pointer_width = "32")]
-    let (a, b) = (black_box(a), black_box(b));
-    a.agrees() && b.agrees()
+    a.agrees_apart() && b.agrees_apart()
 }
 
 /// A value and its inverted copy.
@@ -146,6 +144,15 @@ impl<T: Words> Redundant<T> {
     #[inline(always)]
     pub(crate) fn agrees(&self) -> bool {
         self.value.agreement(&self.inverted) == u32::MAX
+    }
+
+    /// The same in a function that is never inlined, as [`are_whole`].
+    #[inline(always)]
+    pub(crate) fn agrees_apart(&self) -> bool {
+        let guarded = self;
+        #[cfg(target_pointer_width = "32")]
+        let guarded = black_box(guarded);
+        guarded.agrees()
     }
 
     /// The copy anew, likewise.

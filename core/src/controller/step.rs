@@ -12,7 +12,7 @@ use crate::modes::{Event, Events, Mode};
 use crate::past::Past;
 use crate::probe::ProbeState;
 use crate::quantity::{
-    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, saturate,
+    Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
 use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
 
@@ -58,7 +58,7 @@ impl<I: Injection> Step<'_, I> {
         let (late, early) = self.keep_time(v);
         let mut faults = lost.union(v.faults()).union(self.inputs.faults);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
-        v.hot.latched |= faults.common(FaultSet::CRITICAL).bits();
+        v.hot.kept |= faults.common(FaultSet::CRITICAL).bits();
 
         let before = Mode::from_code(v.hot.small.mode.into()).unwrap_or(Mode::Fault);
         if before == Mode::Active {
@@ -107,14 +107,14 @@ impl<I: Injection> Step<'_, I> {
             ..
         } = self.inputs;
         let checks = &self.config.plausibility;
-        let mut implausible = FaultSet::from_bits(v.hot.implausible);
+        let mut kept = v.faults();
 
         if let Input::New(motion) = motion {
             v.heard.motion = self.now;
             changed.add(Changed::HEARD);
             changed.add(Changed::MOTION);
             let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds);
-            implausible.set(!plausible, Fault::SpeedImplausible);
+            kept.set(!plausible, Fault::SpeedImplausible);
             if agree {
                 checks.motion(&mut v.plausibility, motion.speeds[0], motion.yaw_rate());
             }
@@ -140,7 +140,7 @@ impl<I: Injection> Step<'_, I> {
             Input::Lost => {
                 changed.add(Changed::COLUMN);
                 v.plausibility.forget_column();
-                implausible.set(false, Fault::ColumnImplausible);
+                kept.set(false, Fault::ColumnImplausible);
             }
         }
         match lane {
@@ -160,17 +160,17 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(Changed::LANE);
                 v.plausibility.forget_lane();
                 past.forget_line();
-                implausible.set(false, Fault::LaneImplausible);
+                kept.set(false, Fault::LaneImplausible);
             }
         }
-        self.check(v, changed, past, due, &mut implausible);
+        self.check(v, changed, past, due, &mut kept);
         self.make_up_for_age(v, past);
         if let Input::New(_) = request {
             v.heard.request = self.now;
             changed.add(Changed::HEARD);
         }
 
-        v.hot.implausible = implausible.bits();
+        v.hot.kept = kept.bits();
         self.lost()
     }
 
@@ -182,7 +182,7 @@ impl<I: Injection> Step<'_, I> {
         changed: &mut Changed,
         past: &mut Past,
         due: &mut Due,
-        implausible: &mut FaultSet,
+        kept: &mut FaultSet,
     ) {
         let checks = &self.config.plausibility;
         if let Some(c) = to_check(&self.inputs.column, &mut due.column) {
@@ -194,12 +194,12 @@ impl<I: Injection> Step<'_, I> {
                 c.wheel_angle,
                 self.applied,
             );
-            implausible.set(!plausible, Fault::ColumnImplausible);
+            kept.set(!plausible, Fault::ColumnImplausible);
         }
         if let Some(sample) = to_check(&self.inputs.lane, &mut due.lane) {
             changed.add(Changed::LANE);
             let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
-            implausible.set(!plausible, Fault::LaneImplausible);
+            kept.set(!plausible, Fault::LaneImplausible);
         }
     }
 
@@ -434,8 +434,9 @@ impl<I: Injection> Step<'_, I> {
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ZERO, share);
-        let share = saturate(product(authority.bits(), v.share.bits()));
-        Torque::from_wide(product(share, asked.bits()))
+        // Neither is more than one.
+        let share = share_of(authority.bits(), v.share.bits());
+        Torque::from_bits(share_of(share, asked.bits()))
     }
 }
 

@@ -419,11 +419,9 @@ impl Receivers {
         let _ = self.lane.change(|slot| (slot.at, slot.value.at) = (now, now));
     }
 
-    /// Whether no receiver is damaged. A function of its own, as [`are_whole`].
-    ///
-    /// [`are_whole`]: crate::redundant::are_whole
-    #[inline(never)]
-    pub(super) fn is_whole(&self) -> bool {
+    /// Whether no receiver is damaged.
+    #[inline(always)]
+    pub(super) fn are_whole(&self) -> bool {
         self.lane.agrees()
             && self.refused.agrees()
             && self.column.agrees()

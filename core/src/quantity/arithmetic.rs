@@ -12,6 +12,33 @@ pub(crate) const fn product(a: i32, b: i32) -> i64 {
         >> FRAC_BITS
 }
 
+/// A share of a value, rounded to nearest. `share` is 0 to 1, so that the result is no larger than the value.
+pub(crate) const fn share_of(share: i32, value: i32) -> i32 {
+    product(share, value) as i32
+}
+
+/// [`product`] rounded down, saturating.
+pub(crate) const fn product_below(a: i32, b: i32) -> i32 {
+    saturate((a as i64).wrapping_mul(b as i64) >> FRAC_BITS)
+}
+
+/// The same, held within +-`most`.
+pub(crate) const fn product_within(a: i32, b: i32, most: i32) -> i32 {
+    let (wide, most) = ((a as i64).wrapping_mul(b as i64) >> FRAC_BITS, most as i64);
+    if wide > most {
+        most as i32
+    } else if wide < most.wrapping_neg() {
+        most.wrapping_neg() as i32
+    } else {
+        wide as i32
+    }
+}
+
+/// The upper half of `a * b`, which a 32-bit core has in one instruction.
+pub(crate) const fn upper_product(a: i32, b: i32) -> i32 {
+    ((a as i64).wrapping_mul(b as i64) >> 32) as i32
+}
+
 /// `wide * factor`, saturating. `i64::saturating_mul` takes a product of 128 bits, which is a hundred instructions on a
 /// 32-bit core.
 pub(crate) const fn wide_product(wide: i64, factor: i32) -> i64 {
@@ -32,8 +59,8 @@ pub(crate) const fn wide_product(wide: i64, factor: i32) -> i64 {
     }
 }
 
-/// `bits * span / 1 s`, rounded to nearest and saturated to an `i32`, for a span of at most 0.5 s: 2^32 / 10^6 as a
-/// multiplier, 8e-6 of relative error.
+/// `bits * span / 1 s`, rounded to nearest and saturated to an `i32`, for a span of at most [`LONGEST_US`]: 2^32 / 10^6 as
+/// a multiplier, 8e-6 of relative error.
 #[inline(always)]
 pub(crate) const fn per_second_times(bits: i64, span: Micros) -> i64 {
     // The usual case first.
@@ -46,7 +73,7 @@ pub(crate) const fn per_second_times(bits: i64, span: Micros) -> i64 {
 
 const fn wide_per_second(bits: i64, span: Micros) -> i32 {
     let share = share_of_second(span);
-    // Nothing wraps: a share has less than 31.1 bits, and the lower product no sign.
+    // Nothing wraps: a share has 31 bits, and the lower product no sign.
     let low = (bits as u32 as u64)
         .wrapping_mul(share as u64)
         .wrapping_add(1 << 31)
@@ -60,10 +87,18 @@ pub(crate) const fn per_second(bits: i32, span: Micros) -> i32 {
     (wide.wrapping_add(1 << 31) >> 32) as i32
 }
 
-/// A span as a share of a second in 2^-32, half of one at most.
-const fn share_of_second(span: Micros) -> u32 {
-    let us = if span.us() > 500_000 { 500_000 } else { span.us() };
-    us.wrapping_mul(4295)
+/// The longest span that counts: half a second, less what would make a share of it more than an `i32` holds. So its
+/// product with 32 bits is one instruction of a 32-bit core.
+const LONGEST_US: u32 = 499_996;
+
+/// A span as a share of a second in 2^-32, not quite half of one at most.
+const fn share_of_second(span: Micros) -> i32 {
+    let us = if span.us() > LONGEST_US {
+        LONGEST_US
+    } else {
+        span.us()
+    };
+    us.wrapping_mul(4295) as i32
 }
 
 /// `dividend / divisor`, rounded down, saturating; 0 for a divisor of zero. A long division with two digits of 16 bits:
@@ -124,10 +159,11 @@ pub(crate) const fn saturate(wide: i64) -> i32 {
     }
 }
 
-/// `value / 2^shift`, rounded to nearest (ties away from minus infinity). `shift` is 1 to 62.
+/// `value / 2^shift`, rounded to nearest (ties away from minus infinity). `shift` is 1 to 62, and half of its unit more
+/// than `value` is an `i64` too.
 pub(crate) const fn shift_round(value: i64, shift: u32) -> i64 {
     value
-        .saturating_add(1_i64.wrapping_shl(shift.wrapping_sub(1)))
+        .wrapping_add(1_i64.wrapping_shl(shift.wrapping_sub(1)))
         .wrapping_shr(shift)
 }
 
@@ -177,6 +213,30 @@ mod tests {
             let exact = i128::from(narrow) * i128::from(factor);
             let rounded = (exact + (1 << 23)).div_euclid(1 << 24);
             assert_eq!(i128::from(product(narrow, factor)), rounded, "{narrow} {factor}");
+            let share = narrow.clamp(0, 1 << 24);
+            let exact_share = i128::from(share) * i128::from(factor);
+            let rounded = (exact_share + (1 << 23)).div_euclid(1 << 24);
+            assert_eq!(i128::from(share_of(share, factor)), rounded, "{share} {factor}");
+            let below = exact.div_euclid(1 << 24);
+            let below = below.clamp(i32::MIN.into(), i32::MAX.into());
+            assert_eq!(
+                i128::from(product_below(narrow, factor)),
+                below,
+                "{narrow} {factor}"
+            );
+            let most = numbers.any() as i32 & i32::MAX;
+            let within = below.clamp(-i128::from(most), most.into());
+            assert_eq!(
+                i128::from(product_within(narrow, factor, most)),
+                within,
+                "{narrow} {factor}"
+            );
+            let upper = exact.div_euclid(1 << 32);
+            assert_eq!(
+                i128::from(upper_product(narrow, factor)),
+                upper,
+                "{narrow} {factor}"
+            );
         }
     }
 
@@ -187,11 +247,11 @@ mod tests {
             // Most spans are of a few milliseconds; the longest that counts is half a second.
             let us = match case % 4 {
                 0 => numbers.any() as u32,
-                1 => 500_000 - (numbers.word() % 3) as u32,
+                1 => LONGEST_US + 1 - (numbers.word() % 3) as u32,
                 _ => (numbers.word() % 100_000) as u32,
             };
             let (bits, span) = (numbers.any() as i64, Micros::from_us(us));
-            let share = 4295 * i128::from(us.min(500_000));
+            let share = 4295 * i128::from(us.min(LONGEST_US));
             let exact = |bits: i128| (bits * share + (1 << 31)).div_euclid(1 << 32);
             let expected = exact(bits.into()).clamp(i32::MIN.into(), i32::MAX.into());
             assert_eq!(i128::from(per_second_times(bits, span)), expected, "{bits} {us}");
