@@ -9,6 +9,7 @@ use haptic_core::params::Params;
 
 use super::band::Band;
 use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, whole};
+use super::probe::Probes;
 use crate::models::sensors::TORQUE_RESOLUTION_NM;
 use crate::scenario::{Condition, Scenario};
 
@@ -85,6 +86,7 @@ pub(super) struct Ecus<const N: usize> {
     ramp_done: [i32; N],
     past: [[i32; N]; PAST],
     band: Band<N>,
+    probes: Probes<N>,
 }
 
 /// One update of a filtered rate.
@@ -131,6 +133,7 @@ impl<const N: usize> Ecus<N> {
             ramp_done: zero(),
             past: [zero(); PAST],
             band: Band::new(),
+            probes: Probes::new(),
         }
     }
 
@@ -175,13 +178,17 @@ impl<const N: usize> Ecus<N> {
         for torques in &mut self.past {
             torques[lane] = 0;
         }
-        self.band.begin(lane, gains);
+        let has_probe = scenario.guidance().probe;
+        self.band
+            .begin(lane, gains, if has_probe { p.probe_amplitude_nm } else { 0.0 });
+        self.probes.begin(lane, &p, has_probe);
     }
 
     /// From its second step on a run's steps take a millisecond each.
     #[inline(always)]
     pub(super) fn let_time_pass(&mut self) {
         (self.growth, self.fall) = (self.growth_in_a_step, self.fall_in_a_step);
+        self.probes.let_time_pass();
     }
 
     /// The torque does not reach the column any more: what the ECU decides is nobody's matter.
@@ -193,6 +200,8 @@ impl<const N: usize> Ecus<N> {
     pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
         let last = (step - TIMEOUT_MS - 1) / 5;
         let (trusted, applied) = (self.past[last as usize % PAST][lane], self.applied[lane]);
+        // Half a wave of the probe does not stand for two seconds, and what the other half took does not come back.
+        let applied = smaller_of_same_sign(applied, applied.wrapping_sub(self.probes.applied[lane]));
         self.mode[lane] = HANDOVER;
         self.ramp_from[lane] = smaller_of_same_sign(trusted, applied);
     }
@@ -258,8 +267,9 @@ impl<const N: usize> Ecus<N> {
     #[inline(always)]
     pub(super) fn decide(&mut self, own: &[i32; N], is_window_due: bool, is_kept: bool) {
         for l in 0..N {
-            // Hands: the torque of the last step acted for a millisecond.
-            let acts = (self.applied[l].wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
+            // Hands: the torque of the last step acted for a millisecond. The probe does not count.
+            let guidance = self.applied[l].wrapping_sub(self.probes.applied[l]);
+            let acts = (guidance.wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
             self.without_ms[l] = self.without_ms[l].wrapping_add(if acts { 1 } else { 0 });
             self.suspect[l] |= flag(self.without_ms[l] >= HANDS_MS) & self.matters[l];
         }
@@ -279,11 +289,17 @@ impl<const N: usize> Ecus<N> {
         if hands_over != 0 {
             self.ramps(&mut wanted);
         }
+        let mut is_guided = [0; N];
+        for l in 0..N {
+            is_guided[l] = flag(self.mode[l] == GUIDED);
+        }
+        self.probes.add(&is_guided, &mut wanted);
         let mut torque = [0; N];
         self.envelope(&wanted, &mut torque);
+        self.probes.hold(&torque, &self.limited);
         if is_kept {
             for l in 0..N {
-                self.past[(own[l] / 5) as usize % PAST][l] = torque[l];
+                self.past[(own[l] / 5) as usize % PAST][l] = torque[l].wrapping_sub(self.probes.applied[l]);
             }
         }
         for l in 0..N {

@@ -18,8 +18,6 @@ pub enum Reason {
     SensorErrors,
     /// Exact sensors, past the bus.
     ExactSensors,
-    /// The host asks for the probe.
-    Probe,
     /// Slower than the controller guides.
     TooSlow,
     /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
@@ -35,7 +33,6 @@ impl fmt::Display for Reason {
             Self::ChangingSpeed => "a speed that changes",
             Self::SensorErrors => "sensors with errors",
             Self::ExactSensors => "exact sensors, past the bus",
-            Self::Probe => "a probe",
             Self::TooSlow => "slower than is guided",
             Self::EarlyFailure => "a lane preview that fails within the first 2 s",
             Self::TooLong => "longer than 2000 s",
@@ -67,7 +64,6 @@ pub fn why_not(scenario: &Scenario) -> Option<Reason> {
             guided && scenario.sensors() == Sensors::Exact,
             Reason::ExactSensors,
         ),
-        (guided && scenario.guidance().probe, Reason::Probe),
         (
             guided && scenario.speed_m_per_s() < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
             Reason::TooSlow,

@@ -26,6 +26,7 @@ mod checks;
 mod counts;
 mod ecu;
 mod gate;
+mod probe;
 mod runs;
 #[cfg(test)]
 mod tests;

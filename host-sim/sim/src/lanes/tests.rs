@@ -100,6 +100,8 @@ fn random(count: usize, seed: u64) -> Vec<Scenario> {
                 reduction_nm_per_s: between(4.0, 8.0),
                 low_speed_share: between(0.0, 1.0),
                 high_speed_share: between(0.0, 1.0),
+                probe_amplitude_nm: between(0.0, 0.25),
+                probe_frequency_hz: between(1.0, 2.2),
                 ..Params::PAPER
             };
             builder = builder.guidance(GuidanceParameters {
@@ -112,6 +114,7 @@ fn random(count: usize, seed: u64) -> Vec<Scenario> {
         if between(0.0, 1.0) < 0.3 {
             builder = builder.driver_change(Some(change));
         }
+        builder = builder.probe(between(0.0, 1.0) < 0.4);
         if let Ok(scenario) = builder.build() {
             scenarios.push(scenario);
         }
