@@ -505,9 +505,9 @@ impl Plan {
 /// The sensors of a world that is not the paper's.
 #[derive(Debug, Clone)]
 pub(crate) struct Sensing {
-    errors: SensorErrors,
-    camera: ErringCamera,
-    gyro: ErringGyro,
+    pub(crate) errors: SensorErrors,
+    pub(crate) camera: ErringCamera,
+    pub(crate) gyro: ErringGyro,
 }
 
 impl Sensing {

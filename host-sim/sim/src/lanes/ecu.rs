@@ -8,7 +8,7 @@
 use haptic_core::params::Params;
 
 use super::band::Band;
-use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, whole};
+use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, speed_heard, whole};
 use super::probe::Probes;
 use crate::models::sensors::TORQUE_RESOLUTION_NM;
 use crate::scenario::{Condition, Scenario};
@@ -146,7 +146,7 @@ impl<const N: usize> Ecus<N> {
             all[lane] = bits(gain);
         }
         self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
-        self.scheduled[lane] = scheduled(&p, scenario.speed_m_per_s());
+        self.scheduled[lane] = scheduled(&p, speed_heard(scenario));
         self.limit[lane] = bits(p.torque_limit_nm);
         self.growth_in_a_step[lane] = per_second(bits(p.wind_up_nm_per_s), MS);
         let fall = per_second(bits(p.reduction_nm_per_s), MS);
@@ -427,10 +427,9 @@ impl<const N: usize> Ecus<N> {
     }
 }
 
-/// Share of the torque at a speed, as the bus carries it.
-fn scheduled(p: &Params, speed_m_per_s: f64) -> i32 {
+/// Share of the torque at a speed.
+fn scheduled(p: &Params, speed: i32) -> i32 {
     let middle = 60.0 / 3.6;
-    let speed = on_the_bus(bits(speed_m_per_s), 16);
     let slower = speed < bits(middle);
     let (per, least) = if slower {
         (

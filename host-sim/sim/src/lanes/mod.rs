@@ -27,7 +27,9 @@ mod counts;
 mod ecu;
 mod gate;
 mod probe;
+mod real;
 mod runs;
+mod sensing;
 #[cfg(test)]
 mod tests;
 mod tracked;

@@ -52,7 +52,13 @@ impl<const N: usize> Reals<N> {
     }
 
     /// A new run begins in a lane, with such a plant or without.
-    pub(super) fn begin(&mut self, lane: usize, plant: Option<Box<RealPlant>>, v_m_per_s: f64, has_banks: bool) {
+    pub(super) fn begin(
+        &mut self,
+        lane: usize,
+        plant: Option<Box<RealPlant>>,
+        v_m_per_s: f64,
+        has_banks: bool,
+    ) {
         self.runs[lane] = plant.map(|plant| {
             Box::new(Real {
                 v_m_per_s,
@@ -87,12 +93,23 @@ impl<const N: usize> Reals<N> {
 
     /// The motors answer the commands of the step before: what is measured of them is heard in every second step.
     #[inline(always)]
-    pub(super) fn judge(&mut self, is_heard: bool, commanded: &[i32; N], matters: &[i32; N], suspect: &mut [i32; N]) {
+    pub(super) fn judge(
+        &mut self,
+        is_heard: bool,
+        commanded: &[i32; N],
+        matters: &[i32; N],
+        suspect: &mut [i32; N],
+    ) {
         if !self.is_any {
             return;
         }
         for (l, run) in self.runs.iter_mut().enumerate() {
-            let Some(Real { plant, motor: Some(motor), .. }) = run.as_deref_mut() else {
+            let Some(Real {
+                plant,
+                motor: Some(motor),
+                ..
+            }) = run.as_deref_mut()
+            else {
                 continue;
             };
             let torque = |bits: i32| Torque::from_nm(f64::from(bits) * (1.0 / ONE));
@@ -122,8 +139,14 @@ impl<const N: usize> Reals<N> {
             let Some(run) = run.as_deref_mut().filter(|_| acting.alive[l] == ALIVE) else {
                 continue;
             };
-            let [sideslip_rad, yaw_rate_rad_s, wheel_rad, wheel_rate_rad_s, arm_nm, yaw_rad] =
-                std::array::from_fn(|i| state[i][l]);
+            let [
+                sideslip_rad,
+                yaw_rate_rad_s,
+                wheel_rad,
+                wheel_rate_rad_s,
+                arm_nm,
+                yaw_rad,
+            ] = std::array::from_fn(|i| state[i][l]);
             let before = PlantState {
                 sideslip_rad,
                 yaw_rate_rad_s,

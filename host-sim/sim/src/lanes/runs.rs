@@ -7,6 +7,7 @@ use haptic_log::trace::{Sample, Trace};
 use super::ALIVE;
 use super::checks::Checks;
 use super::ecu::{Ecus, TIMEOUT_MS};
+use super::sensing::Senses;
 use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, Worlds, YAW_RATE};
 use crate::guidance::NoGuidance;
 use crate::models::STEP_S;
@@ -45,6 +46,7 @@ pub(super) struct Lanes<const N: usize> {
     worlds: Worlds<N>,
     ecus: Ecus<N>,
     checks: Checks<N>,
+    senses: Senses<N>,
     /// Number of the step in each run.
     own: [i32; N],
     /// All bits where there is a camera for the guidance.
@@ -62,6 +64,7 @@ impl<const N: usize> Lanes<N> {
             worlds: Worlds::new(whole),
             ecus: Ecus::new(),
             checks: Checks::new(),
+            senses: Senses::new(),
             own: [0; N],
             looks: [0; N],
             has_events: false,
@@ -87,8 +90,13 @@ impl<const N: usize> Lanes<N> {
     }
 
     pub(super) fn begin(&mut self, lane: usize, number: usize, scenario: &Scenario) {
-        let simulation = Simulation::with(scenario, NoGuidance);
+        let mut simulation = Simulation::with(scenario, NoGuidance);
         self.worlds.begin(lane, &simulation);
+        let has_banks = !scenario.course().is_level();
+        self.worlds
+            .real
+            .begin(lane, simulation.real.take(), scenario.speed_m_per_s(), has_banks);
+        self.senses.begin(lane, simulation.sensing.take());
         self.ecus.begin(lane, scenario);
         self.checks.begin(lane, scenario);
         self.own[lane] = 0;
@@ -206,6 +214,7 @@ impl<const N: usize> Lanes<N> {
             driver_nm[l] = self.worlds.state[ARM][l] + self.worlds.remnant_nm[l];
         }
         self.hear(phase, looks, &driver_nm);
+        self.hear_motors(phase);
         self.ecus.decide(&self.own, phase == 0, is_sample);
         let torque_nm = self.ecus.torque_nm();
         if is_sample {
@@ -222,36 +231,48 @@ impl<const N: usize> Lanes<N> {
     #[inline(always)]
     fn hear(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
         let Self {
-            worlds, ecus, checks, ..
+            worlds,
+            ecus,
+            checks,
+            senses,
+            own,
+            ..
         } = self;
         let matters = *ecus.matters();
         if phase.is_multiple_of(VEHICLE_MS) {
-            checks.vehicle(&worlds.state[YAW_RATE], &matters, &mut ecus.suspect);
+            let yaw_rate = senses.yaw_rate(own, &worlds.state[YAW_RATE]);
+            checks.vehicle(&yaw_rate, &matters, &mut ecus.suspect);
         }
         if phase.is_multiple_of(COLUMN_MS) {
-            ecus.column(driver_nm);
+            let [driver_nm, wheel] = senses.column(driver_nm, &worlds.state[WHEEL]);
+            ecus.column(&driver_nm);
             let applied = ecus.torque_nm();
             let driver = ecus.driver_nm();
-            checks.column(
-                &driver,
-                &applied,
-                &worlds.state[WHEEL],
-                &matters,
-                &mut ecus.suspect,
-            );
+            checks.column(&driver, &applied, &wheel, &matters, &mut ecus.suspect);
         }
         if looks {
             let dt_ms = if phase % CAMERA_MS == 9 { 9 } else { 8 };
             let camera = &worlds.camera;
-            let seen = ecus.picture(&camera.e_y, &camera.e_theta, dt_ms, &self.own);
+            let [e_y, e_theta] = senses.picture(own, &ecus.hears, [&camera.e_y, &camera.e_theta]);
+            let seen = ecus.picture(&e_y, &e_theta, dt_ms, own);
             let mut heard = matters;
             for l in 0..N {
                 heard[l] &= ecus.hears[l];
             }
             let times = [dt_ms, phase % VEHICLE_MS];
             let keeps = phase.is_multiple_of(CAMERA_MS);
-            checks.picture(&seen, times, &self.own, keeps, &heard, &mut ecus.suspect);
+            checks.picture(&seen, times, own, keeps, &heard, &mut ecus.suspect);
         }
+    }
+
+    /// The motors' torques reach the ECUs.
+    #[inline(always)]
+    fn hear_motors(&mut self, phase: u32) {
+        let Self { worlds, ecus, .. } = self;
+        let (matters, is_heard) = (*ecus.matters(), phase.is_multiple_of(COLUMN_MS));
+        worlds
+            .real
+            .judge(is_heard, &ecus.applied, &matters, &mut ecus.suspect);
     }
 
     #[inline(always)]

@@ -68,7 +68,12 @@ impl<const N: usize> Senses<N> {
 
     /// The lane errors of a picture, m and rad, in the runs that see the road.
     #[inline(always)]
-    pub(super) fn picture(&mut self, own: &[i32; N], hears: &[i32; N], truth: [&[f64; N]; 2]) -> [[f64; N]; 2] {
+    pub(super) fn picture(
+        &mut self,
+        own: &[i32; N],
+        hears: &[i32; N],
+        truth: [&[f64; N]; 2],
+    ) -> [[f64; N]; 2] {
         let mut seen = truth.map(|errors| *errors);
         if self.is_any {
             for (l, sensing) in self.own.iter_mut().enumerate() {

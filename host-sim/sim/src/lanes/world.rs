@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use super::ALIVE;
+use super::real::{Acting, Reals};
 use super::tracked::Tracked;
 use crate::guidance::NoGuidance;
 use crate::models::STEP_S;
@@ -51,6 +52,7 @@ pub(super) struct Worlds<const N: usize> {
     pub(super) driver: Points<N>,
     pub(super) camera: Points<N>,
     pub(super) body: Tracked<N>,
+    pub(super) real: Reals<N>,
     pub(super) remnant_nm: [f64; N],
     /// [`ALIVE`] where a run is under way.
     pub(super) alive: [u64; N],
@@ -102,6 +104,7 @@ impl<const N: usize> Worlds<N> {
             driver: Points::new(),
             camera: Points::new(),
             body: Tracked::new(),
+            real: Reals::new(),
             remnant_nm: [0.0; N],
             alive: [0; N],
             suspect: [0; N],
@@ -150,6 +153,7 @@ impl<const N: usize> Worlds<N> {
             }
         }
         self.distance[lane] = transition.distance_m;
+        self.real.set_gains(lane, transition.gains());
     }
 
     /// chi of each run, rad.
@@ -201,6 +205,7 @@ impl<const N: usize> Worlds<N> {
             let is_off = self.body.offset[l].abs() > crate::simulation::DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
         }
+        self.real.locate(roads, |lane| self.body.place(lane));
     }
 
     /// The drivers' eyes and arms, columns and vehicles move for a millisecond under these torques.
@@ -211,6 +216,15 @@ impl<const N: usize> Worlds<N> {
         let before = self.direction_rad();
         let mut next = [[0.0; N]; STATES];
         self.linear(&next_target, torque_nm, &mut next);
+        let acting = Acting {
+            target: &self.target,
+            next_target: &next_target,
+            torque_nm,
+            remnant_nm: &self.remnant_nm,
+            alive: &self.alive,
+        };
+        self.real
+            .step(&self.state, &acting, &mut next, &mut self.distance);
         (self.state, self.target) = (next, next_target);
         for l in 0..N {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);

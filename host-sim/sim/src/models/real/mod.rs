@@ -86,6 +86,20 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         input: &PlantInput,
         bank_rad: f64,
     ) {
+        let (state, distance_m) = self.next(&plant.state(), v_m_per_s, gains, input, bank_rad);
+        plant.set_state(state, distance_m);
+    }
+
+    /// The state after a step, and how far the vehicle went in it.
+    #[inline]
+    pub(crate) fn next(
+        &mut self,
+        before: &PlantState,
+        v_m_per_s: [f64; 2],
+        gains: ArmGains,
+        input: &PlantInput,
+        bank_rad: f64,
+    ) -> (PlantState, f64) {
         let [force_n, moment_nm] = self.wind.step();
         let held = Held {
             v_m_per_s,
@@ -98,7 +112,6 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
                 moment_nm,
             },
         };
-        let before = plant.state();
         let x = [
             v_m_per_s[0] * before.sideslip_rad.tan(),
             before.yaw_rate_rad_s,
@@ -122,7 +135,7 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         } else {
             input.guidance_torque_nm
         };
-        plant.set_state(
+        (
             PlantState {
                 sideslip_rad: next[0].atan2(v_m_per_s[1]),
                 yaw_rate_rad_s: next[1],
@@ -132,12 +145,17 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
                 yaw_rad: next[7],
             },
             next[0].hypot(0.5 * (v_m_per_s[0] + v_m_per_s[1])) * STEP_S,
-        );
+        )
     }
 
     /// The motor's torque as it measures it, N.m.
     pub fn motor_torque_nm(&self) -> f64 {
         self.motor_nm * (1.0 + self.world.motor_error)
+    }
+
+    /// Whether the motor delivers what it is told at once.
+    pub(crate) fn motor_is_ideal(&self) -> bool {
+        self.world.motor_lag == 0.0 && self.world.motor_error == 0.0
     }
 
     fn rates(&self, x: &State, held: &Held, share: f64) -> State {
