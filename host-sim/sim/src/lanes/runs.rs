@@ -93,9 +93,10 @@ impl<const N: usize> Lanes<N> {
         let mut simulation = Simulation::with(scenario, NoGuidance);
         self.worlds.begin(lane, &simulation);
         let has_banks = !scenario.course().is_level();
+        let speed_m_per_s = scenario.speed_m_per_s();
         self.worlds
             .real
-            .begin(lane, simulation.real.take(), scenario.speed_m_per_s(), has_banks);
+            .begin(lane, simulation.real.take(), speed_m_per_s, has_banks);
         self.senses.begin(lane, simulation.sensing.take());
         self.ecus.begin(lane, scenario);
         self.checks.begin(lane, scenario);

@@ -19,7 +19,7 @@ pub(super) const YAW_RATE: usize = 1;
 pub(super) const WHEEL: usize = 2;
 pub(super) const WHEEL_RATE: usize = 3;
 pub(super) const ARM: usize = 4;
-const YAW: usize = 5;
+pub(super) const YAW: usize = 5;
 
 /// A near and a far point of each run.
 #[repr(C, align(64))]
