@@ -47,10 +47,14 @@ pub(super) fn flag(holds: bool) -> i32 {
     if holds { -1 } else { 0 }
 }
 
-/// The speed as its sensor has it, in counts as the bus carries it.
+/// The speed at the start as its sensor has it, in counts as the bus carries it.
 pub(super) fn speed_heard(scenario: &Scenario) -> i32 {
-    let sensed = scenario.car().sensor_errors.speed_gain * scenario.speed_m_per_s();
-    on_the_bus(bits(sensed), 16).min(FASTEST << 24)
+    heard(scenario.car().sensor_errors.speed_gain * scenario.speed_m_per_s())
+}
+
+/// A sensed speed, m/s, in such counts.
+pub(super) fn heard(sensed_m_per_s: f64) -> i32 {
+    on_the_bus(bits(sensed_m_per_s), 16).min(FASTEST << 24)
 }
 
 #[cfg(test)]

@@ -184,6 +184,11 @@ impl<const N: usize> Ecus<N> {
         self.probes.begin(lane, &p, has_probe);
     }
 
+    /// A speed that is another than before is heard.
+    pub(super) fn hear_speed(&mut self, lane: usize, p: &Params, speed: i32) {
+        self.scheduled[lane] = scheduled(p, speed);
+    }
+
     /// From its second step on a run's steps take a millisecond each.
     #[inline(always)]
     pub(super) fn let_time_pass(&mut self) {

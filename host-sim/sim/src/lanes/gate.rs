@@ -10,8 +10,6 @@ use crate::scenario::{Condition, FailureKind, Scenario, Sensors};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Reason {
-    /// A speed that changes.
-    ChangingSpeed,
     /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
     Camera,
     /// Exact sensors, past the bus.
@@ -27,7 +25,6 @@ pub enum Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::ChangingSpeed => "a speed that changes",
             Self::Camera => "a camera that is late, blind at times, or on another line",
             Self::ExactSensors => "exact sensors, past the bus",
             Self::TooSlow => "slower than is guided",
@@ -60,7 +57,6 @@ pub fn why_not(scenario: &Scenario) -> Option<Reason> {
     let failure = scenario.failure();
     let heard_m_per_s = f64::from(speed_heard(scenario)) * (1.0 / ONE);
     let reasons = [
-        (scenario.changes_speed(), Reason::ChangingSpeed),
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
         (
             guided && scenario.sensors() == Sensors::Exact,

@@ -30,6 +30,7 @@ mod probe;
 mod real;
 mod runs;
 mod sensing;
+mod speeds;
 #[cfg(test)]
 mod tests;
 mod tracked;

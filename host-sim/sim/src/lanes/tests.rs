@@ -12,7 +12,7 @@ use crate::models::real::{Tyres, WorldParameters};
 use crate::models::road::Course;
 use crate::models::tolerances::Tolerances;
 use crate::scenario::{
-    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors,
+    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
 };
 use crate::simulation::simulate;
 
@@ -116,6 +116,19 @@ fn real(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> S
         builder.course(banked_course())
     } else {
         builder
+    }
+}
+
+/// Speeds that change by time or by place, some below what is guided.
+fn changing(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
+    let first = between(50.0, 100.0);
+    let kmh = vec![first, first * between(0.5, 1.1), first * between(0.3, 1.0)];
+    if between(0.0, 1.0) < 0.5 {
+        let time = vec![between(1.0, 5.0), between(12.0, 15.0), between(22.0, 26.0)];
+        builder.speed(Speed::ByTime { time, kmh })
+    } else {
+        let place = vec![between(10.0, 80.0), between(250.0, 300.0), between(480.0, 600.0)];
+        builder.speed(Speed::ByPlace { place, kmh })
     }
 }
 
@@ -243,10 +256,20 @@ fn real_worlds_are_the_same_in_lanes_and_few_are_suspect() {
 }
 
 #[test]
+fn speeds_that_change_are_the_same_in_lanes_and_few_are_suspect() {
+    let suspects = compare(&random(40, 8, changing), Width::Widest);
+    assert!(suspects < 25, "{suspects} of 40");
+    let all: Beside = |builder, between| changing(real(erring(builder, between), between), between);
+    let suspects = compare(&random(40, 9, all), Width::Widest);
+    assert!(suspects < 30, "{suspects} of 40");
+}
+
+#[test]
 fn every_width_gives_the_same() {
     let mut scenarios = random(16, 2, |builder, _| builder);
     scenarios.extend(random(8, 6, erring));
     scenarios.extend(random(16, 7, real));
+    scenarios.extend(random(8, 10, changing));
     for width in [Width::Widest, Width::Avx2, Width::Portable] {
         compare(&scenarios, width);
     }

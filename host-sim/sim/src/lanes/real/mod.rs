@@ -28,7 +28,6 @@ type State<const N: usize> = [[f64; N]; STATES];
 /// The plants, of the runs that have one.
 #[repr(C, align(64))]
 pub(super) struct Reals<const N: usize> {
-    v: [f64; N],
     m: [f64; N],
     i: [f64; N],
     l_f: [f64; N],
@@ -43,8 +42,9 @@ pub(super) struct Reals<const N: usize> {
     damping: [f64; N],
     friction: [f64; N],
     give: [f64; N],
-    /// The most that the power assist gives at the run's speed.
+    /// The most that the power assist gives, at standstill, and the speed at which it is half of that.
     assist: [f64; N],
+    assist_speed: [f64; N],
     lag: [f64; N],
     /// Of the motor's torque over what it is told.
     gain: [f64; N],
@@ -73,6 +73,8 @@ pub(super) struct Acting<'a, const N: usize> {
     pub(super) target: &'a [f64; N],
     pub(super) next_target: &'a [f64; N],
     pub(super) torque_nm: &'a [f64; N],
+    /// At the start and at the end of the step, m/s.
+    pub(super) speeds: [&'a [f64; N]; 2],
     pub(super) remnant_nm: &'a [f64; N],
     pub(super) alive: &'a [u64; N],
 }
@@ -83,7 +85,6 @@ impl<const N: usize> Reals<N> {
             [1.0; N]
         }
         Self {
-            v: one(),
             m: one(),
             i: one(),
             l_f: one(),
@@ -98,6 +99,7 @@ impl<const N: usize> Reals<N> {
             friction: one(),
             give: one(),
             assist: one(),
+            assist_speed: one(),
             lag: one(),
             gain: one(),
             ripple: one(),
@@ -119,14 +121,13 @@ impl<const N: usize> Reals<N> {
     }
 
     /// A new run begins in a lane, with such a plant or without.
-    pub(super) fn begin(&mut self, lane: usize, plant: Option<Box<RealPlant>>, v: f64, has_banks: bool) {
+    pub(super) fn begin(&mut self, lane: usize, plant: Option<Box<RealPlant>>, has_banks: bool) {
         (self.motors[lane], self.has_banks[lane]) = (None, false);
         if let Some(plant) = &plant {
             let (track, column, world, driver) = (&plant.vehicle, &plant.column, &plant.world, &plant.driver);
             let car = &track.vehicle;
             let ([front, rear], [front_most, rear_most]) = (&mut self.stiffness, &mut self.most);
             for (all, value) in [
-                (&mut self.v, v),
                 (&mut self.m, car.m),
                 (&mut self.i, car.i),
                 (&mut self.l_f, car.l_f),
@@ -142,7 +143,8 @@ impl<const N: usize> Reals<N> {
                 (&mut self.damping, column.damping),
                 (&mut self.friction, column.friction_nm),
                 (&mut self.give, column.give_rad),
-                (&mut self.assist, world.most_assist_nm(v)),
+                (&mut self.assist, world.assist),
+                (&mut self.assist_speed, world.assist_speed),
                 (&mut self.lag, world.motor_lag),
                 (&mut self.gain, 1.0 + world.motor_error),
                 (&mut self.ripple, world.motor_ripple),
@@ -236,7 +238,7 @@ impl<const N: usize> Reals<N> {
             };
             moves[l] = true;
             [self.force[l], self.moment[l]] = plant.wind.step();
-            lateral[l] = self.v[l] * state[BETA][l].tan();
+            lateral[l] = acting.speeds[0][l] * state[BETA][l].tan();
         }
         let x = [
             lateral,
@@ -269,8 +271,9 @@ impl<const N: usize> Reals<N> {
             if !moves[l] {
                 continue;
             }
-            next[BETA][l] = lateral[l].atan2(self.v[l]);
-            distance_m[l] = lateral[l].hypot(self.v[l]) * STEP_S;
+            let (from, to) = (acting.speeds[0][l], acting.speeds[1][l]);
+            next[BETA][l] = lateral[l].atan2(to);
+            distance_m[l] = lateral[l].hypot(0.5 * (from + to)) * STEP_S;
             for (place, after) in [
                 (YAW_RATE, &yaw_rate),
                 (WHEEL, &wheel),

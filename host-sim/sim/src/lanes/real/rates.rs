@@ -8,7 +8,12 @@ impl<const N: usize> Reals<N> {
     #[inline(always)]
     pub(super) fn rates(&self, x: &State<N>, share: f64, acting: &Acting<N>, moves: &[bool; N]) -> State<N> {
         let [lateral, yaw_rate, wheel, wheel_rate, deflection, arm, motor, _] = x;
-        let ([front, rear], trail) = self.tyres([lateral, yaw_rate, wheel], moves);
+        let mut v = [0.0; N];
+        for l in 0..N {
+            let (from, to) = (acting.speeds[0][l], acting.speeds[1][l]);
+            v[l] = from + share * (to - from);
+        }
+        let ([front, rear], trail) = self.tyres([lateral, yaw_rate, wheel, &v], moves);
         let mut ripple = [0.0; N];
         for l in 0..N {
             if moves[l] && self.ripple[l] != 0.0 {
@@ -25,11 +30,12 @@ impl<const N: usize> Reals<N> {
 
             let lever = self.lever[l] * (self.castor_share[l] + (1.0 - self.castor_share[l]) * trail[l]);
             let lateral_rate =
-                (front[l] + rear[l] + self.force[l]) / self.m[l] + self.gravity[l] - self.v[l] * yaw_rate[l];
+                (front[l] + rear[l] + self.force[l]) / self.m[l] + self.gravity[l] - v[l] * yaw_rate[l];
             let turning = (self.l_f[l] * front[l] - self.l_r[l] * rear[l] + self.moment[l]) / self.i[l];
             let hands = arm[l] + acting.remnant_nm[l];
             let boost = (hands.abs() / FULL_ASSIST_AT_NM).min(1.0);
-            let assist = self.assist[l] * boost * boost * hands.signum();
+            let slowness = self.assist_speed[l] / (self.assist_speed[l] + 3.6 * v[l]);
+            let assist = self.assist[l] * slowness * boost * boost * hands.signum();
             let all = hands + acts + assist + -lever * front[l];
             let given_way = deflection[l] / self.give[l];
             let against = self.damping[l] * wheel_rate[l] + self.friction[l] * given_way;
@@ -52,7 +58,7 @@ impl<const N: usize> Reals<N> {
     #[inline(always)]
     fn tyres(
         &self,
-        [lateral, yaw_rate, wheel]: [&[f64; N]; 3],
+        [lateral, yaw_rate, wheel, v]: [&[f64; N]; 4],
         moves: &[bool; N],
     ) -> ([[f64; N]; 2], [f64; N]) {
         let (mut across, mut angle, mut force) = ([[0.0; N]; 2], [[0.0; N]; 2], [[0.0; N]; 2]);
@@ -61,15 +67,15 @@ impl<const N: usize> Reals<N> {
         for l in 0..N {
             across[0][l] = lateral[l] + self.l_f[l] * yaw_rate[l];
             across[1][l] = lateral[l] + -self.l_r[l] * yaw_rate[l];
-            angle[0][l] = across[0][l] / self.v[l];
-            angle[1][l] = across[1][l] / self.v[l];
+            angle[0][l] = across[0][l] / v[l];
+            angle[1][l] = across[1][l] / v[l];
             saturates |= self.saturates[l] & moves[l];
         }
         if saturates {
             for l in 0..N {
                 if self.saturates[l] & moves[l] {
-                    angle[0][l] = across[0][l].atan2(self.v[l]);
-                    angle[1][l] = across[1][l].atan2(self.v[l]);
+                    angle[0][l] = across[0][l].atan2(v[l]);
+                    angle[1][l] = across[1][l].atan2(v[l]);
                 }
             }
         }

@@ -129,12 +129,7 @@ impl WorldParameters {
     /// bend, constant beyond, and falling with speed.
     pub(super) fn assist_nm(&self, hands_nm: f64, v_m_per_s: f64) -> f64 {
         let share = (hands_nm.abs() / FULL_ASSIST_AT_NM).min(1.0);
-        self.most_assist_nm(v_m_per_s) * share * share * hands_nm.signum()
-    }
-
-    /// The most that the power assist gives at a speed, N.m.
-    pub(crate) fn most_assist_nm(&self, v_m_per_s: f64) -> f64 {
         let slowness = self.assist_speed / (self.assist_speed + 3.6 * v_m_per_s);
-        self.assist * slowness
+        self.assist * slowness * share * share * hands_nm.signum()
     }
 }
