@@ -122,7 +122,7 @@ fn real(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> S
 /// Speeds that change by time or by place, some below what is guided.
 fn changing(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
     let first = between(50.0, 100.0);
-    let kmh = vec![first, first * between(0.5, 1.1), first * between(0.3, 1.0)];
+    let kmh = vec![first, first * between(0.25, 1.1), first * between(0.3, 1.0)];
     if between(0.0, 1.0) < 0.5 {
         let time = vec![between(1.0, 5.0), between(12.0, 15.0), between(22.0, 26.0)];
         builder.speed(Speed::ByTime { time, kmh })
