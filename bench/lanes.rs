@@ -68,6 +68,8 @@ fn main() {
             }
         });
         wall_seconds = wall_seconds.min(start.elapsed().as_secs_f64());
+        let is_nominal = beside != Beside::Nothing || handed_back == 0;
+        assert!(is_nominal, "the evaluation's drives are nominal");
         if alone {
             let start = Instant::now();
             let driven: u64 = scenarios
