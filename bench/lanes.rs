@@ -2,52 +2,83 @@
 //! reliances, side by side on one core, with every check of the ECU on. Prints one JSON object with the peers' field names.
 //! The first drive is the peers' own.
 //!
+//! `--beside` adds to each drive what a study has beside the paper, and `--alone` drives them all one by one with the
+//! shipping ECU too, in turn with the lanes: `over_one_by_one` is how many times as fast the lanes are, with what they hand
+//! back driven alone.
+//!
 //!     cargo run --release --example lanes -p haptic-guidance -- --repeat 5
+//!     cargo run --release --example lanes -p haptic-guidance -- --beside wind --alone
 
 use std::time::Instant;
 
 use haptic_sim::lanes::{LANES, Width, drive};
+use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::scenario::{Condition, Scenario};
+use haptic_sim::models::real::WorldParameters;
+use haptic_sim::scenario::{Condition, Scenario, ScenarioBuilder};
+use haptic_sim::simulation::{Run, simulate};
+use haptic_sim::worlds::WORLDS;
 
-const USAGE: &str =
-    "usage: lanes [--width widest|avx2|portable] [--repeat N], the fastest of N rounds is timed";
+const USAGE: &str = "usage: lanes [--width widest|avx2|portable] [--repeat N] [--alone] \
+    [--beside probe|sensors|wind|everything], the fastest of N rounds is timed";
 
 fn main() {
-    let (mut repeat, mut width) = (1, Width::Widest);
+    let (mut repeat, mut width, mut alone, mut beside) = (1, Width::Widest, false, Beside::Nothing);
     let mut arguments = std::env::args().skip(1);
     while let Some(option) = arguments.next() {
+        if option == "--alone" {
+            alone = true;
+            continue;
+        }
         match (option.as_str(), arguments.next().as_deref()) {
             ("--repeat", Some(n)) if n.parse::<u32>().is_ok_and(|n| n > 0) => repeat = n.parse().unwrap_or(1),
             ("--width", Some("widest")) => width = Width::Widest,
             ("--width", Some("avx2")) => width = Width::Avx2,
             ("--width", Some("portable")) => width = Width::Portable,
+            ("--beside", Some("probe")) => beside = Beside::Probe,
+            ("--beside", Some("sensors")) => beside = Beside::Sensors,
+            ("--beside", Some("wind")) => beside = Beside::Wind,
+            ("--beside", Some("everything")) => beside = Beside::Everything,
             _ => {
                 eprintln!("{USAGE}");
                 std::process::exit(2);
             }
         }
     }
-    let scenarios = drives();
+    let scenarios = drives(beside);
     let _built = scenarios[0].course().centreline();
-    let mut wall_seconds = f64::INFINITY;
-    let (mut steps, mut peak_m) = (0, 0.0);
+    let (mut wall_seconds, mut alone_seconds) = (f64::INFINITY, f64::INFINITY);
+    let (mut steps, mut peak_m, mut handed_back) = (0, 0.0, 0);
     for _ in 0..repeat {
         let start = Instant::now();
-        let mut driven = 0;
+        (steps, handed_back) = (0, 0);
         drive(&scenarios, width, |number, run| {
-            let run = run.expect("the evaluation's drives are nominal");
-            driven += u64::from(run.steps);
-            let samples = &run.trace.samples;
-            let from = samples.partition_point(|s| s.s_m < 1080.0);
-            let in_window = samples[from..].iter().take_while(|s| s.s_m <= 1740.0);
-            let peak = in_window.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max);
+            let given_back;
+            let run = match run {
+                Some(run) => run,
+                None => {
+                    handed_back += 1;
+                    given_back = simulate(&scenarios[number]);
+                    &given_back
+                }
+            };
+            steps += u64::from(run.steps);
             if number == 0 {
-                peak_m = peak;
+                peak_m = peak(run);
             }
         });
         wall_seconds = wall_seconds.min(start.elapsed().as_secs_f64());
-        steps = driven;
+        let is_nominal = beside != Beside::Nothing || handed_back == 0;
+        assert!(is_nominal, "the evaluation's drives are nominal");
+        if alone {
+            let start = Instant::now();
+            let driven: u64 = scenarios
+                .iter()
+                .map(|scenario| u64::from(simulate(scenario).steps))
+                .sum();
+            assert_eq!(driven, steps, "lanes drive what is driven alone");
+            alone_seconds = alone_seconds.min(start.elapsed().as_secs_f64());
+        }
     }
     let simulated_seconds = steps as f64 * 1e-3;
     println!(
@@ -61,22 +92,77 @@ fn main() {
             "times_real_time": simulated_seconds / wall_seconds,
             "steps": steps,
             "peak_lateral_error_m": peak_m,
+            "drives": scenarios.len(),
+            "handed_back": handed_back,
+            "over_one_by_one": alone.then(|| alone_seconds / wall_seconds),
         })
     );
 }
 
+/// Largest lateral error in the evaluation's window, m.
+fn peak(run: &Run) -> f64 {
+    let samples = &run.trace.samples;
+    let from = samples.partition_point(|s| s.s_m < 1080.0);
+    let in_window = samples[from..].iter().take_while(|s| s.s_m <= 1740.0);
+    in_window.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max)
+}
+
+/// What a drive has beside the paper's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Beside {
+    Nothing,
+    Probe,
+    /// Sensors with gains, biases and noise.
+    Sensors,
+    /// Gusts, friction and a motor with a lag, on the paper's tyres.
+    Wind,
+    /// The world `everything` of `host-sim availability`, each car another.
+    Everything,
+}
+
+impl Beside {
+    fn add(self, builder: ScenarioBuilder, number: u64) -> ScenarioBuilder {
+        match self {
+            Self::Nothing => builder,
+            Self::Probe => builder.probe(true),
+            Self::Sensors => builder.seed(number).sensor_errors(SensorErrors {
+                torque_bias: 0.05,
+                angle_bias: 1.0,
+                speed_gain: 1.01,
+                yaw_rate_noise: 2.0,
+                lane_noise: 0.01,
+                heading_noise: 0.5,
+                ..SensorErrors::default()
+            }),
+            Self::Wind => builder.seed(number).world(WorldParameters {
+                gust_sd: 100.0,
+                friction: 0.2,
+                motor_lag: 0.005,
+                ..WorldParameters::default()
+            }),
+            Self::Everything => {
+                let kind = WORLDS.iter().find(|kind| kind.name == "everything");
+                let kind = kind.expect("there is a world of this name");
+                let builder = builder.seed(number).world(kind.parameters());
+                builder.tolerances(kind.tolerances(number))
+            }
+        }
+    }
+}
+
 /// Of the paper's driver and two others, with delays of 0.1 to 0.45 s.
-fn drives() -> Vec<Scenario> {
+fn drives(beside: Beside) -> Vec<Scenario> {
     let conditions = [Condition::Mid, Condition::High, Condition::Low];
     let delays = (0..8).map(|i| 0.1 + 0.05 * f64::from(i));
     let pairs = delays.flat_map(|t_p| conditions.map(|condition| (t_p, condition)));
-    let scenario = |(t_p, condition)| {
+    let scenario = |(number, (t_p, condition))| {
         let driver = DriverParameters {
             t_p,
             ..DriverParameters::default()
         };
         let builder = Scenario::builder().driver(driver).condition(condition);
+        let builder = beside.add(builder, number);
         builder.build().expect("every value is in its range")
     };
-    pairs.map(scenario).collect()
+    (0..).zip(pairs).map(scenario).collect()
 }

@@ -10,7 +10,7 @@ use crate::models::road::{Centreline, Tracker};
 #[derive(Debug, Clone)]
 pub(crate) struct PreviewPoints {
     /// How far ahead they are, s.
-    times_s: [f64; 2],
+    pub(crate) times_s: [f64; 2],
     pub(crate) near_m: f64,
     pub(crate) far_m: f64,
     pub(crate) near: Tracker,

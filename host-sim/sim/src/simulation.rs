@@ -169,7 +169,7 @@ impl AskingDriver {
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     /// How the speed changes, if it does.
-    speed: Option<SpeedProfile>,
+    pub(crate) speed: Option<SpeedProfile>,
     /// How far ahead anybody looks, and the driver, s.
     ahead_s: [f64; 2],
     duration_s: f64,
@@ -463,7 +463,7 @@ impl Plan {
     }
 
     /// Where the driver's far point is at a speed when the farthest that anybody looks at gets to the road's end, m.
-    fn end_m(&self, road: &Centreline, v_m_per_s: f64) -> f64 {
+    pub(crate) fn end_m(&self, road: &Centreline, v_m_per_s: f64) -> f64 {
         let [longest_s, driver_s] = self.ahead_s;
         road.length_m() - (v_m_per_s * longest_s - v_m_per_s * driver_s)
     }
@@ -505,9 +505,9 @@ impl Plan {
 /// The sensors of a world that is not the paper's.
 #[derive(Debug, Clone)]
 pub(crate) struct Sensing {
-    errors: SensorErrors,
-    camera: ErringCamera,
-    gyro: ErringGyro,
+    pub(crate) errors: SensorErrors,
+    pub(crate) camera: ErringCamera,
+    pub(crate) gyro: ErringGyro,
 }
 
 impl Sensing {

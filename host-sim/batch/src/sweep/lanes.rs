@@ -130,4 +130,25 @@ mod tests {
         }
         assert!(in_lanes > 40 && out > 40, "{in_lanes} in lanes, {out} not");
     }
+
+    /// A probe, sensors with errors, other cars, wind and friction in lanes.
+    #[test]
+    fn nor_does_it_where_the_world_is_not_the_papers() {
+        let sweep = with_road(
+            "samples = 24\nmetrics = [\"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
+            "[vary]\nfailure.kind = [\"none\", \"input\"]\n\"failure.time\" = { uniform = [3, 9] }\n\
+             speed = { uniform = [40, 90] }\n\"driver.remnant_sd\" = [0, 0.1]\n\"guidance.probe\" = [false, true]\n\
+             \"tolerances.load\" = { uniform = [0, 300] }\n\"sensor_errors.lane_noise\" = [0, 0.01]\n\
+             \"world.gust_sd\" = { uniform = [0, 150] }\n\"world.friction\" = { uniform = [0, 0.4] }\n",
+        );
+        for chunk in 0..sweep.chunks() {
+            let side_by_side = sweep.run_chunk(chunk).unwrap();
+            let alone = sweep.run_chunk_one_by_one(chunk).unwrap();
+            assert_eq!(side_by_side.to_bytes(1), alone.to_bytes(1), "chunk {chunk}");
+            for drive in sweep.drives_of(chunk) {
+                let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
+                assert_eq!(haptic_sim::lanes::why_not(&scenario), None);
+            }
+        }
+    }
 }

@@ -45,6 +45,7 @@ impl<const N: usize> Band<N> {
         &mut self,
         lane: usize,
         [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate]: [f64; 4],
+        probe_nm: f64,
     ) {
         let gains = [on_e_y, on_e_theta, on_e_y_rate, on_e_theta_rate].map(|gain| gain * 1e3);
         for (all, gain) in self.gains.iter_mut().zip(gains) {
@@ -53,7 +54,8 @@ impl<const N: usize> Band<N> {
         // Errors are cut to 1 mm and 0.1 mrad there, rates to 40 mm/s and 2 mrad/s; gains are whole numbers.
         let [e_y, e_theta, e_y_rate, e_theta_rate] = gains;
         let coarse = 8.0 + 2e-3 * e_y + 3e-4 * e_theta + 0.1 * e_y_rate + 4e-3 * e_theta_rate;
-        self.half[lane] = BAND_MNM - coarse;
+        // While there is a probe the monitor's is wider by it, to the next whole mN.m.
+        self.half[lane] = BAND_MNM - coarse + probe_nm * 1e3;
         for errors in self.before.iter_mut().chain(&mut self.last) {
             errors[lane] = 0.0;
         }

@@ -1,8 +1,12 @@
 //! Quantities as counts of 2^-24 of their unit, as `haptic-core` has them.
 
+use crate::scenario::Scenario;
+
 pub(super) const ONE: f64 = (1 << 24) as f64;
 /// A millisecond as a share of a second in 2^-32, as core has it.
 pub(super) const MS: i64 = 1000 * 4295;
+/// What the bus carries of a speed, m/s.
+const FASTEST: i32 = 90;
 
 /// As core turns SI values into bits; saturates.
 #[inline(always)]
@@ -43,14 +47,19 @@ pub(super) fn flag(holds: bool) -> i32 {
     if holds { -1 } else { 0 }
 }
 
-/// The speed as the bus carries it, m/s.
-pub(super) fn speed_on_the_bus(speed_m_per_s: f64) -> f64 {
-    f64::from(on_the_bus(bits(speed_m_per_s), 16)) * (1.0 / ONE)
+/// The speed at the start as its sensor has it, in counts as the bus carries it.
+pub(super) fn speed_heard(scenario: &Scenario) -> i32 {
+    heard(scenario.car().sensor_errors.speed_gain * scenario.speed_m_per_s())
+}
+
+/// A sensed speed, m/s, in such counts.
+pub(super) fn heard(sensed_m_per_s: f64) -> i32 {
+    on_the_bus(bits(sensed_m_per_s), 16).min(FASTEST << 24)
 }
 
 #[cfg(test)]
 mod tests {
-    use haptic_core::quantity::{Speed, Torque};
+    use haptic_core::quantity::Torque;
 
     use super::*;
     use crate::lanes::ecu::{
@@ -85,9 +94,8 @@ mod tests {
         ] {
             assert_eq!(bits(nm), of(nm), "{nm}");
         }
-        assert_eq!(
-            speed_on_the_bus(16.667),
-            Speed::from_m_per_s(16.667).m_per_s().mul_add(256.0, 0.5).floor() / 256.0
-        );
+        // 60 km/h are 16 + 2/3 m/s, and 4266.67 LSB.
+        let drive = Scenario::default();
+        assert_eq!((drive.speed_kmh(), speed_heard(&drive)), (60.0, 4267 << 16));
     }
 }

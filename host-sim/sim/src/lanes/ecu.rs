@@ -8,7 +8,8 @@
 use haptic_core::params::Params;
 
 use super::band::Band;
-use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, whole};
+use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, speed_heard, whole};
+use super::probe::Probes;
 use crate::models::sensors::TORQUE_RESOLUTION_NM;
 use crate::scenario::{Condition, Scenario};
 
@@ -85,6 +86,7 @@ pub(super) struct Ecus<const N: usize> {
     ramp_done: [i32; N],
     past: [[i32; N]; PAST],
     band: Band<N>,
+    probes: Probes<N>,
 }
 
 /// One update of a filtered rate.
@@ -131,6 +133,7 @@ impl<const N: usize> Ecus<N> {
             ramp_done: zero(),
             past: [zero(); PAST],
             band: Band::new(),
+            probes: Probes::new(),
         }
     }
 
@@ -143,7 +146,7 @@ impl<const N: usize> Ecus<N> {
             all[lane] = bits(gain);
         }
         self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
-        self.scheduled[lane] = scheduled(&p, scenario.speed_m_per_s());
+        self.scheduled[lane] = scheduled(&p, speed_heard(scenario));
         self.limit[lane] = bits(p.torque_limit_nm);
         self.growth_in_a_step[lane] = per_second(bits(p.wind_up_nm_per_s), MS);
         let fall = per_second(bits(p.reduction_nm_per_s), MS);
@@ -175,13 +178,22 @@ impl<const N: usize> Ecus<N> {
         for torques in &mut self.past {
             torques[lane] = 0;
         }
-        self.band.begin(lane, gains);
+        let has_probe = scenario.guidance().probe;
+        self.band
+            .begin(lane, gains, if has_probe { p.probe_amplitude_nm } else { 0.0 });
+        self.probes.begin(lane, &p, has_probe);
+    }
+
+    /// A speed that is another than before is heard.
+    pub(super) fn hear_speed(&mut self, lane: usize, p: &Params, speed: i32) {
+        self.scheduled[lane] = scheduled(p, speed);
     }
 
     /// From its second step on a run's steps take a millisecond each.
     #[inline(always)]
     pub(super) fn let_time_pass(&mut self) {
         (self.growth, self.fall) = (self.growth_in_a_step, self.fall_in_a_step);
+        self.probes.let_time_pass();
     }
 
     /// The torque does not reach the column any more: what the ECU decides is nobody's matter.
@@ -193,6 +205,8 @@ impl<const N: usize> Ecus<N> {
     pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
         let last = (step - TIMEOUT_MS - 1) / 5;
         let (trusted, applied) = (self.past[last as usize % PAST][lane], self.applied[lane]);
+        // Half a wave of the probe does not stand for two seconds, and what the other half took does not come back.
+        let applied = smaller_of_same_sign(applied, applied.wrapping_sub(self.probes.applied[lane]));
         self.mode[lane] = HANDOVER;
         self.ramp_from[lane] = smaller_of_same_sign(trusted, applied);
     }
@@ -258,8 +272,9 @@ impl<const N: usize> Ecus<N> {
     #[inline(always)]
     pub(super) fn decide(&mut self, own: &[i32; N], is_window_due: bool, is_kept: bool) {
         for l in 0..N {
-            // Hands: the torque of the last step acted for a millisecond.
-            let acts = (self.applied[l].wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
+            // Hands: the torque of the last step acted for a millisecond. The probe does not count.
+            let guidance = self.applied[l].wrapping_sub(self.probes.applied[l]);
+            let acts = (guidance.wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
             self.without_ms[l] = self.without_ms[l].wrapping_add(if acts { 1 } else { 0 });
             self.suspect[l] |= flag(self.without_ms[l] >= HANDS_MS) & self.matters[l];
         }
@@ -279,11 +294,17 @@ impl<const N: usize> Ecus<N> {
         if hands_over != 0 {
             self.ramps(&mut wanted);
         }
+        let mut is_guided = [0; N];
+        for l in 0..N {
+            is_guided[l] = flag(self.mode[l] == GUIDED);
+        }
+        self.probes.add(&is_guided, &mut wanted);
         let mut torque = [0; N];
         self.envelope(&wanted, &mut torque);
+        self.probes.hold(&torque, &self.limited);
         if is_kept {
             for l in 0..N {
-                self.past[(own[l] / 5) as usize % PAST][l] = torque[l];
+                self.past[(own[l] / 5) as usize % PAST][l] = torque[l].wrapping_sub(self.probes.applied[l]);
             }
         }
         for l in 0..N {
@@ -411,10 +432,9 @@ impl<const N: usize> Ecus<N> {
     }
 }
 
-/// Share of the torque at a speed, as the bus carries it.
-fn scheduled(p: &Params, speed_m_per_s: f64) -> i32 {
+/// Share of the torque at a speed.
+fn scheduled(p: &Params, speed: i32) -> i32 {
     let middle = 60.0 / 3.6;
-    let speed = on_the_bus(bits(speed_m_per_s), 16);
     let slower = speed < bits(middle);
     let (per, least) = if slower {
         (

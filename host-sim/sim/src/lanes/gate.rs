@@ -2,24 +2,18 @@
 
 use std::fmt;
 
+use super::counts::{ONE, speed_heard};
 use crate::models::disturbances::SensorErrors;
-use crate::models::tolerances::Car;
 use crate::scenario::{Condition, FailureKind, Scenario, Sensors};
 
 /// What keeps a run out of the lanes: the shipping ECU drives it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Reason {
-    /// A world that is not the paper's: wind, tyres, a real column, a road that is not level.
-    World,
-    /// A speed that changes.
-    ChangingSpeed,
-    /// Sensors with errors.
-    SensorErrors,
+    /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
+    Camera,
     /// Exact sensors, past the bus.
     ExactSensors,
-    /// The host asks for the probe.
-    Probe,
     /// Slower than the controller guides.
     TooSlow,
     /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
@@ -31,11 +25,8 @@ pub enum Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::World => "a world that is not the paper's",
-            Self::ChangingSpeed => "a speed that changes",
-            Self::SensorErrors => "sensors with errors",
+            Self::Camera => "a camera that is late, blind at times, or on another line",
             Self::ExactSensors => "exact sensors, past the bus",
-            Self::Probe => "a probe",
             Self::TooSlow => "slower than is guided",
             Self::EarlyFailure => "a lane preview that fails within the first 2 s",
             Self::TooLong => "longer than 2000 s",
@@ -53,23 +44,26 @@ const LONGEST_S: f64 = 2000.0;
 /// Why the lanes cannot drive a scenario; `None` if they can.
 #[must_use]
 pub fn why_not(scenario: &Scenario) -> Option<Reason> {
-    let Car {
-        world, sensor_errors, ..
-    } = scenario.car();
+    let SensorErrors {
+        camera_latency,
+        camera_jitter,
+        dropouts,
+        line_jumps,
+        ..
+    } = scenario.car().sensor_errors;
+    let camera = [camera_latency, camera_jitter, dropouts, line_jumps];
     let guided = scenario.condition() != Condition::Manual;
     let params = scenario.controller_params();
     let failure = scenario.failure();
+    let heard_m_per_s = f64::from(speed_heard(scenario)) * (1.0 / ONE);
     let reasons = [
-        (!world.is_ideal() || !scenario.course().is_level(), Reason::World),
-        (scenario.changes_speed(), Reason::ChangingSpeed),
-        (sensor_errors != SensorErrors::default(), Reason::SensorErrors),
+        (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
         (
             guided && scenario.sensors() == Sensors::Exact,
             Reason::ExactSensors,
         ),
-        (guided && scenario.guidance().probe, Reason::Probe),
         (
-            guided && scenario.speed_m_per_s() < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
+            guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
             Reason::TooSlow,
         ),
         (

@@ -26,7 +26,11 @@ mod checks;
 mod counts;
 mod ecu;
 mod gate;
+mod probe;
+mod real;
 mod runs;
+mod sensing;
+mod speeds;
 #[cfg(test)]
 mod tests;
 mod tracked;

@@ -1,5 +1,7 @@
 //! The runs that are under way in the lanes, and their millisecond.
 
+mod hear;
+
 use std::sync::Arc;
 
 use haptic_log::trace::{Sample, Trace};
@@ -7,6 +9,8 @@ use haptic_log::trace::{Sample, Trace};
 use super::ALIVE;
 use super::checks::Checks;
 use super::ecu::{Ecus, TIMEOUT_MS};
+use super::sensing::Senses;
+use super::speeds::Speeds;
 use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, Worlds, YAW_RATE};
 use crate::guidance::NoGuidance;
 use crate::models::STEP_S;
@@ -20,17 +24,12 @@ use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Sim
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
 /// then has the others' rhythm.
 const BLOCK: u32 = 50;
-/// Of a camera, in ms: its rhythm, and that of the frames.
-const CAMERA_MS: u32 = 25;
-const COLUMN_MS: u32 = 2;
-const VEHICLE_MS: u32 = 10;
 
 /// What a lane has of its run beside the arrays.
 struct Slot {
     /// The scenario's number, while its run is under way or not yet handed on.
     scenario: Option<usize>,
     plan: Option<Plan>,
-    speed_m_per_s: f64,
     remnant: Option<Remnant>,
     run: Run,
     /// Whether the run came to its end without suspicion.
@@ -45,6 +44,8 @@ pub(super) struct Lanes<const N: usize> {
     worlds: Worlds<N>,
     ecus: Ecus<N>,
     checks: Checks<N>,
+    senses: Senses<N>,
+    speeds: Speeds<N>,
     /// Number of the step in each run.
     own: [i32; N],
     /// All bits where there is a camera for the guidance.
@@ -62,6 +63,8 @@ impl<const N: usize> Lanes<N> {
             worlds: Worlds::new(whole),
             ecus: Ecus::new(),
             checks: Checks::new(),
+            senses: Senses::new(),
+            speeds: Speeds::new(),
             own: [0; N],
             looks: [0; N],
             has_events: false,
@@ -69,7 +72,6 @@ impl<const N: usize> Lanes<N> {
             slots: std::array::from_fn(|_| Slot {
                 scenario: None,
                 plan: None,
-                speed_m_per_s: 0.0,
                 remnant: None,
                 run: Run {
                     trace: Trace {
@@ -87,8 +89,12 @@ impl<const N: usize> Lanes<N> {
     }
 
     pub(super) fn begin(&mut self, lane: usize, number: usize, scenario: &Scenario) {
-        let simulation = Simulation::with(scenario, NoGuidance);
+        let mut simulation = Simulation::with(scenario, NoGuidance);
         self.worlds.begin(lane, &simulation);
+        let has_banks = !scenario.course().is_level();
+        self.worlds.real.begin(lane, simulation.real.take(), has_banks);
+        self.speeds.begin(lane, scenario, &simulation.plan);
+        self.senses.begin(lane, simulation.sensing.take());
         self.ecus.begin(lane, scenario);
         self.checks.begin(lane, scenario);
         self.own[lane] = 0;
@@ -111,7 +117,6 @@ impl<const N: usize> Lanes<N> {
         }
         slot.remnant = (simulation.remnant.scale_nm != 0.0).then_some(simulation.remnant);
         slot.plan = Some(simulation.plan);
-        slot.speed_m_per_s = scenario.speed_m_per_s();
         self.happen(lane);
     }
 
@@ -206,51 +211,19 @@ impl<const N: usize> Lanes<N> {
             driver_nm[l] = self.worlds.state[ARM][l] + self.worlds.remnant_nm[l];
         }
         self.hear(phase, looks, &driver_nm);
+        self.hear_motors(phase);
         self.ecus.decide(&self.own, phase == 0, is_sample);
         let torque_nm = self.ecus.torque_nm();
         if is_sample {
             self.worlds.locate(&self.roads);
+            self.speeds.locate(self.worlds.body.s());
             self.record(&driver_nm, &torque_nm);
         }
-        self.worlds.move_on(&torque_nm);
+        let speeds = self.speeds.of_step(&self.own);
+        self.worlds.move_on(&torque_nm, speeds);
+        self.speeds.go_on(&mut self.worlds, &self.roads);
         for own in &mut self.own {
             *own = own.wrapping_add(1);
-        }
-    }
-
-    /// The frames of a step reach the ECUs.
-    #[inline(always)]
-    fn hear(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
-        let Self {
-            worlds, ecus, checks, ..
-        } = self;
-        let matters = *ecus.matters();
-        if phase.is_multiple_of(VEHICLE_MS) {
-            checks.vehicle(&worlds.state[YAW_RATE], &matters, &mut ecus.suspect);
-        }
-        if phase.is_multiple_of(COLUMN_MS) {
-            ecus.column(driver_nm);
-            let applied = ecus.torque_nm();
-            let driver = ecus.driver_nm();
-            checks.column(
-                &driver,
-                &applied,
-                &worlds.state[WHEEL],
-                &matters,
-                &mut ecus.suspect,
-            );
-        }
-        if looks {
-            let dt_ms = if phase % CAMERA_MS == 9 { 9 } else { 8 };
-            let camera = &worlds.camera;
-            let seen = ecus.picture(&camera.e_y, &camera.e_theta, dt_ms, &self.own);
-            let mut heard = matters;
-            for l in 0..N {
-                heard[l] &= ecus.hears[l];
-            }
-            let times = [dt_ms, phase % VEHICLE_MS];
-            let keeps = phase.is_multiple_of(CAMERA_MS);
-            checks.picture(&seen, times, &self.own, keeps, &heard, &mut ecus.suspect);
         }
     }
 
@@ -308,7 +281,7 @@ impl<const N: usize> Lanes<N> {
                 wheel_rate_rad_per_s: state[WHEEL_RATE][l],
                 yaw_rate_rad_per_s: state[YAW_RATE][l],
                 sideslip_rad: state[BETA][l],
-                speed_m_per_s: slot.speed_m_per_s,
+                speed_m_per_s: self.speeds.now[l],
                 driver_torque_nm: driver_nm[l],
                 guidance_torque_nm: torque_nm[l],
                 guidance_limited: self.ecus.is_limited(l),

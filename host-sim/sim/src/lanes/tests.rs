@@ -6,9 +6,14 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use super::*;
+use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::real::{Tyres, WorldParameters};
 use crate::models::road::Course;
-use crate::scenario::{Condition, DriverChange, Failure, FailureKind, GuidanceParameters, Sensors};
+use crate::models::tolerances::Tolerances;
+use crate::scenario::{
+    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
+};
 use crate::simulation::simulate;
 
 /// Every field of every sample, signs of zeros included.
@@ -46,8 +51,89 @@ fn short_course() -> Course {
     Course::from_toml("short.toml", text).unwrap()
 }
 
-/// Random scenarios over all that lanes drive.
-fn random(count: usize, seed: u64) -> Vec<Scenario> {
+fn banked_course() -> Course {
+    let text = "[[segment]]\nlength = 120\nbank = -0.025\n[[segment]]\nlength = 60\ncurvature_start = 0\n\
+        curvature_end = 0.004\nbank_start = -0.025\nbank_end = -0.06\n[[segment]]\nlength = 150\ncurvature = 0.004\n\
+        bank = -0.06\n[[segment]]\nlength = 60\ncurvature_start = 0.004\ncurvature_end = -0.003\nbank_start = -0.06\n\
+        bank_end = 0.04\n[[segment]]\nlength = 200\ncurvature = -0.003\nbank = 0.04\n[[segment]]\nlength = 150";
+    Course::from_toml("banked.toml", text).unwrap()
+}
+
+/// What a scenario has beside the paper's, from a draw between two ends.
+type Beside = fn(ScenarioBuilder, &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder;
+
+/// Sensors with errors, but a camera that is in time.
+fn erring(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
+    builder.sensor_errors(SensorErrors {
+        torque_bias: between(-0.1, 0.1),
+        torque_gain: between(0.95, 1.05),
+        angle_bias: between(-1.5, 1.5),
+        speed_gain: between(0.97, 1.03),
+        yaw_rate_bias: between(-5.0, 5.0),
+        yaw_rate_gain: between(0.97, 1.03),
+        yaw_rate_noise: between(-2.0, 3.0).max(0.0),
+        lane_noise: between(-0.02, 0.03).max(0.0),
+        heading_noise: between(-2.0, 2.0).max(0.0),
+        camera_yaw: between(-2.0, 2.0),
+        ..SensorErrors::default()
+    })
+}
+
+/// Cars that differ, tyres, column, motor, wind and a road that lies aslant, each in some of the worlds.
+fn real(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
+    let mut some = |share: f64, from: f64, to: f64, off: f64| {
+        let value = between(from, to);
+        if between(0.0, 1.0) < share { value } else { off }
+    };
+    let world = WorldParameters {
+        tyres: if some(0.5, 1.0, 1.0, 0.0) == 0.0 {
+            Tyres::Linear
+        } else {
+            Tyres::Saturating
+        },
+        mu: some(0.5, 0.6, 1.0, 1.0),
+        castor_share: some(0.5, 0.2, 0.6, 0.4),
+        bank: some(0.3, -0.04, 0.04, 0.0),
+        friction: some(0.5, 0.1, 0.4, 0.0),
+        friction_give: some(0.5, 0.1, 0.5, 0.2),
+        assist: some(0.3, 1.0, 8.0, 0.0),
+        motor_lag: some(0.3, 0.001, 0.02, 0.0),
+        motor_error: some(0.3, -0.1, 0.1, 0.0),
+        motor_ripple: some(0.3, 0.01, 0.03, 0.0),
+        wind: some(0.3, -200.0, 200.0, 0.0),
+        gust_sd: some(0.5, 20.0, 200.0, 0.0),
+        ..WorldParameters::default()
+    };
+    let tolerances = Tolerances {
+        tyres: some(0.3, 0.0, 0.15, 0.0),
+        trail: some(0.3, 0.0, 0.15, 0.0),
+        load: some(0.3, 0.0, 300.0, 0.0),
+        ..Tolerances::default()
+    };
+    let is_banked = some(0.5, 1.0, 1.0, 0.0) != 0.0;
+    let builder = builder.world(world).tolerances(tolerances);
+    if is_banked {
+        builder.course(banked_course())
+    } else {
+        builder
+    }
+}
+
+/// Speeds that change by time or by place, some below what is guided.
+fn changing(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
+    let first = between(50.0, 100.0);
+    let kmh = vec![first, first * between(0.25, 1.1), first * between(0.3, 1.0)];
+    if between(0.0, 1.0) < 0.5 {
+        let time = vec![between(1.0, 5.0), between(12.0, 15.0), between(22.0, 26.0)];
+        builder.speed(Speed::ByTime { time, kmh })
+    } else {
+        let place = vec![between(10.0, 80.0), between(250.0, 300.0), between(480.0, 600.0)];
+        builder.speed(Speed::ByPlace { place, kmh })
+    }
+}
+
+/// Random scenarios over all that lanes drive in the paper's world, with something beside it.
+fn random(count: usize, seed: u64, beside: Beside) -> Vec<Scenario> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let course = short_course();
     let mut scenarios = Vec::new();
@@ -100,6 +186,8 @@ fn random(count: usize, seed: u64) -> Vec<Scenario> {
                 reduction_nm_per_s: between(4.0, 8.0),
                 low_speed_share: between(0.0, 1.0),
                 high_speed_share: between(0.0, 1.0),
+                probe_amplitude_nm: between(0.0, 0.25),
+                probe_frequency_hz: between(1.0, 2.2),
                 ..Params::PAPER
             };
             builder = builder.guidance(GuidanceParameters {
@@ -112,6 +200,8 @@ fn random(count: usize, seed: u64) -> Vec<Scenario> {
         if between(0.0, 1.0) < 0.3 {
             builder = builder.driver_change(Some(change));
         }
+        builder = builder.probe(!manual && between(0.0, 1.0) < 0.4);
+        builder = beside(builder, &mut between);
         if let Ok(scenario) = builder.build() {
             scenarios.push(scenario);
         }
@@ -146,13 +236,40 @@ fn the_papers_drives_are_the_same_in_lanes() {
 
 #[test]
 fn random_drives_are_the_same_in_lanes_and_few_are_suspect() {
-    let suspects = compare(&random(80, 1), Width::Widest);
+    let suspects = compare(&random(80, 1, |builder, _| builder), Width::Widest);
     assert!(suspects < 30, "{suspects} of 80");
 }
 
 #[test]
+fn sensors_with_errors_are_the_same_in_lanes_and_few_are_suspect() {
+    let suspects = compare(&random(80, 3, erring), Width::Widest);
+    assert!(suspects < 50, "{suspects} of 80");
+}
+
+#[test]
+fn real_worlds_are_the_same_in_lanes_and_few_are_suspect() {
+    let suspects = compare(&random(80, 4, real), Width::Widest);
+    assert!(suspects < 50, "{suspects} of 80");
+    let both: Beside = |builder, between| real(erring(builder, between), between);
+    let suspects = compare(&random(60, 5, both), Width::Widest);
+    assert!(suspects < 40, "{suspects} of 60");
+}
+
+#[test]
+fn speeds_that_change_are_the_same_in_lanes_and_few_are_suspect() {
+    let suspects = compare(&random(40, 8, changing), Width::Widest);
+    assert!(suspects < 25, "{suspects} of 40");
+    let all: Beside = |builder, between| changing(real(erring(builder, between), between), between);
+    let suspects = compare(&random(40, 9, all), Width::Widest);
+    assert!(suspects < 30, "{suspects} of 40");
+}
+
+#[test]
 fn every_width_gives_the_same() {
-    let scenarios = random(16, 2);
+    let mut scenarios = random(16, 2, |builder, _| builder);
+    scenarios.extend(random(8, 6, erring));
+    scenarios.extend(random(16, 7, real));
+    scenarios.extend(random(8, 10, changing));
     for width in [Width::Widest, Width::Avx2, Width::Portable] {
         compare(&scenarios, width);
     }

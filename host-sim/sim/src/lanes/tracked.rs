@@ -76,6 +76,15 @@ impl<const N: usize> Tracked<N> {
         &self.s
     }
 
+    /// Where a point was found last.
+    pub(super) fn place(&self, lane: usize) -> Tracker {
+        Tracker {
+            cell: self.cell[lane],
+            s_m: self.s[lane],
+            advance_m: self.advance[lane],
+        }
+    }
+
     /// A new run begins in a lane.
     pub(super) fn begin(&mut self, lane: usize, road: &Centreline, tracker: &Tracker) {
         (self.s[lane], self.advance[lane]) = (tracker.s_m, tracker.advance_m);

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use super::ALIVE;
+use super::real::{Acting, Reals};
 use super::tracked::Tracked;
 use crate::guidance::NoGuidance;
 use crate::models::STEP_S;
@@ -18,11 +19,13 @@ pub(super) const YAW_RATE: usize = 1;
 pub(super) const WHEEL: usize = 2;
 pub(super) const WHEEL_RATE: usize = 3;
 pub(super) const ARM: usize = 4;
-const YAW: usize = 5;
+pub(super) const YAW: usize = 5;
 
 /// A near and a far point of each run.
 #[repr(C, align(64))]
 pub(super) struct Points<const N: usize> {
+    /// How far ahead they are, s and m.
+    times_s: [[f64; N]; 2],
     near_m: [f64; N],
     far_m: [f64; N],
     near: Tracked<N>,
@@ -51,6 +54,7 @@ pub(super) struct Worlds<const N: usize> {
     pub(super) driver: Points<N>,
     pub(super) camera: Points<N>,
     pub(super) body: Tracked<N>,
+    pub(super) real: Reals<N>,
     pub(super) remnant_nm: [f64; N],
     /// [`ALIVE`] where a run is under way.
     pub(super) alive: [u64; N],
@@ -65,6 +69,7 @@ pub(super) struct Worlds<const N: usize> {
 impl<const N: usize> Points<N> {
     fn new() -> Self {
         Self {
+            times_s: [[0.0; N]; 2],
             near_m: [0.0; N],
             far_m: [0.0; N],
             near: Tracked::new(),
@@ -76,6 +81,7 @@ impl<const N: usize> Points<N> {
 
     fn begin(&mut self, lane: usize, road: &Centreline, points: &crate::preview::PreviewPoints) {
         (self.near_m[lane], self.far_m[lane]) = (points.near_m, points.far_m);
+        [self.times_s[0][lane], self.times_s[1][lane]] = points.times_s;
         self.near.begin(lane, road, &points.near);
         self.far.begin(lane, road, &points.far);
         (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
@@ -102,6 +108,7 @@ impl<const N: usize> Worlds<N> {
             driver: Points::new(),
             camera: Points::new(),
             body: Tracked::new(),
+            real: Reals::new(),
             remnant_nm: [0.0; N],
             alive: [0; N],
             suspect: [0; N],
@@ -142,6 +149,15 @@ impl<const N: usize> Worlds<N> {
         (self.alive[lane], self.suspect[lane]) = (ALIVE, 0);
     }
 
+    /// A run goes at another speed, and its course ends where its driver's far point is at `end_m`.
+    pub(super) fn at_speed(&mut self, lane: usize, v_m_per_s: f64, end_m: f64) {
+        for points in [&mut self.driver, &mut self.camera] {
+            points.near_m[lane] = v_m_per_s * points.times_s[0][lane];
+            points.far_m[lane] = v_m_per_s * points.times_s[1][lane];
+        }
+        self.end[lane] = end_m;
+    }
+
     /// How the arm of a run moves from now on.
     pub(super) fn set_transition(&mut self, lane: usize, transition: &Transition) {
         for (all, column) in self.columns.iter_mut().zip(&transition.columns) {
@@ -150,6 +166,7 @@ impl<const N: usize> Worlds<N> {
             }
         }
         self.distance[lane] = transition.distance_m;
+        self.real.set_gains(lane, transition.gains());
     }
 
     /// chi of each run, rad.
@@ -201,16 +218,27 @@ impl<const N: usize> Worlds<N> {
             let is_off = self.body.offset[l].abs() > crate::simulation::DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
         }
+        self.real.locate(roads, |lane| self.body.place(lane));
     }
 
-    /// The drivers' eyes and arms, columns and vehicles move for a millisecond under these torques.
+    /// The drivers' eyes and arms, columns and vehicles move for a millisecond, from one speed to the next.
     #[inline(always)]
-    pub(super) fn move_on(&mut self, torque_nm: &[f64; N]) {
+    pub(super) fn move_on(&mut self, torque_nm: &[f64; N], speeds: [&[f64; N]; 2]) {
         let mut next_target = [0.0; N];
         self.vision(&mut next_target);
         let before = self.direction_rad();
         let mut next = [[0.0; N]; STATES];
         self.linear(&next_target, torque_nm, &mut next);
+        let acting = Acting {
+            target: &self.target,
+            next_target: &next_target,
+            torque_nm,
+            speeds,
+            remnant_nm: &self.remnant_nm,
+            alive: &self.alive,
+        };
+        self.real
+            .step(&self.state, &acting, &mut next, &mut self.distance);
         (self.state, self.target) = (next, next_target);
         for l in 0..N {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);

@@ -14,11 +14,11 @@ pub trait Column {
 /// is held and a large one is opposed by all of it.
 #[derive(Debug, Clone)]
 pub struct SteeringColumn {
-    inertia: f64,
-    damping: f64,
-    friction_nm: f64,
+    pub(crate) inertia: f64,
+    pub(crate) damping: f64,
+    pub(crate) friction_nm: f64,
     /// Deflection at which the friction gives way, rad.
-    give_rad: f64,
+    pub(crate) give_rad: f64,
 }
 
 impl SteeringColumn {

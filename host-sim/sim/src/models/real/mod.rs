@@ -14,10 +14,12 @@ mod single_track;
 mod wind;
 
 pub use column::{Column, SteeringColumn};
+pub(crate) use parameters::FULL_ASSIST_AT_NM;
 pub use parameters::{Tyres, WorldParameters};
+pub(crate) use single_track::TRAIL_SHAPE;
 pub use single_track::{Response, SingleTrack, Surroundings, Vehicle};
+pub(crate) use wind::Wind;
 
-use self::wind::Wind;
 use super::STEP_S;
 use super::driver::{ArmGains, DriverParameters};
 use super::plant::{Plant, PlantInput, PlantState};
@@ -26,9 +28,9 @@ use super::vehicle::VehicleParameters;
 /// Acceleration of gravity, m/s^2.
 pub const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Ripples of the motor in a turn of the wheel.
-const RIPPLES: f64 = 24.0;
+pub(crate) const RIPPLES: f64 = 24.0;
 
-const STATES: usize = 8;
+pub(crate) const STATES: usize = 8;
 /// Lateral velocity (m/s), yaw rate, wheel angle, wheel rate, friction's deflection (rad), arm's torque, motor's
 /// torque, yaw angle.
 type State = [f64; STATES];
@@ -36,11 +38,11 @@ type State = [f64; STATES];
 /// Vehicle, column, arm and motor of a less than ideal world.
 #[derive(Debug, Clone)]
 pub struct RealPlant<V = SingleTrack, C = SteeringColumn> {
-    vehicle: V,
-    column: C,
-    world: WorldParameters,
-    driver: DriverParameters,
-    wind: Wind,
+    pub(crate) vehicle: V,
+    pub(crate) column: C,
+    pub(crate) world: WorldParameters,
+    pub(crate) driver: DriverParameters,
+    pub(crate) wind: Wind,
     /// Deflection of the friction and the motor's torque; the rest is the plant's.
     deflection_rad: f64,
     motor_nm: f64,
@@ -166,7 +168,11 @@ impl<V: Vehicle, C: Column> RealPlant<V, C> {
         } else {
             0.0
         };
-        let ripple = world.motor_ripple * (RIPPLES * wheel).sin();
+        let ripple = if world.motor_ripple == 0.0 {
+            0.0
+        } else {
+            world.motor_ripple * (RIPPLES * wheel).sin()
+        };
         let acting = torque * (1.0 + world.motor_error) + ripple;
 
         let response =

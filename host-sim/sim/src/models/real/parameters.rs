@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::input::{RangeError, in_range};
 
+/// Driver torque at which the power assist is whole, N.m.
+pub(crate) const FULL_ASSIST_AT_NM: f64 = 3.0;
+
 /// How tyres answer slip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -125,8 +128,7 @@ impl WorldParameters {
     /// Torque of the power assist, N.m: with the square of the driver's torque up to 3 N.m, as most boost curves
     /// bend, constant beyond, and falling with speed.
     pub(super) fn assist_nm(&self, hands_nm: f64, v_m_per_s: f64) -> f64 {
-        const FULL_AT_NM: f64 = 3.0;
-        let share = (hands_nm.abs() / FULL_AT_NM).min(1.0);
+        let share = (hands_nm.abs() / FULL_ASSIST_AT_NM).min(1.0);
         let slowness = self.assist_speed / (self.assist_speed + 3.6 * v_m_per_s);
         self.assist * slowness * share * share * hands_nm.signum()
     }

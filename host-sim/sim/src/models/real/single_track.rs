@@ -4,7 +4,7 @@ use super::{GRAVITY_M_PER_S2, Tyres};
 use crate::models::vehicle::VehicleParameters;
 
 /// Shape factor of the trail; passenger cars' lie about here.
-const TRAIL_SHAPE: f64 = 1.2;
+pub(crate) const TRAIL_SHAPE: f64 = 1.2;
 
 /// What a vehicle drives in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,14 +37,14 @@ pub trait Vehicle {
 /// Equations (1) to (4), with tyres that may saturate.
 #[derive(Debug, Clone)]
 pub struct SingleTrack {
-    vehicle: VehicleParameters,
-    tyres: Tyres,
+    pub(crate) vehicle: VehicleParameters,
+    pub(crate) tyres: Tyres,
     /// Share of the trail that the castor makes: it stays while the pneumatic trail falls.
-    castor_share: f64,
+    pub(crate) castor_share: f64,
     /// Aligning torque on the column per side force of the front axle, at no slip, N.m/N.
-    lever: f64,
+    pub(crate) lever: f64,
     /// Weight on the front and on the rear axle, N.
-    load_n: [f64; 2],
+    pub(crate) load_n: [f64; 2],
 }
 
 impl SingleTrack {
@@ -61,22 +61,27 @@ impl SingleTrack {
         }
     }
 
-    /// Force of an axle, N, and the share of its pneumatic trail that is left, for a slip angle.
+    /// Force of an axle, N, for a slip angle.
     ///
-    /// The force has its stiffness at no slip and nears mu*load where the tyre slides; in between it keeps to the
-    /// stiffness for long, as a curve of the fourth order does, so that the stiffness given is that of driving. The
-    /// trail falls earlier and to nothing, as a cosine of an arc tangent (Pacejka, Tyre and Vehicle Dynamics,
-    /// chapter 4).
-    fn axle(&self, stiffness: f64, load_n: f64, mu: f64, slip_rad: f64) -> [f64; 2] {
+    /// It has its stiffness at no slip and nears mu*load where the tyre slides; in between it keeps to the
+    /// stiffness for long, as a curve of the fourth order does, so that the stiffness given is that of driving.
+    fn axle(&self, stiffness: f64, load_n: f64, mu: f64, slip_rad: f64) -> f64 {
         if self.tyres == Tyres::Linear {
-            return [stiffness * slip_rad, 1.0];
+            return stiffness * slip_rad;
         }
         let most = mu * load_n;
         let slip = stiffness * slip_rad / most;
-        [
-            most * slip / (1.0 + slip.powi(4)).sqrt().sqrt(),
-            (TRAIL_SHAPE * slip.atan()).cos().max(0.0),
-        ]
+        most * slip / (1.0 + slip.powi(4)).sqrt().sqrt()
+    }
+
+    /// The share of an axle's pneumatic trail that is left: it falls earlier than the force, and to nothing, as a cosine
+    /// of an arc tangent (Pacejka, Tyre and Vehicle Dynamics, chapter 4).
+    fn trail(&self, stiffness: f64, load_n: f64, mu: f64, slip_rad: f64) -> f64 {
+        if self.tyres == Tyres::Linear {
+            return 1.0;
+        }
+        let slip = stiffness * slip_rad / (mu * load_n);
+        (TRAIL_SHAPE * slip.atan()).cos().max(0.0)
     }
 }
 
@@ -106,8 +111,10 @@ impl Vehicle for SingleTrack {
             };
             steered - angle
         };
-        let [front, trail] = self.axle(2.0 * k_f, self.load_n[0], around.mu, slip(l_f, k_t * wheel_rad));
-        let [rear, _] = self.axle(2.0 * k_r, self.load_n[1], around.mu, slip(-l_r, 0.0));
+        let front_slip = slip(l_f, k_t * wheel_rad);
+        let front = self.axle(2.0 * k_f, self.load_n[0], around.mu, front_slip);
+        let trail = self.trail(2.0 * k_f, self.load_n[0], around.mu, front_slip);
+        let rear = self.axle(2.0 * k_r, self.load_n[1], around.mu, slip(-l_r, 0.0));
         let gravity = -GRAVITY_M_PER_S2 * around.bank_rad.sin();
         let lever = self.lever * (self.castor_share + (1.0 - self.castor_share) * trail);
         Response {

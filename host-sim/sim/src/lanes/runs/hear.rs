@@ -1,0 +1,60 @@
+//! What reaches the ECUs in a step: frames of the vehicle, the column and the camera, and what the motors deliver.
+
+use super::{Lanes, WHEEL, YAW_RATE};
+
+/// Of a camera, in ms: its rhythm, and that of the frames.
+const CAMERA_MS: u32 = 25;
+const COLUMN_MS: u32 = 2;
+const VEHICLE_MS: u32 = 10;
+
+impl<const N: usize> Lanes<N> {
+    /// The frames of a step reach the ECUs.
+    #[inline(always)]
+    pub(super) fn hear(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
+        let Self {
+            worlds,
+            ecus,
+            checks,
+            senses,
+            speeds,
+            own,
+            ..
+        } = self;
+        let matters = *ecus.matters();
+        if phase.is_multiple_of(VEHICLE_MS) {
+            speeds.hear(ecus, checks, &matters);
+            let yaw_rate = senses.yaw_rate(own, &worlds.state[YAW_RATE]);
+            checks.vehicle(&yaw_rate, &matters, &mut ecus.suspect);
+        }
+        if phase.is_multiple_of(COLUMN_MS) {
+            let [driver_nm, wheel] = senses.column(driver_nm, &worlds.state[WHEEL]);
+            ecus.column(&driver_nm);
+            let applied = ecus.torque_nm();
+            let driver = ecus.driver_nm();
+            checks.column(&driver, &applied, &wheel, &matters, &mut ecus.suspect);
+        }
+        if looks {
+            let dt_ms = if phase % CAMERA_MS == 9 { 9 } else { 8 };
+            let camera = &worlds.camera;
+            let [e_y, e_theta] = senses.picture(own, &ecus.hears, [&camera.e_y, &camera.e_theta]);
+            let seen = ecus.picture(&e_y, &e_theta, dt_ms, own);
+            let mut heard = matters;
+            for l in 0..N {
+                heard[l] &= ecus.hears[l];
+            }
+            let times = [dt_ms, phase % VEHICLE_MS];
+            let keeps = phase.is_multiple_of(CAMERA_MS);
+            checks.picture(&seen, times, own, keeps, &heard, &mut ecus.suspect);
+        }
+    }
+
+    /// The motors' torques reach the ECUs.
+    #[inline(always)]
+    pub(super) fn hear_motors(&mut self, phase: u32) {
+        let Self { worlds, ecus, .. } = self;
+        let (matters, is_heard) = (*ecus.matters(), phase.is_multiple_of(COLUMN_MS));
+        worlds
+            .real
+            .judge(is_heard, &ecus.applied, &matters, &mut ecus.suspect);
+    }
+}
