@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     /// Keep every drive in FILE as soon as it is done; a run with the same FILE goes on from there
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Fail (exit code 1) if with 95 % confidence the rate of a judged world may be above R an hour
+    /// Fail (exit code 1) if with 95 % confidence the rate of a judged world, its roads together, may be above R an hour
     #[arg(long, value_name = "R")]
     most_per_hour: Option<f64>,
     /// Runs of each fault of the campaign in the world 'everything' (or the last one asked for); 0: none
@@ -93,11 +93,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     let results = results.availability;
     let too_many = |most: f64| {
-        results
-            .cells
-            .iter()
-            .map(|cell| (cell.judged, cell.declarations.upper_95))
-            .any(|(judged, upper)| judged && (upper > most || upper.is_nan()))
+        let mut bounds = results.judged().map(|cell| cell.declarations.upper_95);
+        bounds.any(|upper| upper > most || upper.is_nan())
     };
     Ok(if arguments.most_per_hour.is_some_and(too_many) {
         Outcome::Failed

@@ -135,7 +135,7 @@ fn quantile(law: &ChiSquared, share: f64) -> f64 {
 pub struct Cell {
     /// Name of the world.
     pub world: &'static str,
-    /// Name of the road.
+    /// Name of the road; `all` of them together.
     pub road: &'static str,
     /// Whether no declaration is to be expected: nothing in it is beyond what roads and cars are.
     pub judged: bool,
@@ -192,8 +192,22 @@ pub struct Availability {
     pub hours: f64,
     /// By world and road.
     pub cells: Vec<Cell>,
+    /// Judged worlds, their roads together, if there are several.
+    pub together: Vec<Cell>,
     /// Legs of judged worlds in which the ECU left, or the vehicle left the road, with guidance or by hand.
     pub legs: Vec<Leg>,
+}
+
+impl Availability {
+    /// What is judged: each world in which nothing is to be expected, on all its roads.
+    pub fn judged(&self) -> impl Iterator<Item = &Cell> {
+        let cells = if self.together.is_empty() {
+            &self.cells
+        } else {
+            &self.together
+        };
+        cells.iter().filter(|cell| cell.judged)
+    }
 }
 
 /// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
@@ -223,19 +237,31 @@ pub fn study(
 }
 
 fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
+    let of_cell = |world: &WorldKind, road: &Road| {
+        let mut of_cell: Vec<&Leg> = legs
+            .iter()
+            .copied()
+            .filter(|leg| leg.world == world.name && leg.road == road.name)
+            .collect();
+        // Sums are the same in whatever order the legs were driven.
+        of_cell.sort_by_key(|leg| leg.number);
+        of_cell
+    };
+    let of_cell = &of_cell;
     let cells = plan.worlds.iter().flat_map(|world| {
-        plan.roads.iter().map(|road| {
-            let mut of_cell: Vec<&Leg> = legs
-                .iter()
-                .copied()
-                .filter(|leg| leg.world == world.name && leg.road == road.name)
-                .collect();
-            // Sums are the same in whatever order the legs were driven.
-            of_cell.sort_by_key(|leg| leg.number);
-            cell(world, road, &of_cell)
-        })
+        let roads = plan.roads.iter();
+        roads.map(move |road| cell(world, road.name, &of_cell(world, road)))
     });
     let cells = cells.collect();
+    let several = plan
+        .worlds
+        .iter()
+        .filter(|world| world.judged && plan.roads.len() > 1);
+    let together = several.map(|world| {
+        let on_all: Vec<&Leg> = plan.roads.iter().flat_map(|road| of_cell(world, road)).collect();
+        cell(world, "all", &on_all)
+    });
+    let together = together.collect();
     let numbers = plan.legs();
     let happened = numbers.iter().filter_map(|number| {
         let mut of_number = legs.iter().filter(|leg| leg.is(number));
@@ -246,11 +272,12 @@ fn summary(plan: &Plan, legs: &[&Leg]) -> Availability {
         seed: plan.seed,
         hours: plan.hours,
         cells,
+        together,
         legs: happened.collect(),
     }
 }
 
-fn cell(world: &WorldKind, road: &Road, legs: &[&Leg]) -> Cell {
+fn cell(world: &WorldKind, road: &'static str, legs: &[&Leg]) -> Cell {
     let (lost, legs): (Vec<&Leg>, Vec<&Leg>) = legs.iter().copied().partition(|leg| leg.is_lost_by_hand());
     let lost_by_hand = Lost {
         legs: lost.len(),
@@ -279,7 +306,7 @@ fn cell(world: &WorldKind, road: &Road, legs: &[&Leg]) -> Cell {
     };
     Cell {
         world: world.name,
-        road: road.name,
+        road,
         judged: world.judged,
         hours,
         available: sum(|leg| leg.active_s) / (3600.0 * hours),

@@ -177,9 +177,37 @@ fn a_drive_that_is_lost_by_hand_is_counted_apart() {
         found.legs.iter().map(|leg| leg.number).collect::<Vec<_>>(),
         [1, 2]
     );
+    assert!(found.together.is_empty() && found.judged().count() == 1);
+    // Both roads together: two declarations in twice the time, and judged in place of each alone.
+    let both = Plan {
+        roads: ROADS.iter().collect(),
+        ..plan
+    };
+    let on = |road: &str, leg: &Leg| Leg {
+        road: road.into(),
+        ..leg.clone()
+    };
+    let all: Vec<Leg> = ROADS
+        .iter()
+        .flat_map(|r| legs.iter().map(|leg| on(r.name, leg)))
+        .collect();
+    let found = summary(&both, &all.iter().collect::<Vec<_>>());
+    let [together] = found.judged().collect::<Vec<_>>()[..] else {
+        panic!("{:?}", found.together)
+    };
+    assert_eq!((together.road, together.declarations.count), ("all", 2));
+    assert!((together.hours - 0.08).abs() < 1e-12 && (together.available - 0.5).abs() < 1e-12);
+    assert_eq!(
+        (together.cars, together.lost_by_hand.legs, found.cells.len()),
+        (2, 2, 2)
+    );
     // Nothing is known of a rate where every drive is lost by hand.
-    let none = summary(&plan, &[&legs[1]]);
-    assert!(none.cells[0].declarations.upper_95.is_nan() && none.cells[0].hours == 0.0);
+    let none = summary(&both, &[&legs[1]]);
+    assert!(
+        none.cells
+            .iter()
+            .all(|cell| cell.declarations.upper_95.is_nan() && cell.hours == 0.0)
+    );
 }
 
 /// A population is of thirty cars, and drives can be asked for by number.

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use super::OutputError;
-use super::files::{write_figure, write_report};
+use super::{OutputError, files::write_figure, files::write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::availability::{Availability, Cell as Row, Ended, Leg, Rate};
@@ -13,7 +12,7 @@ use serde::Serialize;
 
 /// What the study is about.
 pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
-                           The interval is the exact 95 % interval of a Poisson rate. Every drive is driven a second time \
+                           The interval is the exact one of a Poisson rate; it is at most the bound, with 95 % confidence. Every drive is driven a second time \
                            by hand; one that leaves the road then too is lost by hand, and counted there alone.";
 
 /// What is given up for what: false declarations, and faults noticed in the same world.
@@ -175,7 +174,7 @@ fn interval(rate: &Rate) -> Cell {
     Cell::Text(format!("{:.2} to {:.2}", rate.interval[0], rate.interval[1]))
 }
 
-/// Every world on every road.
+/// Every world on every road; the roads of a judged one together.
 pub fn table(results: &Availability) -> Table {
     let row = |row: &Row| {
         vec![
@@ -185,6 +184,7 @@ pub fn table(results: &Availability) -> Table {
             Cell::number(row.declarations.count as f64, 0),
             Cell::number(row.declarations.per_hour, 2),
             interval(&row.declarations),
+            Cell::number(row.declarations.upper_95, 4),
             Cell::Text(format!("{} of {}", row.cars_with, row.cars)),
             Cell::number(100.0 * (1.0 - row.available), 2),
             Cell::number(row.latched as f64, 0),
@@ -203,6 +203,7 @@ pub fn table(results: &Availability) -> Table {
             "False declarations",
             "Per hour",
             "95 % interval",
+            "At most, 95 %",
             "Cars with one",
             "Time without guidance (%)",
             "Latched",
@@ -213,7 +214,7 @@ pub fn table(results: &Availability) -> Table {
         ]
         .map(String::from)
         .to_vec(),
-        rows: results.cells.iter().map(row).collect(),
+        rows: results.cells.iter().chain(&results.together).map(row).collect(),
     }
 }
 
