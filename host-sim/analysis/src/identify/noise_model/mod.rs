@@ -20,6 +20,7 @@
 //! ended ([`report`]).
 
 mod delays;
+mod doubts;
 mod evidence;
 mod finite;
 mod information;

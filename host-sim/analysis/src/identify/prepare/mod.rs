@@ -16,7 +16,7 @@ use serde::Serialize;
 pub use faults::ColumnFaults;
 pub use stretches::{LeftOut, Reason};
 
-use super::lane::{LaneNoise, smooth};
+use super::lane::{LaneDoubt, LaneNoise, smooth};
 use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
 
@@ -112,6 +112,8 @@ pub(crate) struct Prepared {
     pub log: DriveLog,
     /// Rows that are driving, in order.
     pub stretches: Vec<Range<usize>>,
+    /// What is not known of the lane signals for the whole record.
+    pub lane_doubts: Vec<LaneDoubt>,
     pub preflight: Preflight,
 }
 
@@ -167,10 +169,19 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         ..Preflight::default()
     };
     let [y, theta] = lane;
-    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed
-    {
+    let mut lane_doubts = Vec::new();
+    let mut take = |smoothed: Option<super::lane::Smoothed>,
+                    raw: Vec<f64>,
+                    noise: &mut LaneNoise,
+                    lane: usize| match smoothed {
         Some(s) => {
             *noise = s.noise;
+            let doubt = |signal| LaneDoubt {
+                lane,
+                from: 0,
+                signal,
+            };
+            lane_doubts.extend(s.doubts.into_iter().map(doubt));
             s.signal
         }
         None => raw,
@@ -178,8 +189,8 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     let clean = DriveLog {
         start_s: log.start_s,
         dt_s: dt,
-        e_y_m: take(y, e_y.signal, &mut lane_noise[0]),
-        e_theta_rad: take(theta, e_theta.signal, &mut lane_noise[1]),
+        e_y_m: take(y, e_y.signal, &mut lane_noise[0], 0),
+        e_theta_rad: take(theta, e_theta.signal, &mut lane_noise[1], 1),
         wheel_angle_rad: phi.signal,
         guidance_torque_nm: t_h.signal,
         driver_torque_nm: t_d.signal,
@@ -194,6 +205,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     Prepared {
         log: clean,
         stretches,
+        lane_doubts,
         preflight,
     }
 }
