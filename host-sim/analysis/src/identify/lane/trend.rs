@@ -119,6 +119,10 @@ impl<const N: usize> Filter<N> {
     }
 
     /// Innovations of the columns of `rows` over their standard deviation, zero where a sample has no part.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "plain loops over the columns, which the compiler takes side by side"
+    )]
     pub(super) fn whitened(&self, rows: &[Row]) -> Vec<Row> {
         let mut state = [[0.0; COLUMNS]; N];
         state[0] = rows[0];
@@ -158,6 +162,10 @@ impl<const N: usize> Filter<N> {
     }
 
     /// The course under each column of `rows`, from the whole record.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "plain loops over the columns, which the compiler takes side by side"
+    )]
     pub(super) fn smoothed(&self, rows: &[Row]) -> Vec<Row> {
         let mut state = [[0.0; COLUMNS]; N];
         state[0] = rows[0];
