@@ -71,3 +71,11 @@ fn a_wrong_sensor_is_refuted_with_its_cause() {
         assert_eq!(line(name).identified, 0, "{:?}", line(name));
     }
 }
+
+/// The arm is another one than is assumed, which the record says: it is estimated, and the model then holds.
+#[test]
+fn another_t_nms_is_estimated_and_refutes_nothing() {
+    for name in ["t_nms 0.15 s", "t_nms 0.06 s", "noise 10 mm, t_nms 0.15 s"] {
+        assert_eq!(line(name).refuted, 0, "{:?}", line(name));
+    }
+}

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{COLUMNS, DriveLog, Mapping, Options, Recording, open_mapped};
+use haptic_analysis::identify::{COLUMNS, DriveLog, Mapping, Options, Recording, SPEED_COLUMN, open_mapped};
 use haptic_batch::identify::{Method, single_track};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -93,7 +93,7 @@ fn log_of(py: Python<'_>, columns: &Bound<'_, PyDict>, manual: bool) -> PyResult
     let mut given = Vec::new();
     for (name, values) in columns {
         let name: String = name.extract()?;
-        if COLUMNS.contains(&name.as_str()) {
+        if COLUMNS.contains(&name.as_str()) || name == SPEED_COLUMN {
             let values: PyReadonlyArray1<'_, f64> = values.extract().map_err(|_| {
                 errors::input(
                     py,

@@ -27,6 +27,22 @@ def test_a_path_and_its_columns_give_the_same_driver():
     assert abs(by_path["t_p"].optimum - truth["t_p"]) < 0.02
 
 
+def test_columns_tell_their_speed_as_a_file_does(tmp_path):
+    columns = table(LOGS / "guided-probe-clean.csv")
+    columns["speed_m_per_s"] = np.linspace(15.0, 25.0, len(columns["time_s"]))
+    columns["speed_m_per_s"][7] = np.nan
+    path = tmp_path / "drive.csv"
+    np.savetxt(path, np.column_stack(list(columns.values())), "%.17g", ",", header=",".join(columns), comments="")
+    by_path, by_columns = hg.identify(path), hg.identify(columns)
+    told = [found for found in by_columns.results["preflight"]["reading"] if found[0] == "speed"]
+    assert len(told) == 1 and told[0][1] == "15.0 to 25.0 m/s"
+    assert by_columns.results["balance"] is None
+    assert by_path.results["preflight"] == by_columns.results["preflight"]
+    assert hg.identify({**columns, "speed_m_per_s": ["?"] * len(columns["time_s"])}).results["balance"] is not None
+    with pytest.raises(hg.InputError, match="speed_m_per_s"):
+        hg.identify({**columns, "speed_m_per_s": np.zeros(3)})
+
+
 def probed_run():
     driver = {"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}
     return hg.simulate(hg.Scenario(driver=driver, guidance={"probe": True}))

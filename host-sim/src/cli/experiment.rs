@@ -140,12 +140,13 @@ fn run_spoiled(arguments: &Arguments, plan: &Plan, seeds: u32) -> Result<Outcome
         print_json(&result)?;
     } else {
         let mut text = format!(
-            "{} drives of each participant, probe {} N.m, seeds from {}\n\n{}\nInformation bound of gain_1, gain_2, gain_3, \
+            "{} drives of each participant, probe {} N.m, seeds from {}\n\n{}\n{}\nInformation bound of gain_1, gain_2, gain_3, \
              t_p, K_hg on clean logs: {}\n{} wrong of {} identified",
             result.seeds,
             plan.probe_nm,
             plan.seed,
             files::spoiled_table(&result).to_text(),
+            files::held_table(&result).to_text(),
             result.bound.map(|b| format!("{b:.4}")).join(", "),
             result.lies,
             result.identified

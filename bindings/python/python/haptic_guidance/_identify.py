@@ -116,7 +116,7 @@ def identify(
         A CSV, MAT or MDF 4 file, a recording of the bus (candump, ASC, BLF); columns by name (a DataFrame is a mapping
         too); or a run.
         Needed are ``time_s``, ``e_y_m``, ``e_theta_rad``, ``wheel_angle_rad``, ``guidance_torque_nm`` and
-        ``driver_torque_nm``.
+        ``driver_torque_nm``. Where the speed changes, ``speed_m_per_s`` says so.
     manual : bool, optional
         A drive without guidance: K_hg is no part of the model.
     fix : mapping of str to float, optional

@@ -33,7 +33,7 @@ pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_rec
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use drivers::{Difference, Population, differences, population};
 pub use lane::LaneNoise;
-pub use log::{COLUMNS, DriveLog, LogError};
+pub use log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 pub use noise_model::{
     INFORMED, Information, LONGEST_DELAY_S, Truth, identify as identify_with_noise_model, information,
 };

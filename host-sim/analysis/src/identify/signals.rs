@@ -172,6 +172,11 @@ impl Signals {
         }
     }
 
+    /// A signal that the driver might have seen, as [`Signals::visual`].
+    pub(crate) fn seen(&self, raw: &[f64]) -> Lagged {
+        Lagged::straight(lines(raw), self.dt_s, self.t_nms_s)
+    }
+
     /// Whole samples of the delay, rounded up, and the weights of the rest.
     pub(crate) fn delay(&self, t_p_s: f64) -> Delay {
         let samples = (t_p_s / self.dt_s).ceil().max(0.0);

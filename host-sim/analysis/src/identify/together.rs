@@ -1,6 +1,7 @@
 //! Several drives of one driver in one fit: the records one after the other, each with its own preflight, and a constant of
 //! its own for each stretch. The driver, the muscle and the disturbance are the same in all.
 
+use super::lane::LaneDoubt;
 use super::log::{DriveLog, LogError};
 use super::noise_model;
 use super::options::Options;
@@ -106,6 +107,11 @@ impl Prepared {
         }
         self.stretches
             .extend(next.stretches.into_iter().map(|s| s.start + from..s.end + from));
+        let moved = |d: LaneDoubt| LaneDoubt {
+            from: d.from + from,
+            ..d
+        };
+        self.lane_doubts.extend(next.lane_doubts.into_iter().map(moved));
         let (sum, more) = (&mut self.preflight, next.preflight);
         sum.reading.extend(more.reading);
         for ((_, all), (_, faults)) in sum.columns.iter_mut().zip(more.columns) {

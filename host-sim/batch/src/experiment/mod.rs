@@ -23,7 +23,7 @@ use serde::Serialize;
 pub use methods::{METHODS, MethodLine, methods};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
-pub use spoiled::{POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
+pub use spoiled::{Held, POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, Truth, identify_as_published,

@@ -118,6 +118,46 @@ pub const POPULATION: [(&str, &[Spoiling]); 29] = [
     ),
 ];
 
+/// How many 95 % intervals of identified values hold the truth.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Held {
+    /// Identified values.
+    pub identified: usize,
+    /// Those whose interval holds the truth.
+    pub held: usize,
+}
+
+impl Held {
+    /// Their share; none of none.
+    pub fn share(self) -> Option<f64> {
+        (self.identified > 0).then(|| self.held as f64 / self.identified as f64)
+    }
+
+    fn of<'a>(values: impl Iterator<Item = &'a Compared>) -> Self {
+        values
+            .filter(|v| v.1.identified)
+            .fold(Self::default(), |sum, v| Self {
+                identified: sum.identified + 1,
+                held: sum.held
+                    + usize::from(
+                        v.1.interval_95
+                            .is_some_and(|[low, high]| low <= v.2 && v.2 <= high),
+                    ),
+            })
+    }
+}
+
+impl std::ops::Add for Held {
+    type Output = Self;
+
+    fn add(self, more: Self) -> Self {
+        Self {
+            identified: self.identified + more.identified,
+            held: self.held + more.held,
+        }
+    }
+}
+
 /// What was made of one way of spoiling.
 #[derive(Debug, Clone, Serialize)]
 pub struct SpoiledLine {
@@ -135,6 +175,8 @@ pub struct SpoiledLine {
     pub lies: usize,
     /// Share of the 95 % intervals, of those that were identified, that hold the truth.
     pub coverage: Option<f64>,
+    /// The same of gain_1, gain_2, gain_3, t_p and K_hg, counted.
+    pub intervals: [Held; COMPARED],
     /// Root mean square error of gain_1, gain_2, gain_3, t_p and K_hg, refuted or not.
     pub rms: [f64; COMPARED],
     /// Drives in which K_hg was identified and within 0.05.
@@ -152,6 +194,11 @@ pub struct Spoiled {
     pub identified: usize,
     /// Lies in all.
     pub lies: usize,
+    /// 95 % intervals in all, by parameter as in the lines.
+    pub intervals: [Held; COMPARED],
+    /// The same of the drivers whose t_nms is what is assumed. Intervals hold arms of all kinds 95 times in 100, those at
+    /// the edge of the range of arms less often.
+    pub intervals_at_t_nms: [Held; COMPARED],
     /// Least RMS errors of an unbiased estimator from the clean logs, in the order of the lines' own.
     pub bound: [f64; COMPARED],
     /// What was promised and is not kept.
@@ -255,13 +302,7 @@ impl SpoiledLine {
             let e = error(v).abs();
             e > tolerance(v.0, v.2) && v.1.standard_error.is_some_and(|s| e > 4.0 * s)
         });
-        let covered = known
-            .iter()
-            .filter(|v| {
-                v.1.interval_95
-                    .is_some_and(|[low, high]| low <= v.2 && v.2 <= high)
-            })
-            .count();
+        let intervals: [Held; COMPARED] = std::array::from_fn(|i| Held::of(found.iter().map(|f| &f.0[i])));
         let mut causes: Vec<(String, usize)> = Vec::new();
         for cause in found
             .iter()
@@ -283,7 +324,8 @@ impl SpoiledLine {
             cause: causes.into_iter().max_by_key(|c| c.1),
             identified: known.len(),
             lies: lies.count(),
-            coverage: (!known.is_empty()).then(|| covered as f64 / known.len() as f64),
+            coverage: intervals.iter().fold(Held::default(), |sum, h| sum + *h).share(),
+            intervals,
             rms,
             k_hg_read: found
                 .iter()
@@ -316,6 +358,18 @@ impl Spoiled {
                 "{lies} lies among {identified} identified values: more than 1 of 1,000"
             ));
         }
+        let together = |wanted: &dyn Fn(&SpoiledLine) -> bool| -> [Held; COMPARED] {
+            let of = |i: usize| {
+                let lines = lines.iter().filter(|l| wanted(l));
+                lines.fold(Held::default(), |sum, l| sum + l.intervals[i])
+            };
+            std::array::from_fn(of)
+        };
+        let other_muscle = |l: &SpoiledLine| {
+            let way = POPULATION.iter().find(|(name, _)| *name == l.spoiled_by);
+            way.is_some_and(|(_, ways)| ways.iter().any(|w| matches!(w, Spoiling::OtherMuscle(_))))
+        };
+        let (intervals, intervals_at_t_nms) = (together(&|_| true), together(&|l| !other_muscle(l)));
         let line = |name: &str| lines.iter().find(|l| l.spoiled_by == name);
         if let (Some(clean), Some(noisy)) = (line("clean"), line("lane noise 10 mm, 1 mrad")) {
             if noisy.k_hg_read * 14 < 13 * noisy.drives {
@@ -338,6 +392,8 @@ impl Spoiled {
             lines,
             identified,
             lies,
+            intervals,
+            intervals_at_t_nms,
             bound,
             broken,
         }

@@ -9,7 +9,7 @@ use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, 
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
 use haptic_batch::experiment::{
-    Drive, Experiment, Finding, MethodLine, Repeated, Repetitions, Spoiled, SpoiledLine,
+    Drive, Experiment, Finding, Held, MethodLine, Repeated, Repetitions, Spoiled, SpoiledLine,
 };
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
@@ -359,6 +359,32 @@ pub fn spoiled_table(result: &Spoiled) -> Table {
         .map(String::from)
         .to_vec(),
         rows: result.lines.iter().map(row).collect(),
+    }
+}
+
+/// How many of the 95 % intervals of identified values hold the truth, by way of spoiling and parameter.
+pub fn held_table(result: &Spoiled) -> Table {
+    let row = |name: &str, held: &[Held; 5]| {
+        let all = held.iter().fold(Held::default(), |sum, &h| sum + h);
+        let cell = |h: Held| {
+            let text = h.share().map(|x| format!("{x:.3} of {}", h.identified));
+            Cell::Text(text.unwrap_or_else(|| "-".into()))
+        };
+        let cells = held.iter().copied().chain([all]).map(cell);
+        std::iter::once(Cell::Text(name.into())).chain(cells).collect()
+    };
+    let lines = result.lines.iter().filter(|l| l.identified > 0);
+    let mut rows: Vec<Vec<Cell>> = lines.map(|l| row(l.spoiled_by, &l.intervals)).collect();
+    rows.push(row("all, t_nms as assumed", &result.intervals_at_t_nms));
+    rows.push(row("all", &result.intervals));
+    Table {
+        caption: "Share of the 95 % intervals of identified values that hold the truth. Ways in which nothing is identified are \
+                  left out."
+            .into(),
+        columns: ["Spoiled by", "gain_1", "gain_2", "gain_3", "t_p", "K_hg", "All"]
+            .map(String::from)
+            .to_vec(),
+        rows,
     }
 }
 

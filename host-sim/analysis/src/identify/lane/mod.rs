@@ -9,15 +9,27 @@
 //!
 //! So each lane signal is a smooth course (the road, [`trend`]) plus the vehicle's answer to the wheel angle plus
 //! white camera noise. The answer is that of any vehicle: the integrals of the wheel angle and its first-order
-//! lags, with weights estimated from the record. Intensity of the course and size of the noise are those of the
-//! largest likelihood. Innovations beyond [`GATE`] standard deviations are outliers: they get no part.
+//! lags, with weights estimated from the record. Their errors stay the same throughout the record, so no number of rows
+//! averages them out: what they do to the signal is handed on ([`Smoothed::doubts`]), to be a part of the standard errors.
+//!
+//! The course is a random walk that was integrated three times: a road is built so that its curvature has no steps, and the
+//! spectrum of what the camera sees of it falls fast. A walk that is integrated once has a spectrum that falls more slowly:
+//! it leaves noise in the signal and takes the road's bends out of it, and both bias t_p and the gains. Intensity of the
+//! course and size of the noise are those of the largest likelihood. Innovations beyond [`GATE`] standard deviations are
+//! outliers: they get no part.
 //!
 //! A signal whose noise cannot matter ([`NEGLIGIBLE`]) is left as it is.
 
+#[cfg(test)]
+mod tests;
 mod trend;
 
+use nalgebra::DMatrix;
 use serde::Serialize;
-use trend::{Filter, Likelihood, likelihood};
+use trend::{COLUMNS, Filter, Likelihood, Row, likelihood};
+
+/// Order of the course: level, slope and two more derivatives.
+const ORDER: usize = 4;
 
 /// Innovations beyond so many standard deviations are outliers.
 const GATE: f64 = 5.0;
@@ -51,9 +63,22 @@ pub struct LaneNoise {
 pub(crate) struct Smoothed {
     pub signal: Vec<f64>,
     pub error_sd: Vec<f64>,
+    /// What one standard deviation of each independent error of the vehicle's answer makes of the signal.
+    pub doubts: Vec<Vec<f64>>,
     /// Rows in bursts of outliers: whatever the signal was there, it was not the lane.
     pub bursts: Vec<bool>,
     pub noise: LaneNoise,
+}
+
+/// One standard deviation of an error that a smoothed lane signal has throughout.
+#[derive(Debug, Clone)]
+pub(crate) struct LaneDoubt {
+    /// 0 is e_y, 1 is e_theta.
+    pub lane: usize,
+    /// Row of the log that it begins at.
+    pub from: usize,
+    /// What it makes of the signal.
+    pub signal: Vec<f64>,
 }
 
 /// The vehicle's answers to the wheel angle that a lane signal may hold; `integrals` is 1 for an angle, 2 for a place.
@@ -121,6 +146,7 @@ pub(crate) fn smooth(
         return Smoothed {
             signal: signal.to_vec(),
             error_sd: vec![0.0; signal.len()],
+            doubts: Vec::new(),
             bursts: vec![false; signal.len()],
             noise: LaneNoise {
                 noise_sd: white,
@@ -133,57 +159,143 @@ pub(crate) fn smooth(
     } else {
         Vec::new()
     };
-    let mut weight = weight.to_vec();
-    let mut outliers = Vec::new();
-    let mut ratio = 1.0;
-    let mut found: Option<(Filter, Likelihood)> = None;
-    for round in 0..3 {
-        let (best, filter, fit) =
-            best_ratio(signal, &answers, dt, &weight, floor, (round > 0).then_some(ratio));
-        ratio = best;
-        let before = outliers.len();
-        for (k, (w, v)) in weight.iter_mut().zip(&fit.innovations).enumerate() {
-            if *w > 0.0 && v.abs() > GATE {
-                *w = 0.0;
-                outliers.push(k);
-            }
-        }
-        found = Some((filter, fit));
-        if outliers.len() == before {
-            break;
-        }
-    }
-    let Some((_, fit)) = found else {
-        unreachable!("there is a first round")
-    };
-    let filter = Filter::new(dt, ratio, &weight);
-    let motion: Vec<f64> = (0..signal.len())
-        .map(|k| {
-            answers
-                .iter()
-                .zip(fit.weights.iter())
-                .map(|(x, w)| x[k] * w)
-                .sum()
+    let mut rows: Vec<Row> = signal
+        .iter()
+        .map(|&y| {
+            let mut row = [0.0; COLUMNS];
+            row[0] = y;
+            row
         })
         .collect();
-    let road: Vec<f64> = signal.iter().zip(&motion).map(|(y, m)| y - m).collect();
-    let (course, variance) = filter.smoothed(&road);
-    let error_sd: Vec<f64> = variance.iter().map(|v| (v * fit.noise_variance).sqrt()).collect();
-    // What has next to no noise is only completed.
-    let keep = |k: usize| negligible && weight[k] > 0.0;
-    let left = (error_sd.iter().map(|e| e * e).sum::<f64>() / error_sd.len() as f64).sqrt();
-    Smoothed {
-        signal: (0..signal.len())
-            .map(|k| if keep(k) { signal[k] } else { course[k] + motion[k] })
-            .collect(),
-        error_sd,
-        bursts: bursts(&mut outliers, signal.len(), dt),
-        noise: LaneNoise {
-            noise_sd: fit.noise_variance.sqrt(),
-            left_sd: left,
-            outliers: outliers.len(),
-            smoothed: !negligible,
-        },
+    for (i, answer) in answers.iter().enumerate() {
+        for (row, x) in rows.iter_mut().zip(answer) {
+            row[i + 1] = *x;
+        }
+    }
+    let problem = Problem {
+        rows,
+        answers: answers.len(),
+        dt,
+        floor,
+        keep: negligible,
+    };
+    let best = problem.best(weight, None);
+    problem.smoothed(weight.to_vec(), best)
+}
+
+/// A lane signal and the vehicle's answers beside it.
+struct Problem {
+    rows: Vec<Row>,
+    answers: usize,
+    dt: f64,
+    floor: f64,
+    /// Whether the values are kept as they are, and only missing ones completed.
+    keep: bool,
+}
+
+/// The best ratio, by its decadic logarithm.
+struct Best {
+    exponent: f64,
+    fit: Likelihood,
+}
+
+impl Problem {
+    /// The ratio of the largest likelihood: by steps of the same share of the course's bandwidth, which is the eighth root
+    /// of it, from `near` or from 10 rad/s, then by a parabola through the best three.
+    fn best(&self, weight: &[f64], near: Option<f64>) -> Best {
+        let at = |exponent: f64| {
+            let filter = Filter::<ORDER>::new(self.dt, 10.0_f64.powf(exponent), weight);
+            let fit = likelihood(&filter, &self.rows, self.answers, self.floor);
+            Best { exponent, fit }
+        };
+        let order = ORDER as f64;
+        let (start, pace) = (near.unwrap_or(2.0 * order + self.dt.log10()), 0.5 * order);
+        let mut here = at(start);
+        let mut up = at(start + pace);
+        let mut down = at(start - pace);
+        for _ in 0..12 {
+            if up.fit.deviance < here.fit.deviance {
+                (down, here) = (here, up);
+                up = at(here.exponent + pace);
+            } else if down.fit.deviance < here.fit.deviance {
+                (up, here) = (here, down);
+                down = at(here.exponent - pace);
+            } else {
+                break;
+            }
+        }
+        let bend = up.fit.deviance - 2.0 * here.fit.deviance + down.fit.deviance;
+        if bend > 0.0 {
+            let step = 0.5 * (down.fit.deviance - up.fit.deviance) / bend;
+            let refined = at(here.exponent + pace * step.clamp(-0.5, 0.5));
+            if refined.fit.deviance <= here.fit.deviance {
+                here = refined;
+            }
+        }
+        here
+    }
+
+    /// The signal as the best course and the answers have it, after what is out of line lost its part.
+    fn smoothed(&self, mut weight: Vec<f64>, mut best: Best) -> Smoothed {
+        let mut outliers = Vec::new();
+        for round in 0..3 {
+            if round > 0 {
+                best = self.best(&weight, Some(best.exponent));
+            }
+            let before = outliers.len();
+            for (k, (w, v)) in weight.iter_mut().zip(&best.fit.innovations).enumerate() {
+                if *w > 0.0 && v.abs() > GATE {
+                    *w = 0.0;
+                    outliers.push(k);
+                }
+            }
+            if outliers.len() == before {
+                break;
+            }
+        }
+        let Best { exponent, fit } = best;
+        let filter = Filter::<ORDER>::new(self.dt, 10.0_f64.powf(exponent), &weight);
+        // The course takes up what it can of the answers: what is left of each is what its weight adds to the signal.
+        let course = filter.smoothed(&self.rows);
+        let added = |k: usize, i: usize| self.rows[k][i + 1] - course[k][i + 1];
+        let n = self.rows.len();
+        // What has next to no noise is only completed.
+        let keep = |k: usize| self.keep && weight[k] > 0.0;
+        let smooth = |k: usize| -> f64 {
+            course[k][0]
+                + (0..self.answers)
+                    .map(|i| fit.weights[i] * added(k, i))
+                    .sum::<f64>()
+        };
+        let root = fit
+            .covariance
+            .cholesky()
+            .map_or_else(|| DMatrix::zeros(0, 0), |c| c.l());
+        let doubt = |j: usize| -> Vec<f64> {
+            let of = |k: usize| (j..self.answers).map(|i| root[(i, j)] * added(k, i)).sum();
+            (0..n).map(|k| if keep(k) { 0.0 } else { of(k) }).collect()
+        };
+        let noise_variance = fit.noise_variance;
+        let error_sd: Vec<f64> = filter
+            .variances()
+            .iter()
+            .map(|v| (v * noise_variance).sqrt())
+            .collect();
+        let left = (error_sd.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
+        Smoothed {
+            signal: (0..n)
+                .map(|k| if keep(k) { self.rows[k][0] } else { smooth(k) })
+                .collect(),
+            doubts: (0..root.nrows()).map(doubt).collect(),
+            error_sd,
+            bursts: bursts(&mut outliers, n, self.dt),
+            noise: LaneNoise {
+                noise_sd: noise_variance.sqrt(),
+                left_sd: left,
+                outliers: outliers.len(),
+                smoothed: !self.keep,
+            },
+        }
     }
 }
 
@@ -200,45 +312,4 @@ fn bursts(outliers: &mut [usize], rows: usize, dt: f64) -> Vec<bool> {
         last = Some(w[BURST - 1]);
     }
     out
-}
-
-/// The ratio of the largest likelihood: by whole decades from `near` or over all, then by a parabola through the best
-/// three.
-fn best_ratio(
-    signal: &[f64],
-    answers: &[Vec<f64>],
-    dt: f64,
-    weight: &[f64],
-    floor: f64,
-    near: Option<f64>,
-) -> (f64, Filter, Likelihood) {
-    let at = |exponent: f64| {
-        let filter = Filter::new(dt, 10.0_f64.powf(exponent), weight);
-        let fit = likelihood(&filter, signal, answers, floor);
-        (exponent, filter, fit)
-    };
-    let start = near.map_or(1.0, f64::log10);
-    let mut here = at(start);
-    let mut up = at(start + 1.0);
-    let mut down = at(start - 1.0);
-    for _ in 0..12 {
-        if up.2.deviance < here.2.deviance {
-            (down, here) = (here, up);
-            up = at(here.0 + 1.0);
-        } else if down.2.deviance < here.2.deviance {
-            (up, here) = (here, down);
-            down = at(here.0 - 1.0);
-        } else {
-            break;
-        }
-    }
-    let bend = up.2.deviance - 2.0 * here.2.deviance + down.2.deviance;
-    if bend > 0.0 {
-        let step = 0.5 * (down.2.deviance - up.2.deviance) / bend;
-        let refined = at(here.0 + step.clamp(-0.5, 0.5));
-        if refined.2.deviance <= here.2.deviance {
-            here = refined;
-        }
-    }
-    (10.0_f64.powf(here.0), here.1, here.2)
 }

@@ -1,8 +1,8 @@
 //! A smooth course under white noise: its likelihood, and its best estimate from the whole record.
 //!
-//! The course is an integrated random walk of order two: its slope is a random walk. Beside it a signal may follow
-//! known regressors with unknown constant weights. A Kalman filter gives the likelihood for any ratio of the walk's
-//! intensity to the noise, the weights by generalised least squares on what the filter leaves over; a backward
+//! The course is a random walk that was integrated `N - 1` times: its state is its level, its slope and so on. Beside it a
+//! signal may follow known regressors with unknown constant weights. A Kalman filter gives the likelihood for any ratio of
+//! the walk's intensity to the noise, the weights by generalised least squares on what the filter leaves over; a backward
 //! pass turns the filter's estimates into those from the whole record (Durbin and Koopman, "Time Series Analysis by
 //! State Space Methods", sections 4.4 and 6.2). Samples that are missing or out of line have no part in either.
 
@@ -14,31 +14,77 @@ const BEFORE: f64 = 1e12;
 /// Relative change of the state covariance below which it is taken as settled.
 const SETTLED: f64 = 1e-10;
 
+/// The signal and its regressors side by side, so that the filter takes them all at once.
+pub(super) const COLUMNS: usize = 8;
+pub(super) type Row = [f64; COLUMNS];
+
+/// A matrix of the state.
+type Matrix<const N: usize> = [[f64; N]; N];
+
 /// The gain and innovation variance of a step, in units of the noise variance.
 #[derive(Debug, Clone, Copy)]
-struct Gain {
-    level: f64,
-    slope: f64,
+struct Gain<const N: usize> {
+    state: [f64; N],
     /// Variance of the innovation; infinite where the sample has no part.
     innovation: f64,
 }
 
-/// The filter of one ratio over one set of samples: gains and variances, which do not depend on the values.
-#[derive(Debug, Clone)]
-pub(super) struct Filter {
-    dt: f64,
-    gains: Vec<Gain>,
-    /// Predicted covariance at each sample: level, both, slope.
-    predicted: Vec<[f64; 3]>,
+impl<const N: usize> Gain<N> {
+    fn precision(&self) -> f64 {
+        if self.innovation.is_finite() {
+            1.0 / self.innovation
+        } else {
+            0.0
+        }
+    }
 }
 
-impl Filter {
-    /// `ratio` is the intensity of the slope's walk over the noise variance; `weight[k]` the precision of sample k
+/// The filter of one ratio over one set of samples: gains and variances, which do not depend on the values.
+#[derive(Debug, Clone)]
+pub(super) struct Filter<const N: usize> {
+    /// What the state is a sample later.
+    transition: Matrix<N>,
+    gains: Vec<Gain<N>>,
+    /// Predicted covariance at each sample.
+    predicted: Vec<Matrix<N>>,
+}
+
+pub(super) fn factorial(n: usize) -> f64 {
+    (1..=n).map(|i| i as f64).product()
+}
+
+fn times<const N: usize>(a: &Matrix<N>, b: &Matrix<N>) -> Matrix<N> {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..N).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+fn transposed<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
+}
+
+impl<const N: usize> Filter<N> {
+    /// `ratio` is the intensity of the walk over the noise variance; `weight[k]` the precision of sample k
     /// relative to the usual, zero for one that has no part.
     pub(super) fn new(dt: f64, ratio: f64, weight: &[f64]) -> Self {
-        let [q11, q12, q22] = [ratio * dt.powi(3) / 3.0, ratio * dt * dt / 2.0, ratio * dt];
-        let mut p = [BEFORE, 0.0, BEFORE];
-        let mut gains = Vec::with_capacity(weight.len());
+        let power = |n: usize| (0..n).fold(1.0, |x, _| x * dt);
+        let transition: Matrix<N> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                if j < i {
+                    0.0
+                } else {
+                    power(j - i) / factorial(j - i)
+                }
+            })
+        });
+        let walk: Matrix<N> = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let (a, b) = (N - 1 - i, N - 1 - j);
+                ratio * power(a + b + 1) / ((a + b + 1) as f64 * factorial(a) * factorial(b))
+            })
+        });
+        let back = transposed(&transition);
+        let mut p: Matrix<N> =
+            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { BEFORE } else { 0.0 }));
+        let mut gains: Vec<Gain<N>> = Vec::with_capacity(weight.len());
         let mut predicted = Vec::with_capacity(weight.len());
         let mut settled = false;
         let mut last_weight = f64::NAN;
@@ -50,113 +96,150 @@ impl Filter {
                 gains.push(gains[gains.len() - 1]);
                 continue;
             }
-            let gain = if w > 0.0 {
-                let innovation = p[0] + 1.0 / w;
-                Gain {
-                    level: p[0] / innovation,
-                    slope: p[1] / innovation,
-                    innovation,
-                }
-            } else {
-                Gain {
-                    level: 0.0,
-                    slope: 0.0,
-                    innovation: f64::INFINITY,
-                }
+            let innovation = if w > 0.0 { p[0][0] + 1.0 / w } else { f64::INFINITY };
+            let gain = Gain {
+                state: std::array::from_fn(|i| p[i][0] / innovation),
+                innovation,
             };
-            let updated = [
-                p[0] * (1.0 - gain.level),
-                p[1] * (1.0 - gain.level),
-                p[2] - gain.slope * p[1],
-            ];
-            let next = [
-                updated[0] + 2.0 * dt * updated[1] + dt * dt * updated[2] + q11,
-                updated[1] + dt * updated[2] + q12,
-                updated[2] + q22,
-            ];
-            settled = w > 0.0 && (0..3).all(|i| (next[i] - p[i]).abs() <= SETTLED * p[i].abs());
+            let updated: Matrix<N> =
+                std::array::from_fn(|i| std::array::from_fn(|j| p[i][j] - gain.state[i] * p[0][j]));
+            let moved = times(&times(&transition, &updated), &back);
+            let next: Matrix<N> = std::array::from_fn(|i| {
+                std::array::from_fn(|j| 0.5 * (moved[i][j] + moved[j][i]) + walk[i][j])
+            });
+            settled = w > 0.0 && (0..N).all(|i| (next[i][i] - p[i][i]).abs() <= SETTLED * p[i][i].abs());
             p = next;
             gains.push(gain);
         }
-        Self { dt, gains, predicted }
+        Self {
+            transition,
+            gains,
+            predicted,
+        }
     }
 
-    /// Innovations of `u` over their standard deviation, zero where a sample has no part.
-    pub(super) fn whitened(&self, u: &[f64]) -> Vec<f64> {
-        let (mut level, mut slope) = (u[0], 0.0);
-        u.iter()
-            .zip(&self.gains)
-            .map(|(&x, gain)| {
-                if gain.innovation.is_infinite() {
-                    level += self.dt * slope;
-                    return 0.0;
+    /// Innovations of the columns of `rows` over their standard deviation, zero where a sample has no part.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "plain loops over the columns, which the compiler takes side by side"
+    )]
+    pub(super) fn whitened(&self, rows: &[Row]) -> Vec<Row> {
+        let mut state = [[0.0; COLUMNS]; N];
+        state[0] = rows[0];
+        let mut out = Vec::with_capacity(rows.len());
+        for (row, gain) in rows.iter().zip(&self.gains) {
+            let share = gain.precision().sqrt();
+            let used = if share > 0.0 { 1.0 } else { 0.0 };
+            let mut innovation = [0.0; COLUMNS];
+            for c in 0..COLUMNS {
+                innovation[c] = used * (row[c] - state[0][c]);
+            }
+            for i in 0..N {
+                for c in 0..COLUMNS {
+                    state[i][c] += gain.state[i] * innovation[c];
                 }
-                let v = x - level;
-                slope += gain.slope * v;
-                level += gain.level * v + self.dt * slope;
-                v / gain.innovation.sqrt()
-            })
-            .collect()
+            }
+            for i in 0..N {
+                for j in i + 1..N {
+                    for c in 0..COLUMNS {
+                        state[i][c] += self.transition[i][j] * state[j][c];
+                    }
+                }
+            }
+            out.push(innovation.map(|v| v * share));
+        }
+        out
     }
 
-    /// Sum of the logarithms of the innovation variances over the samples that count, and their number; the first
-    /// two, from which the state is found, do not.
-    pub(super) fn log_determinant(&self) -> (f64, usize) {
+    /// Sum of the logarithms of the innovation variances over the samples that count, and their number; the first `N`, from
+    /// which the state is found, do not.
+    fn log_determinant(&self) -> (f64, usize) {
         self.gains
             .iter()
             .filter(|g| g.innovation.is_finite())
-            .skip(2)
+            .skip(N)
             .fold((0.0, 0), |(sum, n), g| (sum + g.innovation.ln(), n + 1))
     }
 
-    /// The course under `u` from the whole record, and its variance in units of the noise variance.
-    pub(super) fn smoothed(&self, u: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let n = u.len();
-        let (mut level, mut slope) = (u[0], 0.0);
-        let mut states = Vec::with_capacity(n);
-        let mut innovations = Vec::with_capacity(n);
-        for (&x, gain) in u.iter().zip(&self.gains) {
-            states.push((level, slope));
-            let v = if gain.innovation.is_finite() {
-                x - level
-            } else {
-                0.0
-            };
-            innovations.push(v);
-            slope += gain.slope * v;
-            level += gain.level * v + self.dt * slope;
+    /// The course under each column of `rows`, from the whole record.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "plain loops over the columns, which the compiler takes side by side"
+    )]
+    pub(super) fn smoothed(&self, rows: &[Row]) -> Vec<Row> {
+        let mut state = [[0.0; COLUMNS]; N];
+        state[0] = rows[0];
+        let mut out = Vec::with_capacity(rows.len());
+        let mut innovations = Vec::with_capacity(rows.len());
+        let mut states = Vec::with_capacity(rows.len());
+        for (row, gain) in rows.iter().zip(&self.gains) {
+            let used = if gain.innovation.is_finite() { 1.0 } else { 0.0 };
+            let mut innovation = [0.0; COLUMNS];
+            for c in 0..COLUMNS {
+                innovation[c] = used * (row[c] - state[0][c]);
+            }
+            states.push(state[0]);
+            innovations.push(innovation);
+            for i in 0..N {
+                for c in 0..COLUMNS {
+                    state[i][c] += gain.state[i] * innovation[c];
+                }
+                for j in i + 1..N {
+                    for c in 0..COLUMNS {
+                        state[i][c] += self.transition[i][j] * (state[j][c] + gain.state[j] * innovation[c]);
+                    }
+                }
+            }
         }
-        // r and N of the backward recursion.
-        let (mut r, mut big_n) = ([0.0, 0.0], [0.0, 0.0, 0.0]);
-        let mut course = vec![0.0; n];
-        let mut variance = vec![0.0; n];
-        for k in (0..n).rev() {
-            let (gain, p) = (self.gains[k], self.predicted[k]);
-            // r_{k-1} = z v/F + L' r_k with L = T - T K z, T = [1 dt; 0 1].
-            let (kl, ks) = (gain.level + self.dt * gain.slope, gain.slope);
-            let (l11, l12, l21, l22) = (1.0 - kl, self.dt, -ks, 1.0);
-            let inverse = if gain.innovation.is_finite() {
-                1.0 / gain.innovation
-            } else {
-                0.0
-            };
-            r = [
-                inverse * innovations[k] + l11 * r[0] + l21 * r[1],
-                l12 * r[0] + l22 * r[1],
-            ];
-            let [a, b, c] = big_n;
-            let (x1, x2) = (a * l11 + b * l21, b * l11 + c * l21);
-            let (y1, y2) = (a * l12 + b * l22, b * l12 + c * l22);
-            big_n = [
-                inverse + l11 * x1 + l21 * x2,
-                l11 * y1 + l21 * y2,
-                l12 * y1 + l22 * y2,
-            ];
-            course[k] = states[k].0 + p[0] * r[0] + p[1] * r[1];
-            let along = p[0] * p[0] * big_n[0] + 2.0 * p[0] * p[1] * big_n[1] + p[1] * p[1] * big_n[2];
-            variance[k] = (p[0] - along).max(0.0);
+        // r of the backward recursion: r_{k-1} = z v/F + L' r_k with L = T (1 - K z').
+        let mut r = [[0.0; COLUMNS]; N];
+        for k in (0..rows.len()).rev() {
+            let (gain, p) = (&self.gains[k], &self.predicted[k]);
+            let mut moved = [[0.0; COLUMNS]; N];
+            for j in 0..N {
+                for i in 0..=j {
+                    for c in 0..COLUMNS {
+                        moved[j][c] += self.transition[i][j] * r[i][c];
+                    }
+                }
+            }
+            let precision = gain.precision();
+            for c in 0..COLUMNS {
+                let mut taken = 0.0;
+                for i in 0..N {
+                    taken += gain.state[i] * moved[i][c];
+                }
+                moved[0][c] += precision * innovations[k][c] - taken;
+            }
+            r = moved;
+            let mut course = states[k];
+            for i in 0..N {
+                for c in 0..COLUMNS {
+                    course[c] += p[0][i] * r[i][c];
+                }
+            }
+            out.push(course);
         }
-        (course, variance)
+        out.reverse();
+        out
+    }
+
+    /// The variance of the course's error in units of the noise variance.
+    pub(super) fn variances(&self) -> Vec<f64> {
+        let mut big_n = [[0.0; N]; N];
+        let mut out = vec![0.0; self.gains.len()];
+        for (k, (gain, p)) in self.gains.iter().zip(&self.predicted).enumerate().rev() {
+            let mut through = self.transition;
+            for row in &mut through {
+                let taken: f64 = row.iter().zip(&gain.state).map(|(t, g)| t * g).sum();
+                row[0] -= taken;
+            }
+            big_n = times(&transposed(&through), &times(&big_n, &through));
+            big_n[0][0] += gain.precision();
+            let along = |m: &[f64; N]| -> f64 { m.iter().zip(&p[0]).map(|(a, b)| a * b).sum() };
+            out[k] = (p[0][0] - along(&std::array::from_fn(|i| along(&big_n[i])))).max(0.0);
+        }
+        out
     }
 }
 
@@ -166,59 +249,74 @@ pub(super) struct Likelihood {
     pub deviance: f64,
     pub noise_variance: f64,
     pub weights: DVector<f64>,
+    /// Covariance of the weights' errors.
+    pub covariance: DMatrix<f64>,
     /// Standardised innovations.
     pub innovations: Vec<f64>,
 }
 
-/// Likelihood of `signal` on `regressors` under `filter`, at the best noise variance that is not below `floor`'s square.
-pub(super) fn likelihood(filter: &Filter, signal: &[f64], regressors: &[Vec<f64>], floor: f64) -> Likelihood {
-    let mut left = filter.whitened(signal);
-    let columns: Vec<Vec<f64>> = regressors.iter().map(|x| filter.whitened(x)).collect();
-    let m = columns.len();
+/// Likelihood of the signal, the first column of `rows`, on the `regressors` behind it under `filter`, at the best noise
+/// variance that is not below `floor`'s square.
+pub(super) fn likelihood<const N: usize>(
+    filter: &Filter<N>,
+    rows: &[Row],
+    regressors: usize,
+    floor: f64,
+) -> Likelihood {
+    let whitened = filter.whitened(rows);
+    let m = regressors;
     // The first samples find the state; what they leave over says nothing.
     let first = filter
         .gains
         .iter()
         .enumerate()
         .filter(|(_, g)| g.innovation.is_finite())
-        .nth(2)
-        .map_or(signal.len(), |(k, _)| k);
-    let dot = |a: &[f64], b: &[f64]| -> f64 { a[first..].iter().zip(&b[first..]).map(|(x, y)| x * y).sum() };
+        .nth(N)
+        .map_or(rows.len(), |(k, _)| k);
+    let mut products = [[0.0; COLUMNS]; COLUMNS];
+    for row in &whitened[first..] {
+        for i in 0..COLUMNS {
+            for j in 0..COLUMNS {
+                products[i][j] += row[i] * row[j];
+            }
+        }
+    }
     let mut weights = DVector::zeros(m);
+    let mut covariance = DMatrix::zeros(m, m);
     if m > 0 {
-        let scale: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
+        let scale: Vec<f64> = (1..=m).map(|i| products[i][i].sqrt().max(1e-300)).collect();
         let gram = DMatrix::from_fn(m, m, |i, j| {
             let ridge = if i == j { 1e-9 } else { 0.0 };
-            dot(&columns[i], &columns[j]) / (scale[i] * scale[j]) + ridge
+            products[i + 1][j + 1] / (scale[i] * scale[j]) + ridge
         });
-        let right = DVector::from_fn(m, |i, _| dot(&columns[i], &left) / scale[i]);
+        let right = DVector::from_fn(m, |i, _| products[i + 1][0] / scale[i]);
         if let Some(c) = gram.cholesky() {
             weights = c.solve(&right);
-            for (w, s) in weights.iter_mut().zip(&scale) {
-                *w /= s;
-            }
-        }
-        for (column, w) in columns.iter().zip(weights.iter()) {
-            for (l, x) in left.iter_mut().zip(column) {
-                *l -= w * x;
+            covariance = c.inverse();
+            for i in 0..m {
+                weights[i] /= scale[i];
+                for j in 0..m {
+                    covariance[(i, j)] /= scale[i] * scale[j];
+                }
             }
         }
     }
+    let mut left: Vec<f64> = whitened
+        .iter()
+        .map(|row| row[0] - weights.iter().zip(&row[1..]).map(|(w, x)| w * x).sum::<f64>())
+        .collect();
     let (log_determinant, count) = filter.log_determinant();
     let n = count.max(1) as f64;
-    let squares = dot(&left, &left) / n;
+    let squares = left[first..].iter().map(|l| l * l).sum::<f64>() / n;
     let noise_variance = squares.max(floor * floor).max(f64::MIN_POSITIVE);
     let sd = noise_variance.sqrt();
-    for l in &mut left[first..] {
-        *l /= sd;
-    }
-    for l in &mut left[..first] {
-        *l = 0.0;
-    }
+    left[..first].fill(0.0);
+    left[first..].iter_mut().for_each(|l| *l /= sd);
     Likelihood {
         deviance: n * (noise_variance.ln() + squares / noise_variance) + log_determinant,
         noise_variance,
         weights,
+        covariance: covariance * noise_variance,
         innovations: left,
     }
 }

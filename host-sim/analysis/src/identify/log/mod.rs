@@ -80,7 +80,7 @@ pub struct DriveLog {
 }
 
 /// The column of a time series that tells the speed; a log may lack it.
-pub(super) const SPEED_COLUMN: &str = "speed_m_per_s";
+pub const SPEED_COLUMN: &str = "speed_m_per_s";
 /// The largest speed over the least that passes for one speed.
 const ONE_SPEED: f64 = 1.06;
 

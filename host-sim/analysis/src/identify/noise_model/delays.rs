@@ -142,7 +142,7 @@ impl<'a> Delays<'a> {
             out.scale = out.loss.max(least);
             let mut point = p.clone();
             point[T_P] = *t_p;
-            problem.with_prior(&point, out)
+            problem.with_prior(&point, out).0
         };
         all.into_iter().zip(t_p_s).map(finished).collect()
     }

@@ -204,11 +204,13 @@ impl Problem<'_> {
     }
 
     /// Widens the standard errors by what is not known of t_nms, and says where the record draws the parameters by it: t_nms
-    /// is that of drivers' arms, about what is assumed, and what the record says of it; to first order.
+    /// is that of drivers' arms, about what is assumed, and what the record says of it; to first order. What the record says
+    /// has the covariance `drawn_with` with the estimates.
     pub(super) fn widen_by_t_nms(
         &self,
         errors: &mut DMatrix<f64>,
         alternatives: &[Alternative],
+        drawn_with: Option<&DVector<f64>>,
     ) -> DVector<f64> {
         let mut drawn = DVector::zeros(errors.nrows());
         let Some(a) = alternatives.iter().find(|a| a.place == T_NMS) else {
@@ -216,11 +218,14 @@ impl Problem<'_> {
         };
         let (known, seen) = (T_NMS_SD_S.powi(2), a.error.powi(2));
         let variance = known * seen / (known + seen);
-        let step = a.step * known / (known + seen);
+        let share = known / (known + seen);
+        let step = a.step * share;
+        let with = |i: usize| drawn_with.map_or(0.0, |c| share * c[i]);
         for i in (0..=T_P).filter(|&i| self.is_free(i)) {
             drawn[i] = a.slopes[i] * step;
             for j in (0..=T_P).filter(|&j| self.is_free(j)) {
-                errors[(i, j)] += variance * a.slopes[i] * a.slopes[j];
+                errors[(i, j)] +=
+                    variance * a.slopes[i] * a.slopes[j] + with(i) * a.slopes[j] + with(j) * a.slopes[i];
             }
         }
         drawn

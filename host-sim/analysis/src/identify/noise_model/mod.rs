@@ -20,6 +20,7 @@
 //! ended ([`report`]).
 
 mod delays;
+mod doubts;
 mod evidence;
 mod finite;
 mod information;
@@ -249,16 +250,23 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The loss with what is known of t_nms beside the record, where it is estimated although nobody asked for it.
-    fn with_prior(&self, p: &[f64], mut quadratic: Quadratic) -> Quadratic {
-        // As so much more of a likelihood whose variance is the loss's own: L (1 + d^2/rows), d in standard deviations.
+    /// The loss with what is known of t_nms beside the record, where it is estimated although nobody asked for it; and how far
+    /// t_nms is from what is assumed, in standard deviations.
+    fn with_prior(&self, p: &[f64], mut quadratic: Quadratic) -> (Quadratic, f64) {
+        // As so much more of a likelihood whose variance is the loss's own: L (1 + d^2/rows).
+        let d = self
+            .t_nms_prior_s
+            .map_or(0.0, |sd| (p[T_NMS] - self.assumed_t_nms_s) / sd);
+        quadratic.loss *= 1.0 + d * d / self.row_count().max(1) as f64;
+        (quadratic, d)
+    }
+
+    /// The same with the derivatives by t_nms: only for sums that have those of the record too.
+    fn with_prior_by_t_nms(&self, p: &[f64], quadratic: Quadratic) -> Quadratic {
+        let loss = quadratic.loss;
+        let (mut quadratic, d) = self.with_prior(p, quadratic);
         if let Some(sd) = self.t_nms_prior_s {
-            let (rows, d) = (
-                self.row_count().max(1) as f64,
-                (p[T_NMS] - self.assumed_t_nms_s) / sd,
-            );
-            let (loss, more) = (quadratic.loss, 1.0 + d * d / rows);
-            quadratic.loss *= more;
+            let rows = self.row_count().max(1) as f64;
             quadratic.gradient[T_NMS] += loss * 2.0 * d / (rows * sd);
             quadratic.hessian[(T_NMS, T_NMS)] += loss * 2.0 / (rows * sd * sd);
         }

@@ -55,7 +55,8 @@ impl Problem<'_> {
         // The corner that the restricted likelihood gave was estimated too.
         let corner = (self.corner_restricted).then_some(RHO);
         let estimated: Vec<usize> = free.iter().copied().chain(corner).collect();
-        let mut errors = covariance(&optimum.quadratic.hessian, &estimated) * error_variance;
+        let inverse = covariance(&optimum.quadratic.hessian, &estimated);
+        let mut errors = &inverse * error_variance;
         let delay_profile = self.profile(
             p,
             optimum.quadratic.loss,
@@ -76,7 +77,12 @@ impl Problem<'_> {
             .copied()
             .filter(|&i| i >= COUNT || !self.bounds[i].touches(p[i]))
             .collect();
-        let alternatives = self.alternatives(p, &core, error_variance);
+        let doubted = self.doubted(&prepared.lane_doubts, p, &kept, &inverse);
+        let mut alternatives = self.alternatives(p, &core, error_variance);
+        let drawn_with = alternatives
+            .iter_mut()
+            .find(|a| a.place == T_NMS)
+            .map(|a| doubted.widen(a, error_variance));
         // What else may be estimated (the muscle, delays of sensors, the share of white noise) counts as known there.
         let within: Vec<usize> = core
             .iter()
@@ -86,10 +92,11 @@ impl Problem<'_> {
             .collect();
         let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian, &kept);
         let trim = self.trim(optimum, &free, &errors, error_variance);
+        errors += doubted.covariance(self.size());
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
         if !options.t_nms_known && !self.is_free(T_NMS) {
             at_t_nms = Some(self.at_t_nms(&unbiased, &errors, &trim.pull));
-            drawn = self.widen_by_t_nms(&mut errors, &alternatives);
+            drawn = self.widen_by_t_nms(&mut errors, &alternatives, drawn_with.as_ref());
         }
         let parameter = |i: usize| {
             if !self.is_free(i) {

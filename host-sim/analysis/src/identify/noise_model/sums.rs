@@ -62,7 +62,7 @@ impl Problem<'_> {
             };
             sums.add(stretch, &gram, LIGHT_CONSTANT, &of_errors);
         }
-        self.with_prior(p, sums.quadratic)
+        self.with_prior(p, sums.quadratic).0
     }
 
     /// Loss, and its derivatives by the parameters of [`CORE`] and the constants, at `p`; those by the others are left at zero.
@@ -83,7 +83,7 @@ impl Problem<'_> {
             }
             sums.add(stretch, &gram, CORE, &of_errors);
         }
-        self.with_prior(p, sums.quadratic)
+        self.with_prior(p, sums.quadratic).0
     }
 
     /// Loss, gradient and Gauss-Newton matrix by all parameters at `p`.
@@ -106,7 +106,7 @@ impl Problem<'_> {
             }
             sums.add(stretch, &gram, COUNT, &of_errors);
         }
-        self.with_prior(p, sums.quadratic)
+        self.with_prior_by_t_nms(p, sums.quadratic)
     }
 
     /// Every row at `p`, kept.

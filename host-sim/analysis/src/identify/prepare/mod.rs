@@ -16,7 +16,7 @@ use serde::Serialize;
 pub use faults::ColumnFaults;
 pub use stretches::{LeftOut, Reason};
 
-use super::lane::{LaneNoise, smooth};
+use super::lane::{LaneDoubt, LaneNoise, Smoothed, smooth};
 use super::log::{COLUMNS, DriveLog};
 use super::options::Options;
 
@@ -112,6 +112,8 @@ pub(crate) struct Prepared {
     pub log: DriveLog,
     /// Rows that are driving, in order.
     pub stretches: Vec<Range<usize>>,
+    /// What is not known of the lane signals for the whole record.
+    pub lane_doubts: Vec<LaneDoubt>,
     pub preflight: Preflight,
 }
 
@@ -127,19 +129,9 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     ];
     let examined = [0, 1, 2, 3, 4].map(|c| faults::examine(columns[c], LEAST[c], c < 2));
     let lane = [0, 1].map(|c| {
-        if !options.lane_noise {
-            return None;
-        }
-        let floor = 0.1 * examined[c].faults.step;
-        Some(smooth(
-            &examined[c].signal,
-            &examined[2].signal,
-            dt,
-            [2, 1][c],
-            !options.plain_smoother,
-            &examined[c].weight,
-            floor,
-        ))
+        options
+            .lane_noise
+            .then(|| smoothed_lane(&examined[c], c, &examined[2].signal, dt, options))
     });
     let mut bad: Vec<Vec<bool>> = examined.iter().map(|e| e.bad.clone()).collect();
     for (c, s) in lane.iter().enumerate() {
@@ -167,19 +159,23 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         ..Preflight::default()
     };
     let [y, theta] = lane;
-    let take = |smoothed: Option<super::lane::Smoothed>, raw: Vec<f64>, noise: &mut LaneNoise| match smoothed
-    {
-        Some(s) => {
-            *noise = s.noise;
-            s.signal
-        }
-        None => raw,
+    let mut lane_doubts = Vec::new();
+    let mut take = |smoothed: Option<Smoothed>, raw: Vec<f64>, lane: usize| {
+        let Some(s) = smoothed else { return raw };
+        lane_noise[lane] = s.noise;
+        let doubt = |signal| LaneDoubt {
+            lane,
+            from: 0,
+            signal,
+        };
+        lane_doubts.extend(s.doubts.into_iter().map(doubt));
+        s.signal
     };
     let clean = DriveLog {
         start_s: log.start_s,
         dt_s: dt,
-        e_y_m: take(y, e_y.signal, &mut lane_noise[0]),
-        e_theta_rad: take(theta, e_theta.signal, &mut lane_noise[1]),
+        e_y_m: take(y, e_y.signal, 0),
+        e_theta_rad: take(theta, e_theta.signal, 1),
         wheel_angle_rad: phi.signal,
         guidance_torque_nm: t_h.signal,
         driver_torque_nm: t_d.signal,
@@ -194,6 +190,26 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     Prepared {
         log: clean,
         stretches,
+        lane_doubts,
         preflight,
     }
+}
+
+/// e_y (lane 0) or e_theta (1) without the camera's noise.
+fn smoothed_lane(
+    examined: &faults::Examined,
+    lane: usize,
+    wheel_angle: &[f64],
+    dt: f64,
+    options: &Options,
+) -> Smoothed {
+    smooth(
+        &examined.signal,
+        wheel_angle,
+        dt,
+        2 - lane,
+        !options.plain_smoother,
+        &examined.weight,
+        0.1 * examined.faults.step,
+    )
 }
