@@ -24,7 +24,7 @@ pub fn pace(applied: Torque, driver: Option<Torque>) -> u32 {
     let Some(driver) = driver else {
         return WITHOUT_COLUMN;
     };
-    let against = if applied < Torque::ZERO {
+    let against = if applied.bits().is_negative() {
         driver
     } else {
         driver.opposite()
