@@ -22,7 +22,8 @@ pub enum Class {
 
 /// Declares the faults: `code Name: class, unseen;`. The code is the fault's bit in the fault word. *Unseen*, in ms, is for
 /// how long before its declaration the fault may have been there and spoilt the torque, beside the age of its input: no
-/// handover starts from an output of that time. 0 where the age says it all, or where the torque does not depend on it.
+/// handover starts from an output of that time. 0 where the age says it all, or where the torque does not depend on it. What
+/// is longer than outputs are remembered trusts none: the handover starts from zero.
 macro_rules! faults {
     ($($(#[$doc:meta])* $code:literal $name:ident: $class:ident, $unseen_ms:literal;)*) => {
         /// A fault, by its bit in the fault word. More will come.
@@ -74,7 +75,7 @@ faults! {
     /// B: the lane preview's sender does not vouch for it.
     1 LaneInvalid: B, 0;
     /// B: the lateral error does not move as yaw error, wheel and speed say it must.
-    2 LaneImplausible: B, 2000;
+    2 LaneImplausible: B, 10_000;
     /// B: no usable driver torque and wheel angle for 30 ms.
     3 ColumnTimeout: B, 0;
     /// B: driver torque and wheel angle do not belong together.

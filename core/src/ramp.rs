@@ -2,13 +2,39 @@
 //!
 //! A sudden loss of guidance in a curve takes a relying driver 0.44 to 0.62 m off the centreline; the same
 //! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/safety.md has the
-//! table). Neither ramp ever grows.
+//! table). Where the driver pushes against the torque there is nothing left to keep, and it goes faster. Neither ramp
+//! ever grows.
 
 use crate::quantity::{Instant, Micros, Torque, TorqueRate, signed_quotient};
 use crate::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
+/// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
+const WITHOUT_COLUMN: u32 = 2;
+/// Where the driver pushes against it, it goes so many times as fast. From 5 N.m that is 7.5 N.m/s: the largest whole
+/// number that keeps the reduction limit.
+const OPPOSED: u32 = 3;
+/// From here on the driver pushes against it: the largest offset of an ordinary torque sensor.
+const OPPOSES: Torque = Torque::from_nm(0.1);
+
+/// How many times as fast a handover goes beside a driver torque, `None` without a good one.
+#[must_use]
+pub fn pace(applied: Torque, driver: Option<Torque>) -> u32 {
+    let Some(driver) = driver else {
+        return WITHOUT_COLUMN;
+    };
+    let against = if applied.bits().is_negative() {
+        driver
+    } else {
+        driver.opposite()
+    };
+    if applied != Torque::ZERO && against > OPPOSES {
+        OPPOSED
+    } else {
+        1
+    }
+}
 
 words! {
     /// A straight line from a torque to zero.

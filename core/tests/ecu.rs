@@ -192,6 +192,56 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() 
     }
 }
 
+/// What a lie about the lane made may have the wrong sign, and nobody knows since when.
+#[test]
+fn a_handover_after_an_implausible_lane_starts_from_zero() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::active_in_curve(sign);
+        rig.run(3000);
+        // To the side at 0.09 rad without getting there.
+        rig.lane.e_theta = Radians::from_rad(rig.lane.e_theta.rad() + sign * 0.09);
+        let (_, step) = rig.run_until(1000, |step| step.command.mode == Mode::Handover);
+        assert!(step.command.faults.contains(Fault::LaneImplausible));
+        let mut last = rig.applied;
+        assert!(sign * last > 0.9, "{last}");
+        // The reduction limit brings it down at 8 mN.m per step.
+        while last.abs() > 0.008 {
+            let next = rig.tick().command.torque.nm();
+            assert!(
+                (sign * (last - next) - 0.008).abs() <= BUS_LSB,
+                "{last} to {next}"
+            );
+            last = next;
+        }
+        assert_eq!(rig.tick().command.torque, Torque::ZERO);
+        assert_eq!(rig.tick().command.mode, Mode::Handover);
+    }
+}
+
+/// 1.5 N.m in 2 s are 0.75 mN.m in a step. Where the driver pushes against them it is 2.25.
+#[test]
+fn a_handover_goes_faster_while_the_driver_pushes_against_it_and_no_longer() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::active_in_curve(sign * 1.5);
+        let start = rig.applied.abs();
+        rig.silent[LANE] = true;
+        rig.run_until(60, |step| step.command.mode == Mode::Handover);
+        for (driver, times) in [(-0.09, 1.0), (-0.11, 3.0), (0.11, 1.0), (-0.3, 3.0), (0.0, 1.0)] {
+            rig.driver = Some(sign * driver);
+            // Until the next column frame has come.
+            rig.run(4);
+            let before = rig.applied;
+            rig.run(50);
+            let fallen = sign * (before - rig.applied);
+            let expected = times * 50.0 * start / 2000.0;
+            assert!(
+                (fallen - expected).abs() <= 2.0 * BUS_LSB,
+                "{driver}: {fallen}, not {expected}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_silence_of_20_ms_is_no_fault() {
     for sender in [LANE, COLUMN, VEHICLE, DEMAND] {

@@ -1,7 +1,7 @@
 //! The ways to zero against hand values: linear, never growing, started from what can be trusted.
 
 use haptic_core::quantity::{Instant, Micros, Torque, TorqueRate};
-use haptic_core::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
+use haptic_core::ramp::{HANDOVER, History, Ramp, pace, smaller_of_same_sign};
 
 /// The resolution of a torque, N.m.
 const LSB: f64 = 1.0 / 16_777_216.0;
@@ -134,4 +134,39 @@ fn a_handover_starts_at_the_lesser_of_trusted_and_applied() {
     assert_eq!(start(0.4), trusted);
     assert_eq!(start(0.1), nm(0.1));
     assert_eq!(start(-0.4), Torque::ZERO);
+}
+
+#[test]
+fn a_handover_goes_three_times_as_fast_while_the_driver_pushes_against_it() {
+    for (applied, driver, expected) in [
+        // From 0.1 N.m on, to both sides.
+        (1.0, -0.101, 3),
+        (1.0, -0.1, 1),
+        (-1.0, 0.101, 3),
+        (-1.0, 0.1, 1),
+        // However small the torque is, and however large the push.
+        (LSB, -5.0, 3),
+        (-LSB, 5.0, 3),
+        // A driver who helps.
+        (1.0, 0.101, 1),
+        (-1.0, -0.101, 1),
+        (1.0, 5.0, 1),
+        (1.0, 0.0, 1),
+        // Nothing to push against.
+        (0.0, 5.0, 1),
+        (0.0, -5.0, 1),
+    ] {
+        assert_eq!(
+            pace(nm(applied), Some(nm(driver))),
+            expected,
+            "{applied} {driver}"
+        );
+    }
+}
+
+#[test]
+fn a_handover_goes_twice_as_fast_without_a_driver_torque() {
+    for applied in [-1.0, 0.0, 1.0] {
+        assert_eq!(pace(nm(applied), None), 2);
+    }
 }

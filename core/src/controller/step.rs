@@ -14,10 +14,8 @@ use crate::probe::ProbeState;
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
-use crate::ramp::{HANDOVER, History, Ramp, smaller_of_same_sign};
+use crate::ramp::{HANDOVER, History, Ramp, pace, smaller_of_same_sign};
 
-/// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
-const WITHOUT_COLUMN: u32 = 2;
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
 /// A step that comes later than this after the last one missed its deadline.
@@ -376,8 +374,9 @@ impl<I: Injection> Step<'_, I> {
             Mode::Fade | Mode::Handover => {
                 let blind =
                     faults.contains(Fault::ColumnTimeout) || faults.contains(Fault::ColumnImplausible);
-                let pace = if mode == Mode::Handover && blind {
-                    WITHOUT_COLUMN
+                let column = self.inputs.column.value().filter(|_| !blind);
+                let pace = if mode == Mode::Handover {
+                    pace(self.applied, column.map(|c| c.driver_torque))
                 } else {
                     1
                 };

@@ -69,6 +69,8 @@ pub struct CaseResult {
     pub excess_m: Option<f64>,
     /// Runs in which the vehicle left its lane and the fault-free one did not.
     pub left_lane: u64,
+    /// Runs in which it went more than a lane's width aside with the torque dropped as well; these are not judged by it.
+    pub off_road: u64,
     /// What failed, by seed.
     pub failures: Vec<FailedTrial>,
 }
@@ -180,6 +182,7 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
         dropped_m: most(|o| o.deviation.dropped_m),
         excess_m: most(|o| o.deviation.excess_m()),
         left_lane: outcomes.iter().filter(|o| o.deviation.leaves_lane).count() as u64,
+        off_road: outcomes.iter().filter(|o| o.deviation.is_off_road()).count() as u64,
         failures: failures.collect(),
     }
 }
@@ -187,7 +190,7 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
 /// What is wrong with where a vehicle went, if anything is.
 fn too_far(deviation: &Deviation) -> Option<String> {
     let (excess_m, dropped_m) = (deviation.excess_m()?, deviation.dropped_m?);
-    (excess_m > MOST_EXCESS_M).then(|| {
+    (excess_m > MOST_EXCESS_M && !deviation.is_off_road()).then(|| {
         format!(
             "the vehicle went {:.2} m aside, {dropped_m:.2} m had the torque been dropped",
             deviation.faulted_m

@@ -16,7 +16,7 @@
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
 //! | engaging | into Active only from 500 ms of Standby and by a request that rose |
 //! | inputs | no input older than 30 ms in Active, no picture of a late camera older than 350 ms |
-//! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s |
+//! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s; the line goes three times as fast while the driver opposes, twice without a column, and starts from zero after an implausible lane |
 //! | fade | never grows, falls by 4 N.m/s |
 //! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked |
 
@@ -44,6 +44,13 @@ const LATE_CAMERA_US: u32 = 350_000;
 const READY_US: u32 = 500_000;
 const FADE_NM_PER_S: f64 = 4.0;
 const HANDOVER_S: f64 = 2.0;
+/// How many times as fast a handover goes that the driver opposes, from what torque on, and without a column.
+const OPPOSED: f64 = 3.0;
+const OPPOSES_NM: f64 = 0.1;
+const BLIND: f64 = 2.0;
+/// Bits of a column that is lost or implausible, and of an implausible lane.
+const COLUMN_FAULTS: u64 = 1 << 3 | 1 << 4;
+const LANE_IMPLAUSIBLE: u64 = 1 << 2;
 /// Most time that one cycle may use of a rate.
 const MOST_S: f64 = 0.002;
 /// One LSB of the torque on the bus: a torque is rounded, the bounds are not.
@@ -52,7 +59,7 @@ const LSB_NM: f64 = 1.0 / 4096.0;
 const TINY_NM: f64 = 1e-6;
 
 /// Bits of the faults of implausible inputs, with the time before which an output is trusted, us.
-const UNSEEN_US: [(u64, u32); 3] = [(1 << 2, 2_000_000), (1 << 4, 1_500_000), (1 << 6, 500_000)];
+const UNSEEN_US: [(u64, u32); 2] = [(1 << 4, 1_500_000), (1 << 6, 500_000)];
 /// What lies between two outputs that the ECU remembers, us, and to spare; and the most that the probe may have taken away.
 const APART_US: u32 = 60_000;
 const PROBE_NM: f64 = 0.2;
@@ -76,11 +83,11 @@ struct Last {
     at_us: u32,
 }
 
-/// Start of a fade or a handover: its largest torque, and when.
+/// Start of a fade or a handover: its largest torque, and how far along it is.
 #[derive(Debug, Clone, Copy)]
 struct Ramp {
     from_nm: f64,
-    at_us: u32,
+    passed_s: f64,
 }
 
 /// Judges one ECU.
@@ -121,7 +128,7 @@ impl InvariantChecker {
             standby_since_us: now_us,
             ramp: Ramp {
                 from_nm: 0.0,
-                at_us: now_us,
+                passed_s: 0.0,
             },
             window: VecDeque::new(),
             outputs: VecDeque::new(),
@@ -185,6 +192,10 @@ impl InvariantChecker {
     /// The largest torque that a handover may start from, beside the last one.
     fn trusted_nm(&self, status: &Status, now_us: u32) -> f64 {
         let age_us = |at_us: u32| now_us.wrapping_sub(at_us);
+        // Nobody knows since when it lied.
+        if status.mode == HANDOVER && status.faults & LANE_IMPLAUSIBLE != 0 {
+            return 0.0;
+        }
         let present = UNSEEN_US.iter().filter(|(fault, _)| status.faults & fault != 0);
         let unseen_us = present.map(|(_, us)| *us).max();
         let Some(unseen_us) = unseen_us.filter(|_| status.mode == HANDOVER) else {
@@ -338,22 +349,30 @@ impl InvariantChecker {
         if status.mode != old_mode {
             self.ramp = Ramp {
                 from_nm: old_nm.abs().min(self.trusted_nm(status, now_us)),
-                // The ramp has moved for one cycle already when it is first seen.
-                at_us: self.last.map_or(now_us, |last| last.at_us),
+                passed_s: 0.0,
             };
         }
+        let elapsed_s = f64::from(self.last.map_or(0, |last| now_us.wrapping_sub(last.at_us))) * 1e-6;
+        // The ramp has moved for one cycle already when it is first seen.
+        self.ramp.passed_s += elapsed_s
+            * match status.mode {
+                HANDOVER if status.faults & COLUMN_FAULTS != 0 => BLIND,
+                HANDOVER if -self.driver_nm * old_nm.signum() > OPPOSES_NM && old_nm != 0.0 => OPPOSED,
+                _ => 1.0,
+            };
         let (torque, old) = (status.torque_nm, old_nm);
         if torque.abs() > old.abs() || torque * old < 0.0 {
             return Err(format!("mode {}: T from {old} to {torque} N.m", status.mode));
         }
-        let passed_s = f64::from(now_us.wrapping_sub(self.ramp.at_us)) * 1e-6;
-        let start = self.ramp.from_nm;
+        let Ramp {
+            from_nm: start,
+            passed_s,
+        } = self.ramp;
         let line = if status.mode == HANDOVER {
             start * (1.0 - passed_s / HANDOVER_S)
         } else {
             start - FADE_NM_PER_S * passed_s
         };
-        let elapsed_s = f64::from(self.last.map_or(0, |last| now_us.wrapping_sub(last.at_us))) * 1e-6;
         // A reduction that is rounded away from zero, and the way to the line at 8 N.m/s.
         let falling = old.abs() - REDUCTION_NM_PER_S * elapsed_s.min(MOST_S);
         if torque.abs() > line.max(0.0).max(falling) + LSB_NM + TINY_NM {

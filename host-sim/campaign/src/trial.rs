@@ -53,6 +53,9 @@ const BEHIND_MS: u32 = 2500;
 const NOTICES_MS: u32 = 1000;
 /// Most that a handover may move the vehicle beyond what dropping the torque in the same step does, m.
 pub(crate) const MOST_EXCESS_M: f64 = 0.1;
+/// Who goes further aside than a lane is wide without any torque is thrown off the road whatever the ECU does: metres
+/// beyond that say nothing of a handover, and are not judged.
+const OFF_ROAD_M: f64 = 3.6;
 /// From the middle of a lane of 3.6 m to where a vehicle of 1.7 m begins to leave it, m.
 const LANE_EDGE_M: f64 = 0.95;
 
@@ -163,6 +166,11 @@ impl Deviation {
     /// How much further the vehicle went than it would have if the torque had been dropped, m.
     pub fn excess_m(&self) -> Option<f64> {
         self.dropped_m.map(|dropped_m| self.faulted_m - dropped_m)
+    }
+
+    /// Whether the vehicle leaves the road with the torque dropped as well: then no handover is judged.
+    pub fn is_off_road(&self) -> bool {
+        self.dropped_m.is_some_and(|dropped_m| dropped_m > OFF_ROAD_M)
     }
 }
 

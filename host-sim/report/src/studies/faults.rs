@@ -21,7 +21,8 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
     write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
     let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
                    they must keep. A fault without a mark on the left has no deadline. The deviation is that from the \
-                   fault-free run, beside what it is if the torque is dropped in the step in which the ECU leaves."
+                   fault-free run, beside what it is if the torque is dropped in the step in which the ECU leaves. Off road: runs \
+                   that go more than 3.6 m aside with the torque dropped as well, whose excess is not judged."
         .into();
     let mut blocks = vec![Block::Figure { figure, caption }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
@@ -96,6 +97,7 @@ pub fn table(campaign: &Campaign) -> Table {
             metres(row.dropped_m),
             metres(row.excess_m),
             count(row.left_lane),
+            count(row.off_road),
             Cell::Text(verdict),
         ]
     };
@@ -117,6 +119,7 @@ pub fn table(campaign: &Campaign) -> Table {
             "Dropped (m)",
             "Excess (m)",
             "Left lane",
+            "Off road",
             "Verdict",
         ]
         .map(String::from)

@@ -42,6 +42,8 @@ const LARGEST_DRIVER_NM: f64 = 10.0;
 /// Between a loss of the lane preview and its time-out, ms; then the handover.
 pub(super) const TIMEOUT_MS: u32 = 31;
 const HANDOVER_MS: i32 = 2000;
+/// A driver torque that pushes against the handover, 0.1 N.m.
+const OPPOSES: i32 = 1_677_722;
 /// Torques kept for a handover, one every 5 ms.
 const PAST: usize = 16;
 /// The ECUs.
@@ -353,7 +355,10 @@ impl<const N: usize> Ecus<N> {
                 (self.mode[l], self.matters[l]) = (OFF, 0);
                 continue;
             }
-            self.ramp_done[l] += 1;
+            // Where the driver pushes against it, three times as fast.
+            let (applied, driver) = (self.applied[l], self.driver[l]);
+            let is_opposed = ((applied > 0) & (driver < -OPPOSES)) | ((applied < 0) & (driver > OPPOSES));
+            self.ramp_done[l] += if is_opposed { 3 } else { 1 };
             let left = i64::from(HANDOVER_MS - self.ramp_done[l]).max(0) * 1000;
             let torque = i64::from(self.ramp_from[l]) * left / i64::from(HANDOVER_MS * 1000);
             *wanted = smaller_of_same_sign(torque as i32, self.applied[l]);
