@@ -520,6 +520,30 @@ mod tests {
         }
     }
 
+    /// 0.125 kg.m2 at 2 rad/s are 0.25 N.m.s beside the margin of 0.6, in the wheel's direction. A check takes 3 mN.m.s away.
+    #[test]
+    fn the_column_check_allows_the_momentum_of_the_wheel_and_no_more() {
+        let judged = |sum_nm_s: f64, rad_per_s: f64| {
+            let mut state = PlausibilityState::NEW;
+            CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
+            (state.column.is_known, state.column.at) = (1, Instant::from_us(0));
+            state.column.sum = AngularImpulse::from_nm_s(sum_nm_s);
+            let wheel = Radians::from_rad(2e-3 * rad_per_s);
+            CHECKS.column(
+                &mut state,
+                Instant::from_us(2000),
+                Torque::ZERO,
+                wheel,
+                Torque::ZERO,
+            )
+        };
+        for sign in [1.0, -1.0] {
+            assert!(judged(sign * 0.59, 0.0) && !judged(sign * 0.61, 0.0));
+            assert!(judged(sign * 0.84, sign * 2.0) && !judged(sign * 0.86, sign * 2.0));
+            assert!(!judged(sign * 0.61, sign * -2.0));
+        }
+    }
+
     /// At its margin a movement may be missing, and half of it has to be predicted; a count further it is not honest.
     #[test]
     fn the_lane_check_keeps_its_margins_to_the_count() {

@@ -17,7 +17,10 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ("modes.rs", &["modes"]),
     ("bus/e2e.rs", &["e2e", "edges", "dbc"]),
     ("monitor.rs", &["monitor", "probe"]),
-    ("plausibility.rs", &["plausibility", "road", "edges", "ecu"]),
+    (
+        "plausibility.rs",
+        &["plausibility", "column", "road", "edges", "ecu"],
+    ),
     (
         "controller.rs",
         &["ecu", "probe", "edges", "endurance", "memory", "road"],
