@@ -242,6 +242,28 @@ fn a_handover_goes_faster_while_the_driver_pushes_against_it_and_no_longer() {
     }
 }
 
+/// 2 s from there, twice as fast: nobody knows what the driver does, whatever the column says.
+#[test]
+fn a_handover_without_a_plausible_column_takes_1_s_whether_the_driver_seems_to_oppose_or_not() {
+    for (sign, driver) in [(1.0, 4.0), (1.0, -1.7), (-1.0, 4.0), (-1.0, -1.7)] {
+        let mut rig = Rig::active_in_curve(sign);
+        rig.run(3000);
+        let start = rig.applied.abs();
+        rig.driver = Some(sign * driver);
+        let (_, step) = rig.run_until(3000, |step| step.command.mode == Mode::Handover);
+        assert!(step.command.faults.contains(Fault::ColumnImplausible));
+        assert!(!step.command.faults.contains(Fault::ColumnTimeout));
+        let before = rig.applied;
+        rig.run(100);
+        let fallen = sign * (before - rig.applied);
+        let expected = 100.0 * start / 1000.0;
+        assert!(
+            (fallen - expected).abs() <= 0.005,
+            "{driver}: {fallen}, not {expected}"
+        );
+    }
+}
+
 #[test]
 fn a_silence_of_20_ms_is_no_fault() {
     for sender in [LANE, COLUMN, VEHICLE, DEMAND] {

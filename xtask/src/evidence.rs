@@ -47,7 +47,7 @@ const MUTATED: [(&str, &[&str]); 36] = [
     ),
     ("ecu/injection.rs", &["ecu", "memory", "monitor", "edges"]),
     ("ramp.rs", &["ramp", "ecu", "endurance"]),
-    ("redundant.rs", &["memory", "ecu"]),
+    ("redundant.rs", &["memory", "ecu", "law_oracle"]),
     ("stored.rs", &["stored"]),
     ("download.rs", &["download"]),
     ("actuator.rs", &["edges", "ecu", "motor"]),
