@@ -103,18 +103,11 @@ impl Sweep {
 
 #[cfg(test)]
 mod tests {
+    use crate::sweep::Sweep;
     use crate::sweep::tests::with_road;
 
-    /// Lanes drive side by side what the shipping ECU drives alone, and hand back what they cannot: the bytes are the same.
-    #[test]
-    fn the_table_does_not_depend_on_lanes() {
-        let sweep = with_road(
-            "samples = 12\nmetrics = [\"time_to_recover_s\", \"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
-            "[vary]\nfailure.kind = [\"none\", \"torque\", \"input\"]\nsensors = [\"paper\", \"exact\"]\n\
-             \"failure.time\" = { uniform = [1.5, 9] }\nspeed = { uniform = [40, 90] }\n\
-             \"driver.t_p\" = { uniform = [0.05, 0.5] }\n\"driver.K_hg\" = { uniform = [0, 1] }\n\
-             \"driver.remnant_sd\" = [0, 0.1]\n",
-        );
+    /// Holds each chunk's bytes in lanes to those one by one; how many drives lanes can take, and how many not.
+    fn same_bytes(sweep: &Sweep) -> (usize, usize) {
         let (mut in_lanes, mut out) = (0, 0);
         for chunk in 0..sweep.chunks() {
             let side_by_side = sweep.run_chunk(chunk).unwrap();
@@ -128,6 +121,20 @@ mod tests {
                 }
             }
         }
+        (in_lanes, out)
+    }
+
+    /// Lanes drive side by side what the shipping ECU drives alone, and hand back what they cannot: the bytes are the same.
+    #[test]
+    fn the_table_does_not_depend_on_lanes() {
+        let sweep = with_road(
+            "samples = 12\nmetrics = [\"time_to_recover_s\", \"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
+            "[vary]\nfailure.kind = [\"none\", \"torque\", \"input\"]\nsensors = [\"paper\", \"exact\"]\n\
+             \"failure.time\" = { uniform = [1.5, 9] }\nspeed = { uniform = [40, 90] }\n\
+             \"driver.t_p\" = { uniform = [0.05, 0.5] }\n\"driver.K_hg\" = { uniform = [0, 1] }\n\
+             \"driver.remnant_sd\" = [0, 0.1]\n",
+        );
+        let (in_lanes, out) = same_bytes(&sweep);
         assert!(in_lanes > 40 && out > 40, "{in_lanes} in lanes, {out} not");
     }
 
@@ -141,14 +148,7 @@ mod tests {
              \"tolerances.load\" = { uniform = [0, 300] }\n\"sensor_errors.lane_noise\" = [0, 0.01]\n\
              \"world.gust_sd\" = { uniform = [0, 150] }\n\"world.friction\" = { uniform = [0, 0.4] }\n",
         );
-        for chunk in 0..sweep.chunks() {
-            let side_by_side = sweep.run_chunk(chunk).unwrap();
-            let alone = sweep.run_chunk_one_by_one(chunk).unwrap();
-            assert_eq!(side_by_side.to_bytes(1), alone.to_bytes(1), "chunk {chunk}");
-            for drive in sweep.drives_of(chunk) {
-                let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
-                assert_eq!(haptic_sim::lanes::why_not(&scenario), None);
-            }
-        }
+        let (in_lanes, out) = same_bytes(&sweep);
+        assert!(in_lanes > 0 && out == 0, "{in_lanes} in lanes, {out} not");
     }
 }
