@@ -5,8 +5,8 @@
 //! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
 //! module: a mistake there must not repeat itself here. It shares how memory is guarded, and nothing else.
 //!
-//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (unless
-//! the mode says that it ends at once, or the driver overrides), in a mode without torque, against a driver who
+//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (in Handover four
+//! times as fast as elsewhere; unless the mode says that it ends at once, or the driver overrides), in a mode without torque, against a driver who
 //! overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and
 //! rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count:
 //! the envelope may still be bringing an honest change about. While the host asks for the probe, and for a second
@@ -98,9 +98,12 @@ pub struct Evidence<'a> {
 const STANDBY: i32 = 1;
 const ACTIVE: i32 = 2;
 const FADE: i32 = 3;
-const LAST_WITH_TORQUE: i32 = 4;
+const HANDOVER: i32 = 4;
+const LAST_WITH_TORQUE: i32 = HANDOVER;
 /// Half an LSB on each side, and the roundings of this file.
 const TOLERANCE_MNM: i32 = 3;
+/// In a handover a torque may fall so many times as fast: its lane may be a lie, of which the monitor knows nothing.
+const DISTRUSTED: i32 = 4;
 /// The probe ends within a period, and none is slower than 1 Hz; a command is stale after 30 ms.
 const PROBE_END_US: i32 = 1_030_000;
 /// For how long the torque may be outside that band.
@@ -179,6 +182,7 @@ impl Monitor {
         let fallen = state.now.torque_mnm.saturating_abs().saturating_sub(left);
         let may_fall = fallen <= within(self.fall_mnm_per_ms)
             || mode > LAST_WITH_TORQUE
+            || (mode == HANDOVER && fallen <= within(self.fall_mnm_per_ms.saturating_mul(DISTRUSTED)))
             || left.saturating_add(OVERRIDE_SLACK_MNM)
                 >= self.bound(state.now.torque_mnm, state.now.driver_mnm);
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)

@@ -434,17 +434,24 @@ fn each_rule_is_tried_by_itself() {
     }
 }
 
-/// 8 mN.m per ms and 3 of tolerance, for 2 ms of a late step at most; across zero all of the old torque falls.
+/// 8 mN.m per ms and 3 of tolerance, in a handover 32, for 2 ms of a late step at most; across zero all of the old torque
+/// falls.
 #[test]
 fn falling_too_fast() {
-    for (us, fall) in [(0, 11), (1000, 11), (1500, 15), (2000, 19), (5000, 19)] {
+    for (us, fall, in_handover) in [
+        (0, 11, 35),
+        (1000, 11, 35),
+        (1500, 15, 51),
+        (2000, 19, 67),
+        (5000, 19, 67),
+    ] {
         for sign in [1, -1] {
             let bench = Bench::at(5.0, sign * counts(1000).0);
             let to = |mnm: i64, mode| { bench }.show(None, None, guidance(sign * counts(mnm).0, mode), us);
-            for mode in [FADE, HANDOVER] {
+            for (mode, fall) in [(FADE, fall), (HANDOVER, in_handover)] {
                 assert!(to(1000 - fall, mode) && !to(1000 - fall - 1, mode), "{us}");
             }
-            assert!(!to(0, STANDBY) && !to(-4, FADE));
+            assert!(!to(0, STANDBY) && !to(-4, FADE) && !to(-4, HANDOVER));
             // Fault and Locked end at once.
             assert!(to(0, 5) && to(0, 6));
             // A driver who leaves 0.5 N.m of 5: down to that at once, and 50 mN.m of what two frames may differ.

@@ -122,7 +122,9 @@ impl Watch {
             };
         }
         let same_way = if self.torque < 0.0 { -torque } else { torque };
-        let (fallen, most) = (self.torque.abs() - same_way, 8.0 * dt_s + 2.0 * LSB);
+        let is_lie = mode == Mode::Handover && step.command.faults.contains(Fault::LaneImplausible);
+        let per_s = if is_lie { 32.0 } else { 8.0 };
+        let (fallen, most) = (self.torque.abs() - same_way, per_s * dt_s + 2.0 * LSB);
         assert!(
             fallen <= most
                 // Across zero it grows from there.
@@ -158,7 +160,7 @@ impl Watch {
             let most = line.0 * (1.0 - passed_s / 2.0).max(0.0);
             // The ECU remembers its outputs finer than the bus shows them.
             assert!(
-                torque.abs() <= most + BUS_LSB + LSB || fallen >= 8.0 * dt_s - BUS_LSB - LSB,
+                torque.abs() <= most + BUS_LSB + LSB || fallen >= per_s * dt_s - BUS_LSB - LSB,
                 "line {line:?}, {most} N.m: {}",
                 context()
             );

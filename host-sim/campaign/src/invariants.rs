@@ -10,7 +10,7 @@
 //! | frame | identifier, length, CRC, counter one ahead, codes that exist, spare bits zero, classes those of the faults |
 //! | limit | abs(T) <= 5 N.m |
 //! | wind-up | abs(T) grows by at most 4 N.m/s (2 ms at most count for one cycle) |
-//! | reduction | abs(T) falls by at most 8 N.m/s, but for an ECU fault and a driver who overrides |
+//! | reduction | abs(T) falls by at most 8 N.m/s, 32 in a handover from an implausible lane, but for an ECU fault and a driver who overrides |
 //! | window | abs(T) grows by at most 1.2 N.m within any 250 ms |
 //! | override | the bound that shrinks from 0.8 N.m of opposing driver torque |
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
@@ -32,6 +32,8 @@ use frame::{override_bounds, warned, well_formed};
 const LIMIT_NM: f64 = 5.0;
 const WIND_UP_NM_PER_S: f64 = 4.0;
 const REDUCTION_NM_PER_S: f64 = 8.0;
+/// The same in a handover from an implausible lane.
+const LIE_NM_PER_S: f64 = 32.0;
 const WINDOW_NM: f64 = 1.2;
 const WINDOW_US: u64 = 250_000;
 const OVERRIDE_FROM_NM: f64 = 0.8;
@@ -266,7 +268,10 @@ impl InvariantChecker {
 
     fn rates(&self, status: &Status, old_nm: f64, elapsed_s: f64, now_us: u32) -> Result<(), String> {
         let elapsed_s = elapsed_s.min(MOST_S);
-        let (growth, fall) = (WIND_UP_NM_PER_S * elapsed_s, REDUCTION_NM_PER_S * elapsed_s);
+        let (growth, fall) = (
+            WIND_UP_NM_PER_S * elapsed_s,
+            reduction_nm_per_s(status) * elapsed_s,
+        );
         // In the frame in which the old torque is positive.
         let sign = if old_nm < 0.0 { -1.0 } else { 1.0 };
         let (old, new) = (old_nm.abs(), sign * status.torque_nm);
@@ -373,8 +378,8 @@ impl InvariantChecker {
         } else {
             start - FADE_NM_PER_S * passed_s
         };
-        // A reduction that is rounded away from zero, and the way to the line at 8 N.m/s.
-        let falling = old.abs() - REDUCTION_NM_PER_S * elapsed_s.min(MOST_S);
+        // A reduction that is rounded away from zero, and the way to the line.
+        let falling = old.abs() - reduction_nm_per_s(status) * elapsed_s.min(MOST_S);
         if torque.abs() > line.max(0.0).max(falling) + LSB_NM + TINY_NM {
             return Err(format!(
                 "mode {}: T = {torque} N.m above its line of {line:.4} N.m after {passed_s:.3} s",
@@ -382,5 +387,14 @@ impl InvariantChecker {
             ));
         }
         Ok(())
+    }
+}
+
+/// How fast a torque may fall.
+fn reduction_nm_per_s(status: &Status) -> f64 {
+    if status.mode == HANDOVER && status.faults & LANE_IMPLAUSIBLE != 0 {
+        LIE_NM_PER_S
+    } else {
+        REDUCTION_NM_PER_S
     }
 }
