@@ -18,9 +18,10 @@
 //!
 //! **Column.** Torque in equals torque out: `T_d + T_a + T_h = c_a*v*psi_dot + B_s*dphi/dt`. Of the power assist `T_a` only
 //! its direction is known, and that it is at most [`ASSIST`] times `T_d`; of the aligning torque, that it is right by 30 %
-//! (trail, tyres, load); and there is friction. What is beyond all that is summed with a memory of 1 s; the inertia (0.11
-//! kg.m2 at hand speeds: 0.02 N.m.s) is far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is
-//! estimated slowly, and bounded.
+//! (trail, tyres, load); and there is friction. All this is summed with a memory of 1 s, and the sum is what of it lies
+//! nearest to zero: the least momentum that the column must lack whatever friction and aligning torque were. So what a hand
+//! pushes for a moment and the column answers later comes to nothing. The inertia (0.11 kg.m2 at hand speeds: 0.02 N.m.s) is
+//! far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is estimated slowly, and bounded.
 //!
 //! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists and is not
 //! that of a line that was chosen anew ([`is_another_line`]), the input goes stale and is a fault.
@@ -337,15 +338,20 @@ impl Plausibility {
                 impulse(most).wrapping_sub(damped),
             );
             let learnt = impulse(state.column.bias.bits());
-            let change = beyond(least, most, 0).wrapping_sub(learnt) >> BIAS_SHIFT;
-            let bias = state.column.bias.bits().wrapping_add(change);
+            let lacking = nearest_to_zero(least, most).wrapping_sub(learnt);
+            let bias = state.column.bias.bits().wrapping_add(lacking >> BIAS_SHIFT);
             state.column.bias = Torque::from_bits(bias)
                 .min(COLUMN_BIAS)
                 .max(COLUMN_BIAS.opposite());
             let tolerance = upper_product(aligning.wrapping_abs(), ALIGNING_ERROR);
             let tolerance = impulse(tolerance.wrapping_add(FRICTION.bits()));
-            let change = beyond(least.wrapping_sub(learnt), most.wrapping_sub(learnt), tolerance);
-            state.column.sum = AngularImpulse::from_bits(leak(state.column.sum.bits(), change, dt));
+            // The tolerance is that of the sum: what is not used up between two pushes explains a part of the last.
+            let sum = state.column.sum.bits();
+            let (least, most) = (
+                leak(sum, lacking.wrapping_sub(tolerance), dt),
+                leak(sum, lacking.wrapping_add(tolerance), dt),
+            );
+            state.column.sum = AngularImpulse::from_bits(nearest_to_zero(least, most));
         }
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
@@ -422,10 +428,9 @@ impl Plausibility {
     }
 }
 
-/// How far an interval is from zero, beside a tolerance; positive where all of it is above.
-fn beyond(least: i32, most: i32, tolerance: i32) -> i32 {
-    let (low, high) = (least.wrapping_sub(tolerance), most.wrapping_add(tolerance));
-    low.max(0).wrapping_add(high.min(0))
+/// What of an interval is nearest to zero: zero itself if it is inside.
+fn nearest_to_zero(least: i32, most: i32) -> i32 {
+    least.max(0).wrapping_add(most.min(0))
 }
 
 /// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.

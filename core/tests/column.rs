@@ -4,7 +4,7 @@
 //! vehicle by 0.1*30*0.022324/(1 + 0.001753*900) = 0.02597 rad/s, against an aligning torque of 0.9874*30*0.02597 = 0.769 N.m.
 
 use haptic_core::config::Config;
-use haptic_core::plausibility::PlausibilityState;
+use haptic_core::plausibility::{Plausibility, PlausibilityState};
 use haptic_core::quantity::{Instant, Micros, Radians, Speed, Torque, TurningRate};
 
 /// Feeds the check every 2 ms for so many seconds: driver torque (N.m) and wheel angle (rad) by time, the guidance's torque,
@@ -91,4 +91,50 @@ fn the_momentum_of_a_wheel_that_is_thrown_round_is_no_torque_that_is_missing() {
         (8.0, turned)
     });
     assert!(against.unwrap() <= stuck, "{against:?}");
+}
+
+/// Pushes of 4 N.m at 5 Hz against a wheel that stands, answered by 0.5 N.m the other way between them. For 40 ms they leave
+/// 0.14 N.m.s beyond the friction, which the answer of 160 ms explains by 0.16 N.m.s: what acts all the time is 0.4 N.m, less
+/// than the friction. For 80 ms they leave 0.28 N.m.s, of which 0.12 are explained: 0.6 N.m.s in the sixth push, by the same
+/// sum in float64 after 1.066 s.
+#[test]
+fn what_a_push_leaves_beyond_the_friction_is_paid_back_between_the_pushes() {
+    for side in [1.0, -1.0] {
+        let taps = |ms: f64| {
+            let torque = |t: f64| if (t * 1e3 + 0.5) % 200.0 < ms { 4.0 } else { -0.5 };
+            declared(20.0, 30.0, 0.0, 0.0, |t| (side * torque(t), 0.0))
+        };
+        assert_eq!(taps(40.0), None);
+        let long = taps(80.0).unwrap();
+        assert!((1.05..1.08).contains(&long), "{long} s");
+    }
+}
+
+/// 20 N.m for 20 ms leave 0.39 N.m.s beyond the friction of 0.5 N.m. In the 0.4 s after that, 1 s of memory forgets them to
+/// 0.39*exp(-0.4) = 0.261, and the friction explains 0.5*(1 - exp(-0.4)) = 0.165 N.m.s of them, and the 0.025 N.m learnt 0.008.
+/// After a second nothing is left, and friction alone does not go on to the other side.
+#[test]
+fn friction_explains_a_push_that_is_over_and_no_more() {
+    let checks = Config::PAPER.plausibility;
+    for side in [1.0, -1.0] {
+        let mut state = PlausibilityState::NEW;
+        checks.motion(
+            &mut state,
+            Speed::from_m_per_s(30.0),
+            Some(TurningRate::from_rad_per_s(0.0)),
+        );
+        let mut left = |from: u32, to: u32, torque: f64| {
+            for ms in (from..to).step_by(2) {
+                let (at, torque) = (Instant::from_us(1000 * ms), Torque::from_nm(side * torque));
+                assert!(checks.column(&mut state, at, torque, Radians::ZERO, Torque::ZERO));
+            }
+            side * Plausibility::used(&state).1.nm_s()
+        };
+        // The first sample has no past.
+        let pushed = left(0, 22, 20.0);
+        assert!((pushed - 0.386).abs() < 3e-3, "{pushed}");
+        let later = left(22, 422, 0.0);
+        assert!((later - 0.088).abs() < 5e-3, "{later}");
+        assert_eq!(left(422, 3000, 0.0), 0.0);
+    }
 }

@@ -54,6 +54,11 @@ const PUSHED_NM: f64 = 0.3;
 /// Inertia of column and wheel.
 const INERTIA_KG_M2: f64 = 0.125;
 
+/// What between two ends is nearest to zero.
+fn nearest_to_zero([least, most]: [f64; 2]) -> f64 {
+    least.max(0.0) + most.min(0.0)
+}
+
 /// Whether errors are further from the last than a vehicle can go.
 fn is_a_step(last: [f64; 2], new: [f64; 2]) -> bool {
     (new[0] - last[0]).abs() > LANE_STEP_M || (new[1] - last[1]).abs() > YAW_STEP_RAD
@@ -209,14 +214,14 @@ impl Residual {
                 moving + driver_nm.min(ASSIST * driver_nm) - aligning.max(by_wheel),
                 moving + driver_nm.max(ASSIST * driver_nm) - aligning.min(by_wheel),
             ];
-            let beyond = |bias: f64, tolerance: f64| {
-                let [low, high] = ends.map(|end| end - bias);
-                (low.min(high) - tolerance).max(0.0) + (low.max(high) + tolerance).min(0.0)
-            };
+            // The torque that is missing at least, and how much of it friction and aligning torque may hide either way.
             let bias = self.column_bias_nm;
+            let missing = nearest_to_zero(ends) - bias;
             let tolerance = FRICTION_NM + ALIGNING_SHARE * aligning.abs();
-            self.momentum_nm_s = self.momentum_nm_s * (-dt / MEMORY_S).exp() + beyond(bias, tolerance) * dt;
-            let learnt = bias + (beyond(0.0, 0.0) - bias) * dt / LEARNT_WITHIN_S;
+            let kept = self.momentum_nm_s * (-dt / MEMORY_S).exp();
+            let possible = [missing - tolerance, missing + tolerance].map(|torque| kept + torque * dt);
+            self.momentum_nm_s = nearest_to_zero(possible);
+            let learnt = bias + missing * dt / LEARNT_WITHIN_S;
             self.column_bias_nm = learnt.clamp(-COLUMN_BIAS_NM, COLUMN_BIAS_NM);
         }
         (self.column_at_s, self.wheel_rad) = (Some(time_s), wheel_rad);

@@ -67,10 +67,10 @@ pub(super) struct Checks<const N: usize> {
     lines: [[f64; N]; LINES],
 }
 
-/// How far an interval is from zero, beside a tolerance.
+/// What of an interval is nearest to zero.
 #[inline(always)]
-fn beyond(least: f64, most: f64, tolerance: f64) -> f64 {
-    (least - tolerance).max(0.0) + (most + tolerance).min(0.0)
+fn nearest_to_zero(least: f64, most: f64) -> f64 {
+    least.max(0.0) + most.min(0.0)
 }
 
 impl<const N: usize> Checks<N> {
@@ -172,12 +172,12 @@ impl<const N: usize> Checks<N> {
             let least = (applied[l] + driver[l].min(assisted) - aligning.max(by_wheel)) * dt - damped;
             let most = (applied[l] + driver[l].max(assisted) - aligning.min(by_wheel)) * dt - damped;
             let bias = self.column_bias[l];
-            let learnt = bias * dt;
-            let change = (beyond(least, most, 0.0) - learnt) * LEARNS;
-            self.column_bias[l] = (bias + change).min(COLUMN_BIAS).max(-COLUMN_BIAS);
+            let lacking = nearest_to_zero(least, most) - bias * dt;
+            self.column_bias[l] = (bias + lacking * LEARNS).min(COLUMN_BIAS).max(-COLUMN_BIAS);
             let tolerance = (aligning.abs() * TOLERANCE + FRICTION) * dt;
             let sum = self.column_sum[l];
-            let sum = sum - sum * dt + beyond(least - learnt, most - learnt, tolerance);
+            let kept = sum - sum * dt + lacking;
+            let sum = nearest_to_zero(kept - tolerance, kept + tolerance);
             self.column_sum[l] = sum;
             let is_sound = (sum.abs() <= COLUMN_MARGIN) & (wheel[l].abs() <= LARGEST_WHEEL);
             suspect[l] |= !flag(is_sound) & matters[l];
