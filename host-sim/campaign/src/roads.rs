@@ -164,7 +164,7 @@ impl ChangingRoad {
     pub(super) fn turning(&self) -> (Course, u32) {
         let curvature_1pm = self.curvature_1pm(TURN_M_PER_S2);
         let lengths_s = lengths_s(PlaceOnRoad::In);
-        let v = self.change.from_m_per_s();
+        let v = self.change.first_m_per_s();
         // Straight and clothoid lie long before the change; the clothoid turns half as much as an arc.
         let turned_m = v * (lengths_s[0] + 0.5) + std::f64::consts::PI / curvature_1pm.abs();
         let onset_s = self.change.time_s_of(turned_m);

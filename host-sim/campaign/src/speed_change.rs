@@ -50,7 +50,7 @@ impl SpeedChange {
         change
     }
 
-    pub(super) fn from_m_per_s(&self) -> f64 {
+    pub(super) fn first_m_per_s(&self) -> f64 {
         self.from_kmh / 3.6
     }
 
@@ -77,14 +77,14 @@ impl SpeedChange {
     pub(super) fn way_m(&self, after_s: f64) -> f64 {
         let changed_s = self.changed_s(after_s);
         let behind_s = (after_s - self.starts_after_s - changed_s).max(0.0);
-        self.from_m_per_s() * after_s + self.rate_m_per_s2 * changed_s * (0.5 * changed_s + behind_s)
+        self.first_m_per_s() * after_s + self.rate_m_per_s2 * changed_s * (0.5 * changed_s + behind_s)
     }
 
     /// When a vehicle has gone so far that is at the onset then, s after its start.
     pub(super) fn time_s_of(&self, onset_m: f64) -> f64 {
         // Of a change that begins before the onset some is done.
         let changed_s = self.changed_s(0.0);
-        (onset_m - 0.5 * self.rate_m_per_s2 * changed_s * changed_s) / self.from_m_per_s()
+        (onset_m - 0.5 * self.rate_m_per_s2 * changed_s * changed_s) / self.first_m_per_s()
     }
 
     /// The speed of a scenario with this onset.
