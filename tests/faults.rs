@@ -35,14 +35,38 @@ fn the_vehicle_is_judged_against_its_twin() {
     assert!(lost.deviation_m > 0.1, "{lost:?}");
 }
 
-/// In a real world every rule of every cycle holds as well.
+/// In a real world every rule of every cycle holds as well, and while the vehicle brakes or speeds up.
 #[test]
 fn no_rule_breaks_where_roads_and_cars_are_real() {
-    let world = WORLDS.iter().find(|world| world.name == "everything").unwrap();
     let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
-    let campaign = campaign::run(&World::real(world), &here, 1..2, || ());
-    let failed: Vec<_> = campaign.failures().filter(|f| f.by == FailedBy::Ecu).collect();
-    assert!(failed.is_empty(), "{failed:#?}");
+    for name in ["everything", "braking"] {
+        let world = WORLDS.iter().find(|world| world.name == name).unwrap();
+        let campaign = campaign::run(&World::real(world), &here, 1..2, || ());
+        let failed: Vec<_> = campaign.failures().filter(|f| f.by == FailedBy::Ecu).collect();
+        assert!(failed.is_empty(), "{failed:#?}");
+    }
+}
+
+/// Braking and speeding up are no fault: with nothing else wrong the ECU stays, and what is lost is noticed as soon.
+#[test]
+fn a_vehicle_that_brakes_is_no_fault_and_hides_none() {
+    let world = WORLDS.iter().find(|world| world.name == "braking").unwrap();
+    let by_name = |name: &str| rows().find(|row| row.name == name).expect("a row of the table");
+    let rows = [
+        "counter-wrap",
+        "clock-fast",
+        "silent-vehicle",
+        "speeds-apart",
+        "speed-falls-to-zero",
+    ];
+    let rows = rows.map(by_name);
+    let campaign = campaign::run(&World::real(world), &rows, 1..9, || ());
+    let left: Vec<u64> = campaign.rows.iter().map(|row| row.left).collect();
+    assert_eq!(left, [0, 0, 8, 8, 8]);
+    let after_ms = |row: usize| campaign.rows[row].left_after_ms.expect("all left")[1];
+    assert!(after_ms(2).max(after_ms(3)) <= 31, "{campaign:#?}");
+    // From 130 km/h to 5 m/s at 10 m/s2, less 4 m/s2 where the vehicle speeds up: after 3.1 s, or 5.2 s at most.
+    assert!(after_ms(4) < 4000, "{campaign:#?}");
 }
 
 /// A campaign that cannot see its faults would pass as well: a fault that is declared must be seen often enough.

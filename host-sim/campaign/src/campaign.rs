@@ -15,6 +15,9 @@ pub struct Campaign {
     pub cycles: u64,
     /// Row by row.
     pub rows: Vec<CaseResult>,
+    /// Name of the world, if it is not the paper's.
+    #[serde(skip)]
+    pub world: Option<&'static str>,
 }
 
 impl Campaign {
@@ -23,6 +26,7 @@ impl Campaign {
             runs: rows.iter().map(|row| row.runs).sum(),
             cycles: rows.iter().map(|row| row.cycles).sum(),
             rows,
+            world: None,
         }
     }
 
@@ -130,7 +134,10 @@ pub fn run(
         .zip(outcomes.chunks(per_row))
         .map(|(row, outcomes)| result(row, outcomes, &again))
         .collect();
-    Campaign::of(rows)
+    Campaign {
+        world: world.kind().map(|kind| kind.name),
+        ..Campaign::of(rows)
+    }
 }
 
 /// What a row's runs showed; `again` is what its command needs beside row and seed.

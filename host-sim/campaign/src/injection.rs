@@ -41,7 +41,7 @@ pub(super) enum Change {
     Noisy(f64),
     /// A constant.
     StuckAt(f64),
-    /// Falls or rises by so much per second until it reaches a value.
+    /// Falls or rises, beside what the truth does, by so much per second until it reaches a value.
     Approaching { value: f64, per_s: f64 },
     /// Plus so much, reached in a straight line within so many ms.
     Sliding { by: f64, ms: u32 },

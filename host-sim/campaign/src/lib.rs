@@ -33,7 +33,9 @@ mod ecu_harness;
 mod injection;
 mod invariants;
 mod residual;
+mod roads;
 mod senders;
+mod speed_change;
 mod start_up;
 pub mod table;
 pub mod target;
@@ -44,4 +46,5 @@ mod wire;
 
 pub use invariants::Violation;
 pub use residual::Seen;
+pub use speed_change::SpeedChange;
 pub use trial::{Deviation, TrialOutcome, World};

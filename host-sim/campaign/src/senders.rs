@@ -240,9 +240,10 @@ fn changed(change: &Change, value: f64, held: f64, since_s: f64, noise: &mut Xos
             value + sd * white
         }
         Change::StuckAt(constant) => constant,
+        // By so much more than what is true changes: a lie about a speed that falls already lies as fast.
         Change::Approaching { value: end, per_s } => {
-            let way = end - held;
-            held + way.signum() * (per_s * since_s).min(way.abs())
+            let way = end - value;
+            value + way.signum() * (per_s * since_s).min(way.abs())
         }
         Change::Sliding { by, ms } => value + by * (since_s * 1e3 / f64::from(ms)).min(1.0),
         // A period of the host's messages up, one down.

@@ -6,6 +6,11 @@
 //! after the start (4 to 5.5 s behind a curve), and 5.2 s after it the run ends. Drivers who do not keep a lane at the
 //! speed, alone and with guidance, do not drive. One second after the ECU has left, the driver drives as manually.
 //!
+//! In a world in which the speed changes, the vehicle brakes or speeds up to another of the campaign's speeds by 1 to 4 m/s2.
+//! That begins up to 1.3 s before the onset and then goes on at it, at the onset, or up to 1 s after it. The road's pieces lie
+//! where this vehicle is at the instants of a run at one speed; the arc has its 0.93 m/s2 where the vehicle is fastest, and less
+//! elsewhere. The driver keeps a lane at every speed in between.
+//!
 //! Where the vehicle goes is judged by forks of the same run: *fault-free* goes on without the fault from the onset, *dropped*
 //! loses the torque in the step in which the ECU leaves. The *deviation* is the distance from the fault-free vehicle across
 //! its direction at the same instant.
@@ -19,6 +24,8 @@ use super::drivers::{Driver, everyone};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
 use super::invariants::Violation;
+use super::roads::{self, ChangingRoad, TURN_KMH};
+use super::speed_change::SpeedChange;
 use super::table::{FaultCase, PlaceOnRoad};
 use super::trial_record::EcuTrace;
 use super::verdict::judge;
@@ -26,24 +33,23 @@ use haptic_core::params::Params;
 use haptic_log::Event;
 use haptic_sim::models::driver::ArmGains;
 use haptic_sim::models::real::WorldParameters;
-use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
+use haptic_sim::models::road::Course;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;
-use haptic_sim::scenario::Scenario;
-use haptic_sim::seeds::Stream;
+use haptic_sim::scenario::{Scenario, ScenarioBuilder, Speed};
+use haptic_sim::seeds::{Stream, named};
 use haptic_sim::stability::{Guided, growth_per_s};
 use haptic_sim::worlds::{Surface, WorldKind};
 use haptic_sim::{Action, Simulation};
 
-/// Lateral acceleration in the arc, m/s2: the paper course's first curve at 60 km/h.
-const LATERAL_M_PER_S2: f64 = 0.926;
 /// Speeds of the campaign, km/h.
 const SPEEDS_KMH: [f64; 7] = [40.0, 50.0, 60.0, 70.0, 80.0, 100.0, 130.0];
+/// Where a driver has to keep a lane whose speed changes between two of them, km/h.
+const BETWEEN_KMH: [f64; 10] = [40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0, 130.0];
 /// A driver keeps a lane if an error dies down this fast, 1/s.
 const SETTLES_PER_S: f64 = 0.05;
-/// Where the heading has to pass pi the curve is tighter, or a run would take a minute.
-const TURN_KMH: f64 = 40.0;
-const TURN_M_PER_S2: f64 = 2.0;
+/// Between which the speed of the turning road changes, km/h: a road for faster ones would take a minute.
+const TURNING_KMH: [f64; 2] = [TURN_KMH, 50.0];
 const EARLIEST_ONSET_MS: u32 = 1500;
 const LATEST_ONSET_MS: u32 = 3000;
 const AFTER_MS: u32 = 5200;
@@ -61,65 +67,26 @@ const LANE_EDGE_M: f64 = 0.95;
 
 const PLACES: [PlaceOnRoad; 3] = [PlaceOnRoad::In, PlaceOnRoad::Before, PlaceOnRoad::After];
 
-/// The world of the trials: roads are made once.
+/// What a seed draws for a row: who drives, in which scenario, and the onset.
+struct Drawn<'a> {
+    driver: &'a Driver,
+    scenario: Scenario,
+    onset_ms: u32,
+    change: Option<SpeedChange>,
+}
+
+/// The world of the trials. Roads are made once, but for those of a speed that changes.
 #[derive(Debug)]
 pub struct World {
     drivers: Vec<Driver>,
-    /// By speed: who keeps a lane.
-    able: Vec<Vec<usize>>,
+    /// By speed, km/h: who keeps a lane.
+    able: Vec<(f64, Vec<usize>)>,
     /// By speed and place: curving left and right.
     roads: Vec<[[Course; 2]; 3]>,
     /// On which the heading passes +-pi.
     turning_road: [Course; 2],
     /// What is real; nothing if `None`.
     real: Option<&'static WorldKind>,
-}
-
-/// A straight of so long, a clothoid of 1 s, an arc, and if the arc ends a clothoid and a straight; on to the end of a run.
-fn road(
-    kmh: f64,
-    lateral_m_per_s2: f64,
-    [straight_s, arc_s]: [f64; 2],
-    run_ms: u32,
-    surface: Surface,
-) -> Course {
-    let v = kmh / 3.6;
-    let curvature_1pm = lateral_m_per_s2 / (v * v);
-    let [level, banked] = [
-        surface.straight_rad(),
-        surface.curve_rad(0.6_f64.copysign(lateral_m_per_s2)),
-    ];
-    let piece = |segment: Segment, bank_rad| segment.with_surface(bank_rad, [0.0; 2]);
-    let rest_s = f64::from(run_ms) * 1e-3 + 2.0;
-    let mut segments = vec![
-        piece(Segment::straight(straight_s * v), [level; 2]),
-        piece(Segment::clothoid(v, 0.0, curvature_1pm), [level, banked]),
-        piece(Segment::arc(v * arc_s.min(rest_s), curvature_1pm), [banked; 2]),
-    ];
-    if arc_s < rest_s {
-        segments.push(piece(Segment::clothoid(v, curvature_1pm, 0.0), [banked, level]));
-        segments.push(piece(Segment::straight(v * rest_s), [level; 2]));
-    }
-    Course::new("curve of the fault campaign", DEFAULT_LANE_WIDTH_M, segments)
-        .expect("in range at these speeds")
-}
-
-/// The straight before the arc and the arc, s, for a place.
-fn lengths_s(place: PlaceOnRoad) -> [f64; 2] {
-    match place {
-        PlaceOnRoad::In => [0.5, f64::INFINITY],
-        // The curve begins 0.2 to 1.7 s after the onset.
-        PlaceOnRoad::Before => [3.2, f64::INFINITY],
-        // It ends 0.3 to 1.8 s before it.
-        PlaceOnRoad::After => [0.5, 1.2],
-    }
-}
-
-/// When the heading of the turning road passes pi.
-fn turned_ms() -> u32 {
-    let rad_per_s = TURN_M_PER_S2 / (TURN_KMH / 3.6);
-    // The clothoid turns half as fast for 1 s, after the straight.
-    ((1.0 + std::f64::consts::PI / rad_per_s) * 1e3) as u32
 }
 
 /// What a run showed.
@@ -129,8 +96,10 @@ pub struct TrialOutcome {
     pub seed: u64,
     /// Who drove.
     pub driver: String,
-    /// How fast, km/h.
+    /// How fast at the start, km/h.
     pub speed_kmh: f64,
+    /// How the speed changes, if it does.
+    pub change: Option<SpeedChange>,
     /// When the fault began, ms after the start.
     pub onset_ms: u32,
     /// What the ECU said of itself, from its frames.
@@ -188,21 +157,21 @@ impl World {
     fn of(real: Option<&'static WorldKind>) -> Self {
         let surface = real.map_or(Surface::FLAT, WorldKind::surface);
         let run_ms = LATEST_ONSET_MS + BEHIND_MS + AFTER_MS;
-        let both = |kmh, lateral, lengths, ms| {
-            [1.0, -1.0].map(|side| road(kmh, side * lateral, lengths, ms, surface))
-        };
-        let at = |kmh| PLACES.map(|place| both(kmh, LATERAL_M_PER_S2, lengths_s(place), run_ms));
+        let at = |kmh| PLACES.map(|place| roads::curve(kmh, place, run_ms, surface));
         let drivers = everyone();
+        let keeps_lane: Vec<f64> = if real.is_some_and(WorldKind::changes_speed) {
+            BETWEEN_KMH.into()
+        } else {
+            SPEEDS_KMH.into()
+        };
         Self {
-            able: SPEEDS_KMH.map(|kmh| able(&drivers, kmh)).into(),
+            able: keeps_lane
+                .into_iter()
+                .map(|kmh| (kmh, able(&drivers, kmh)))
+                .collect(),
             drivers,
             roads: SPEEDS_KMH.map(at).into(),
-            turning_road: both(
-                TURN_KMH,
-                TURN_M_PER_S2,
-                [0.5, f64::INFINITY],
-                turned_ms() + AFTER_MS,
-            ),
+            turning_road: roads::turning(AFTER_MS, surface),
             real,
         }
     }
@@ -217,10 +186,39 @@ impl World {
         self.trial(row, seed, false).0
     }
 
-    /// What a seed draws for a row: who drives, in which scenario, and the onset, ms.
-    fn draw(&self, row: &FaultCase, seed: u64, rng: &mut Xoshiro256PlusPlus) -> (&Driver, Scenario, u32) {
+    /// Those who keep a lane at every speed from one to another, km/h.
+    fn able_between(&self, a_kmh: f64, b_kmh: f64) -> Vec<usize> {
+        let range = a_kmh.min(b_kmh)..=a_kmh.max(b_kmh);
+        let mut there = self.able.iter().filter(|(kmh, _)| range.contains(kmh));
+        let first = there.next().map_or(&[][..], |(_, able)| able);
+        let everywhere = |driver: &usize| {
+            let mut there = there.clone();
+            there.all(|(_, able)| able.contains(driver))
+        };
+        first.iter().copied().filter(everywhere).collect()
+    }
+
+    /// How the speed of a run changes, if it does in this world. It has a stream of its own: all else is drawn as where it
+    /// does not.
+    fn draw_change(&self, row: &FaultCase, seed: u64, from_kmh: f64) -> Option<SpeedChange> {
+        self.real.filter(|kind| kind.changes_speed())?;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(named(Stream::Faults.seed(seed), "speed"));
+        Some(if row.start == Start::HeadingWraps {
+            let from_kmh = TURNING_KMH[rng.random_range(0..2)];
+            SpeedChange::draw(from_kmh, &TURNING_KMH, &mut rng)
+        } else {
+            SpeedChange::draw(from_kmh, &SPEEDS_KMH, &mut rng)
+        })
+    }
+
+    /// What a seed draws for a row.
+    fn draw(&self, row: &FaultCase, seed: u64, rng: &mut Xoshiro256PlusPlus) -> Drawn<'_> {
         let speed = rng.random_range(0..SPEEDS_KMH.len());
-        let able = &self.able[speed];
+        let change = self.draw_change(row, seed, SPEEDS_KMH[speed]);
+        let able = match &change {
+            None => self.able_between(SPEEDS_KMH[speed], SPEEDS_KMH[speed]),
+            Some(change) => self.able_between(change.from_kmh, change.to_kmh),
+        };
         let driver = &self.drivers[able[rng.random_range(0..able.len())]];
         let place = [0, 0, 1, 2][rng.random_range(0..4)];
         let place = match row.place_on_road {
@@ -229,32 +227,67 @@ impl World {
             None if row.start != Start::Engaged => 0,
             None => place,
         };
-        let turns = row.start == Start::HeadingWraps;
-        let (roads, speed_kmh) = if turns {
-            (&self.turning_road, TURN_KMH)
-        } else {
-            (&self.roads[speed][place], SPEEDS_KMH[speed])
-        };
-        let course = &roads[rng.random_range(0..2)];
+        let side = rng.random_range(0..2);
         let later_ms = if PLACES[place] == PlaceOnRoad::After {
             BEHIND_MS
         } else {
             0
         };
         let drawn_ms = later_ms + rng.random_range(EARLIEST_ONSET_MS..LATEST_ONSET_MS);
-        let onset_ms = if turns {
-            turned_ms()
-        } else if row.after_sample {
-            (drawn_ms..).find(|ms| camera_looks(ms - 1)).unwrap_or(drawn_ms)
-        } else {
-            drawn_ms
+        let (course, speed, onset_ms) = match change {
+            None => self.road(row, [speed, place, side], drawn_ms),
+            Some(change) => self.changing_road(row, change, [place, side], drawn_ms),
         };
-        let mut scenario = Scenario::builder()
-            .course(course.clone())
-            .speed_kmh(speed_kmh)
+        let scenario = Scenario::builder()
+            .course(course)
+            .speed(speed)
             .driver(driver.parameters)
             .gains(driver.gains)
             .seed(seed);
+        Drawn {
+            driver,
+            scenario: self.in_this_world(scenario, row, seed),
+            onset_ms,
+            change,
+        }
+    }
+
+    /// Road, speed and onset (ms) of a run at one speed.
+    fn road(&self, row: &FaultCase, [speed, place, side]: [usize; 3], drawn_ms: u32) -> (Course, Speed, u32) {
+        let (roads, kmh, onset_ms) = if row.start == Start::HeadingWraps {
+            (&self.turning_road, TURN_KMH, roads::turned_ms())
+        } else {
+            let roads = &self.roads[speed][place];
+            (roads, SPEEDS_KMH[speed], onset_ms(row, drawn_ms))
+        };
+        (roads[side].clone(), Speed::Constant(kmh), onset_ms)
+    }
+
+    /// The same of a run whose speed changes.
+    fn changing_road(
+        &self,
+        row: &FaultCase,
+        change: SpeedChange,
+        [place, side]: [usize; 2],
+        drawn_ms: u32,
+    ) -> (Course, Speed, u32) {
+        let road = ChangingRoad {
+            change,
+            after_ms: AFTER_MS,
+            side: [1.0, -1.0][side],
+            surface: self.real.map_or(Surface::FLAT, WorldKind::surface),
+        };
+        let (course, onset_ms) = if row.start == Start::HeadingWraps {
+            road.turning()
+        } else {
+            let onset_ms = onset_ms(row, drawn_ms);
+            (road.curve(PLACES[place], onset_ms), onset_ms)
+        };
+        (course, change.speed(onset_ms), onset_ms)
+    }
+
+    /// With the car, the road and the sensors of this world, and what a row makes less than ideal.
+    fn in_this_world(&self, mut scenario: ScenarioBuilder, row: &FaultCase, seed: u64) -> Scenario {
         let mut plant = self
             .real
             .map_or_else(WorldParameters::default, WorldKind::parameters);
@@ -266,14 +299,18 @@ impl World {
         if let Some(less_than_ideal) = row.plant {
             less_than_ideal(&mut plant);
         }
-        let scenario = scenario.world(plant).build().expect("in range at these speeds");
-        (driver, scenario, onset_ms)
+        scenario.world(plant).build().expect("in range at these speeds")
     }
 
     /// Runs a row with a seed, and with `traced` keeps what went into the ECU and came out of it.
     pub(super) fn trial(&self, row: &FaultCase, seed: u64, traced: bool) -> (TrialOutcome, Option<EcuTrace>) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
-        let (driver, scenario, onset_ms) = self.draw(row, seed, &mut rng);
+        let Drawn {
+            driver,
+            scenario,
+            onset_ms,
+            change,
+        } = self.draw(row, seed, &mut rng);
         let mut harness = EcuHarness::new(row, &scenario, onset_ms, onset_ms + AFTER_MS, rng);
         if traced {
             harness.keep_trace();
@@ -306,6 +343,7 @@ impl World {
             seed,
             driver: driver.name.clone(),
             speed_kmh: scenario.speed_kmh(),
+            change,
             onset_ms,
             reported,
             cycles: record.cycles,
@@ -320,6 +358,15 @@ impl World {
             failure: verdict.err(),
         };
         (outcome, trace)
+    }
+}
+
+/// The instant drawn, or the next one behind a lane preview.
+fn onset_ms(row: &FaultCase, drawn_ms: u32) -> u32 {
+    if row.after_sample {
+        (drawn_ms..).find(|ms| camera_looks(ms - 1)).unwrap_or(drawn_ms)
+    } else {
+        drawn_ms
     }
 }
 
@@ -415,3 +462,6 @@ impl Default for World {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -48,8 +48,11 @@ pub fn stamped(campaign: &Campaign) -> Stamped<'_, Campaign> {
 
 /// How much ran, and how much of it failed.
 pub fn summary(campaign: &Campaign) -> String {
+    let world = campaign.world.map_or(String::new(), |name| {
+        format!("; in the world {name}, where a row fails by a broken rule or by where the vehicle goes")
+    });
     format!(
-        "{} rows, {} runs, {} cycles checked, {} failed",
+        "{} rows, {} runs, {} cycles checked, {} failed{world}",
         campaign.rows.len(),
         campaign.runs,
         campaign.cycles,
