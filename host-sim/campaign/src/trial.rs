@@ -129,6 +129,8 @@ pub struct Deviation {
     pub dropped_m: Option<f64>,
     /// Whether the vehicle left its lane where the fault-free one did not.
     pub leaves_lane: bool,
+    /// Whether the vehicle was off the road when the ECU left, and so was the fault-free one: its driver took it there.
+    pub driven_off: bool,
 }
 
 impl Deviation {
@@ -137,9 +139,9 @@ impl Deviation {
         self.dropped_m.map(|dropped_m| self.faulted_m - dropped_m)
     }
 
-    /// Whether the vehicle leaves the road with the torque dropped as well: then no handover is judged.
+    /// Whether the vehicle leaves the road with the torque dropped or without the fault as well: then no handover is judged.
     pub fn is_off_road(&self) -> bool {
-        self.dropped_m.is_some_and(|dropped_m| dropped_m > OFF_ROAD_M)
+        self.driven_off || self.dropped_m.is_some_and(|dropped_m| dropped_m > OFF_ROAD_M)
     }
 }
 
@@ -322,6 +324,7 @@ impl World {
         let left_at = harness.left_at();
         let mut record = harness.into_record();
         let deviation = run.as_ref().copied().unwrap_or_default();
+        record.driven_off = deviation.driven_off;
         if let Err(panic) = run {
             let what = panic
                 .downcast_ref::<String>()
@@ -449,6 +452,10 @@ fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Deviation {
                 let without = dropped.insert(simulation.clone());
                 without.guidance_mut().drop_torque();
                 seen.dropped_m = Some(seen.faulted_m);
+                seen.driven_off = [&*simulation, &*twin].iter().all(|one| {
+                    one.lateral_error_m()
+                        .is_some_and(|error_m| error_m.abs() > OFF_ROAD_M)
+                });
             }
             None => {}
         }

@@ -34,6 +34,8 @@ pub(super) struct TrialRecord {
     /// Last step.
     pub(super) steps: u32,
     pub(super) violation: Option<Violation>,
+    /// Whether the driver was off the road when the ECU left, with or without the fault.
+    pub(super) driven_off: bool,
     /// What the ECU said.
     pub(super) ecu: EcuEvents,
 }

@@ -1,4 +1,4 @@
-//! A speed that changes around the onset, against the drive itself: what the vehicle does, what the bus carries.
+//! A speed that changes around the onset, against the drive itself: what the vehicle does, what the bus carries. And who is judged.
 
 use haptic_log::trace::Sample;
 use haptic_sim::simulation::simulate;
@@ -212,4 +212,18 @@ fn whoever_drives_is_stable_at_every_speed_of_the_run() {
             }
         }
     }
+}
+
+/// At 130 km/h the taps of this participant throw the vehicle 4 m aside, where the camera's signal ends: the ECU hands over,
+/// rightly, and the run is none of a driver who loses the guidance for nothing. Who stays on the road is judged.
+#[test]
+fn a_driver_who_taps_is_judged_on_the_road_only() {
+    let world = World::new();
+    let taps = by_name("driver-taps");
+    let off = world.run(taps, 27);
+    assert!(off.left_after_ms.is_some());
+    assert!(off.deviation.driven_off && off.deviation.is_off_road());
+    assert!(off.failure.is_none(), "{:?}", off.failure);
+    let on = world.run(taps, 11);
+    assert_eq!((on.left_after_ms, on.deviation.driven_off), (None, false));
 }
