@@ -180,6 +180,34 @@ pub(crate) fn drive_all<T: Send>(
     })
 }
 
+/// As [`drive_all`], but what the lanes hand back is nothing: whoever asks has a better way to drive it.
+///
+/// # Errors
+/// As [`Group::drive`].
+pub(crate) fn first_in_lanes<T: Send>(
+    scenarios: &[Scenario],
+    seed: u64,
+    measure: impl Fn(usize, &Run) -> T + Sync,
+) -> Result<Vec<Option<T>>, String> {
+    let checked = Checked::new(seed, scenarios.len() as u64);
+    in_groups(scenarios, |first, scenarios| {
+        let mut found: Vec<Option<T>> = scenarios.iter().map(|_| None).collect();
+        let group = Group {
+            scenarios,
+            first: first as u64,
+            checked,
+        };
+        let alone = |place: usize| simulate(&scenarios[place]);
+        group.in_lanes(Asked::default(), alone, |place, event| {
+            if let Event::Ended(run) = event {
+                found[place] = Some(measure(first + place, run));
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    })
+}
+
 /// What `of_group` makes of the parts of a list, on all cores, in the list's order; it gets the place of the part's first.
 ///
 /// # Errors
