@@ -10,10 +10,12 @@
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{PublishedDriver, participants};
+use haptic_sim::scenario::Scenario;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::experiment::{Probe, recorded, truth_of};
+use crate::experiment::{Probe, guided_drive, log_group, recorded, truth_of};
+use crate::lanes::{Checked, Group, in_groups};
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -119,19 +121,29 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Str
             }
         }
     }
-    let cells: Vec<Cell> = jobs
-        .into_par_iter()
-        .map(|(course, probe, number, driver)| {
+    let checked = Checked::new(question.seed, jobs.len() as u64);
+    let cells: Vec<Cell> = in_groups(&jobs, |first, jobs| {
+        let scenarios = jobs.iter().map(|&(course, probe, number, driver)| {
             let seed = question.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
-            let log = recorded(&driver, Some(&question.courses[course]), probe, seed)?;
+            guided_drive(&driver, Some(&question.courses[course]), probe, seed)
+        });
+        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
+        let driven = log_group(Group {
+            scenarios: &scenarios,
+            first: first as u64,
+            checked,
+        })?;
+        let cells = driven.into_iter().zip(jobs);
+        let cells = cells.map(|(driven, &(course, probe, _, driver))| {
             done();
-            Ok(Cell {
+            Cell {
                 course,
                 probe,
-                information: information(&log, &Options::default(), &truth_of(&driver)),
-            })
-        })
-        .collect::<Result<_, String>>()?;
+                information: information(&driven.log, &Options::default(), &truth_of(&driver)),
+            }
+        });
+        Ok(cells.collect())
+    })?;
     let mut designs = Vec::new();
     for (course, road) in question.courses.iter().enumerate() {
         let of = |probe: Option<Probe>| -> Vec<&Information> {

@@ -100,7 +100,7 @@ fn manual(scenario: &Scenario) -> Result<Scenario, String> {
 /// A leg's drive by hand.
 pub(super) fn by_hand(scenario: &Scenario) -> Run {
     let mut simulation = Simulation::with(scenario, NoGuidance);
-    let mut samples = Vec::new();
+    let mut samples = room();
     while simulation.steps() < LEG_STEPS {
         let Some(outcome) = simulation.step(&Action::default()) else {
             break;
@@ -113,7 +113,7 @@ pub(super) fn by_hand(scenario: &Scenario) -> Run {
 /// A leg's drive with the shipping ECU, and what it reported.
 pub(super) fn with_ecu(scenario: &Scenario) -> (Run, Reported) {
     let mut simulation = Simulation::with(scenario, OverBus::new(scenario.setup()));
-    let (mut watch, mut samples) = (Watch::new(), Vec::new());
+    let (mut watch, mut samples) = (Watch::new(), room());
     while watch.steps < LEG_STEPS && watch.reported.mode != Mode::Fault {
         let action = watch.action();
         let Some(outcome) = simulation.step(&action) else {
@@ -123,6 +123,11 @@ pub(super) fn with_ecu(scenario: &Scenario) -> (Run, Reported) {
         watch.observe(&outcome);
     }
     (run_of(samples, simulation.ending(), watch.steps), watch.reported)
+}
+
+/// For the samples of a leg.
+fn room() -> Vec<Sample> {
+    Vec::with_capacity((LEG_S * f64::from(SAMPLE_RATE_HZ)) as usize + 1)
 }
 
 fn run_of(samples: Vec<Sample>, ending: Option<Ending>, steps: u32) -> Run {

@@ -3,17 +3,18 @@
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::lanes::{Asked, Event};
 use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::Course;
 use haptic_sim::participants::PublishedDriver;
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
 use haptic_sim::simulation;
 
-use super::{Plan, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, path_of};
+use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, path_of};
 use crate::lanes::{Checked, Group, in_groups};
 
 /// A drive with what is needed to judge it.
-pub(super) struct Driven {
+pub(crate) struct Driven {
     pub(super) scenario: Scenario,
-    pub(super) log: DriveLog,
+    pub(crate) log: DriveLog,
     pub(super) path: Vec<(f64, f64)>,
 }
 
@@ -57,7 +58,7 @@ pub(super) fn scenario_of_drive(
     Ok(scenario.to_builder().driver(driver).build()?)
 }
 
-fn driven_alone(scenario: &Scenario) -> Driven {
+pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
     let mut recorder = Recorder::new(true);
     let run = simulation::observe(scenario, |outcome| recorder.observe(outcome));
     Driven {
@@ -80,7 +81,7 @@ pub(super) fn drive_logged(scenarios: &[Scenario], seed: u64) -> Result<Vec<Driv
 }
 
 /// The same in one thread.
-pub(super) fn log_group(group: Group) -> Result<Vec<Driven>, String> {
+pub(crate) fn log_group(group: Group) -> Result<Vec<Driven>, String> {
     let scenarios = group.scenarios;
     let asked = Asked {
         every_step: true,
@@ -107,6 +108,45 @@ pub(super) fn log_group(group: Group) -> Result<Vec<Driven>, String> {
         all[place] = Some(driven_alone(&scenarios[place]));
     }
     Ok(all.into_iter().flatten().collect())
+}
+
+/// A guided drive of a published driver with the remnant and the paper's sensors, on any course (the built-in one if
+/// none), as it is logged.
+///
+/// # Errors
+/// As [`guided_drive`].
+pub fn recorded(
+    driver: &PublishedDriver,
+    course: Option<&Course>,
+    probe: Option<Probe>,
+    seed: u64,
+) -> Result<DriveLog, String> {
+    Ok(driven_alone(&guided_drive(driver, course, probe, seed)?).log)
+}
+
+/// The scenario of that drive.
+///
+/// # Errors
+/// A course that is too short; a probe that the controller refuses.
+pub(crate) fn guided_drive(
+    driver: &PublishedDriver,
+    course: Option<&Course>,
+    probe: Option<Probe>,
+    seed: u64,
+) -> Result<Scenario, String> {
+    let mut scenario = Scenario::builder()
+        .driver(DriverParameters {
+            remnant_sd_nm: REMNANT_GUIDED_NM,
+            ..driver.parameters()
+        })
+        .condition(Condition::Custom)
+        .gains(driver.gains())
+        .guidance(probe.map_or_else(GuidanceParameters::default, Probe::guidance))
+        .seed(seed);
+    if let Some(course) = course {
+        scenario = scenario.course(course.clone());
+    }
+    Ok(scenario.build()?)
 }
 
 /// The drive of a published driver, without remnant.

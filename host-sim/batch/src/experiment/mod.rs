@@ -36,10 +36,11 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{Participant, PublishedDriver, participants};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
-use haptic_sim::simulation;
 
 use crate::lanes::drive_all;
+pub use drives::recorded;
 use drives::{Driven, drive_logged, scenario_of_drive};
+pub(crate) use drives::{guided_drive, log_group};
 
 /// Standard deviation of the remnant in manual driving, N.m.
 pub const REMNANT_MANUAL_NM: f64 = 0.097;
@@ -233,34 +234,6 @@ impl Probe {
             .guidance(self.guidance());
         scenario.build().is_ok()
     }
-}
-
-/// A guided drive of a published driver with the remnant and the paper's sensors, on any course (the built-in one if
-/// none), as it is logged.
-///
-/// # Errors
-/// A course that is too short; a probe that the controller refuses.
-pub fn recorded(
-    driver: &PublishedDriver,
-    course: Option<&Course>,
-    probe: Option<Probe>,
-    seed: u64,
-) -> Result<DriveLog, String> {
-    let mut scenario = Scenario::builder()
-        .driver(DriverParameters {
-            remnant_sd_nm: REMNANT_GUIDED_NM,
-            ..driver.parameters()
-        })
-        .condition(Condition::Custom)
-        .gains(driver.gains())
-        .guidance(probe.map_or_else(GuidanceParameters::default, Probe::guidance))
-        .seed(seed);
-    if let Some(course) = course {
-        scenario = scenario.course(course.clone());
-    }
-    let mut recorder = Recorder::new(true);
-    simulation::observe(&scenario.build()?, |outcome| recorder.observe(outcome));
-    Ok(recorder.into_log())
 }
 
 /// What a published driver and the remnant of the guided drives are, for the information bound.
