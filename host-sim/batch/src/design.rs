@@ -99,30 +99,23 @@ struct Cell {
     information: Information,
 }
 
-/// Answers `question`; `done` is called after each drive.
-///
-/// # Errors
-/// An unknown participant or parameter; a course that cannot be driven.
-pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, String> {
-    let Some(place) = INFORMED[..5].iter().position(|&n| n == question.parameter) else {
-        return Err(format!(
-            "parameter {:?} is unknown, one of {} is wanted",
-            question.parameter,
-            INFORMED[..5].join(", ")
-        ));
-    };
-    let drivers = drivers(&question.participants)?;
-    let probes = probes(question);
+/// What the drives of each course, probe and driver tell.
+fn cells(
+    question: &Question,
+    drivers: &[(u32, PublishedDriver)],
+    probes: &[Option<Probe>],
+    done: impl Fn() + Sync,
+) -> Result<Vec<Cell>, String> {
     let mut jobs = Vec::new();
     for course in 0..question.courses.len() {
-        for &probe in &probes {
-            for &(number, driver) in &drivers {
+        for &probe in probes {
+            for &(number, driver) in drivers {
                 jobs.push((course, probe, number, driver));
             }
         }
     }
     let checked = Checked::new(question.seed, jobs.len() as u64);
-    let cells: Vec<Cell> = in_groups(&jobs, |first, jobs| {
+    in_groups(&jobs, |first, jobs| {
         let scenarios = jobs.iter().map(|&(course, probe, number, driver)| {
             let seed = question.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
             guided_drive(&driver, Some(&question.courses[course]), probe, seed)
@@ -143,7 +136,24 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Str
             }
         });
         Ok(cells.collect())
-    })?;
+    })
+}
+
+/// Answers `question`; `done` is called after each drive.
+///
+/// # Errors
+/// An unknown participant or parameter; a course that cannot be driven.
+pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, String> {
+    let Some(place) = INFORMED[..5].iter().position(|&n| n == question.parameter) else {
+        return Err(format!(
+            "parameter {:?} is unknown, one of {} is wanted",
+            question.parameter,
+            INFORMED[..5].join(", ")
+        ));
+    };
+    let drivers = drivers(&question.participants)?;
+    let probes = probes(question);
+    let cells = cells(question, &drivers, &probes, &done)?;
     let mut designs = Vec::new();
     for (course, road) in question.courses.iter().enumerate() {
         let of = |probe: Option<Probe>| -> Vec<&Information> {

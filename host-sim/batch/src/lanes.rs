@@ -83,7 +83,7 @@ impl Group<'_> {
         alone: impl Fn(usize) -> Run,
         on: impl FnMut(usize, Event) -> Result<(), String>,
     ) -> Result<Vec<usize>, String> {
-        self.with(drive_in_lanes(self.scenarios, asked), alone, on)
+        self.with(|on| drive_in_lanes(self.scenarios, asked, on), alone, on)
     }
 
     /// The same by whatever drives side by side.
@@ -112,13 +112,11 @@ impl Group<'_> {
     }
 }
 
-fn drive_in_lanes(scenarios: &[Scenario], asked: Asked) -> impl FnOnce(&mut dyn FnMut(usize, Event)) {
-    move |on| {
-        if scenarios.len() < FEWEST {
-            (0..scenarios.len()).for_each(|place| on(place, Event::HandedBack));
-        } else {
-            drive_asked(scenarios, asked, on);
-        }
+fn drive_in_lanes(scenarios: &[Scenario], asked: Asked, on: &mut dyn FnMut(usize, Event)) {
+    if scenarios.len() < FEWEST {
+        (0..scenarios.len()).for_each(|place| on(place, Event::HandedBack));
+    } else {
+        drive_asked(scenarios, asked, on);
     }
 }
 
