@@ -114,7 +114,7 @@ pub(crate) fn log_group(group: Group) -> Result<Vec<Driven>, String> {
 /// none), as it is logged.
 ///
 /// # Errors
-/// As [`guided_drive`].
+/// A course that is too short; a probe that the controller refuses.
 pub fn recorded(
     driver: &PublishedDriver,
     course: Option<&Course>,
