@@ -331,7 +331,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/analysis/src/identify/result.rs", "one document: the fields of a result"),
     ("host-sim/analysis/src/identify/search.rs", "one algorithm with its tests"),
     ("host-sim/batch/src/design.rs", "one study: question, designs, confirmation"),
-    ("host-sim/batch/src/experiment/mod.rs", "one study of drivers with a known truth"),
     ("host-sim/batch/src/experiment/spoiled.rs", "one study of one kind of spoiled log after the other"),
     ("host-sim/batch/src/reliance/mod.rs", "one study: drives, sessions, errors"),
     ("host-sim/campaign/src/ecu_harness.rs", "what stands between the world and the ECU, with what it injects"),

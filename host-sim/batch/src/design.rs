@@ -10,10 +10,12 @@
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{PublishedDriver, participants};
+use haptic_sim::scenario::Scenario;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::experiment::{Probe, recorded, truth_of};
+use crate::experiment::{Probe, guided_drive, log_group, recorded, truth_of};
+use crate::lanes::{Checked, Group, in_groups};
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -97,6 +99,46 @@ struct Cell {
     information: Information,
 }
 
+/// What the drives of each course, probe and driver tell.
+fn cells(
+    question: &Question,
+    drivers: &[(u32, PublishedDriver)],
+    probes: &[Option<Probe>],
+    done: impl Fn() + Sync,
+) -> Result<Vec<Cell>, String> {
+    let mut jobs = Vec::new();
+    for course in 0..question.courses.len() {
+        for &probe in probes {
+            for &(number, driver) in drivers {
+                jobs.push((course, probe, number, driver));
+            }
+        }
+    }
+    let checked = Checked::new(question.seed, jobs.len() as u64);
+    in_groups(&jobs, |first, jobs| {
+        let scenarios = jobs.iter().map(|&(course, probe, number, driver)| {
+            let seed = question.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
+            guided_drive(&driver, Some(&question.courses[course]), probe, seed)
+        });
+        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
+        let driven = log_group(Group {
+            scenarios: &scenarios,
+            first: first as u64,
+            checked,
+        })?;
+        let cells = driven.into_iter().zip(jobs);
+        let cells = cells.map(|(driven, &(course, probe, _, driver))| {
+            done();
+            Cell {
+                course,
+                probe,
+                information: information(&driven.log, &Options::default(), &truth_of(&driver)),
+            }
+        });
+        Ok(cells.collect())
+    })
+}
+
 /// Answers `question`; `done` is called after each drive.
 ///
 /// # Errors
@@ -111,27 +153,7 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Str
     };
     let drivers = drivers(&question.participants)?;
     let probes = probes(question);
-    let mut jobs = Vec::new();
-    for course in 0..question.courses.len() {
-        for &probe in &probes {
-            for &(number, driver) in &drivers {
-                jobs.push((course, probe, number, driver));
-            }
-        }
-    }
-    let cells: Vec<Cell> = jobs
-        .into_par_iter()
-        .map(|(course, probe, number, driver)| {
-            let seed = question.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
-            let log = recorded(&driver, Some(&question.courses[course]), probe, seed)?;
-            done();
-            Ok(Cell {
-                course,
-                probe,
-                information: information(&log, &Options::default(), &truth_of(&driver)),
-            })
-        })
-        .collect::<Result<_, String>>()?;
+    let cells = cells(question, &drivers, &probes, &done)?;
     let mut designs = Vec::new();
     for (course, road) in question.courses.iter().enumerate() {
         let of = |probe: Option<Probe>| -> Vec<&Information> {

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::RunRecord;
 use super::claims::{self, Claim};
+use super::lanes::first_in_lanes;
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use haptic_analysis::metrics::Window;
 use haptic_sim::fork::simulate_forked;
@@ -79,11 +80,7 @@ pub fn evaluate(
 ) -> Result<Evaluation, String> {
     let window = window.unwrap_or_else(|| default_window(base.course()));
     super::check_window(window, base)?;
-    let groups: Vec<Vec<(Scenario, Run)>> = families(base)?
-        .into_par_iter()
-        .map(|family| drive(family, &progress))
-        .collect::<Result<_, _>>()?;
-    let mut runs: Vec<(Scenario, Run)> = groups.into_iter().flatten().collect();
+    let mut runs = drive(families(base)?, base.seed(), &progress)?;
     // Driver by driver: without failure, with the sudden loss; behind all of them the lost inputs. Stable.
     let place = |scenario: &Scenario| match scenario.failure().kind {
         FailureKind::Input => usize::MAX,
@@ -163,10 +160,39 @@ fn families(base: &Scenario) -> Result<Vec<Family>, ScenarioError> {
     Ok(families)
 }
 
-fn drive(family: Family, progress: &impl Fn()) -> Result<Vec<(Scenario, Run)>, ScenarioError> {
-    let Family { nominal, failing } = family;
-    let failures: Vec<Failure> = failing.iter().map(Scenario::failure).collect();
-    let (run, runs) = simulate_forked(&nominal, &failures)?;
-    let all = std::iter::once((nominal, run)).chain(failing.into_iter().zip(runs));
-    Ok(all.inspect(|_| progress()).collect())
+/// All runs, family by family: in lanes, and a family of which one is handed back as a fork with the shipping ECU.
+fn drive(
+    families: Vec<Family>,
+    seed: u64,
+    progress: &(impl Fn() + Sync),
+) -> Result<Vec<(Scenario, Run)>, String> {
+    let all = families
+        .iter()
+        .flat_map(|family| std::iter::once(&family.nominal).chain(&family.failing));
+    let scenarios: Vec<Scenario> = all.cloned().collect();
+    let mut runs = first_in_lanes(&scenarios, seed, |_, run| run.clone())?.into_iter();
+    let with_runs: Vec<(Family, Vec<Option<Run>>)> = families
+        .into_iter()
+        .map(|family| {
+            let of_family = runs.by_ref().take(1 + family.failing.len()).collect();
+            (family, of_family)
+        })
+        .collect();
+    let driven: Vec<Vec<(Scenario, Run)>> = with_runs
+        .into_par_iter()
+        .map(|(family, runs)| {
+            let Family { nominal, failing } = family;
+            let runs = match runs.into_iter().collect::<Option<Vec<Run>>>() {
+                Some(runs) => runs,
+                None => {
+                    let failures: Vec<Failure> = failing.iter().map(Scenario::failure).collect();
+                    let (run, failed) = simulate_forked(&nominal, &failures)?;
+                    std::iter::once(run).chain(failed).collect()
+                }
+            };
+            let scenarios = std::iter::once(nominal).chain(failing);
+            Ok(scenarios.zip(runs).inspect(|_| progress()).collect())
+        })
+        .collect::<Result<_, ScenarioError>>()?;
+    Ok(driven.into_iter().flatten().collect())
 }

@@ -10,14 +10,14 @@
 //! value in the second half is at most 0.9 times that of the whole. Low reliance is shown, not judged: this driver
 //! drives nearly as manually, works against the guidance until the failure is noticed, and has least to lose by its absence.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::evaluate::DRIVERS_T_P;
+use super::lanes::drive_all;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenario};
-use haptic_sim::simulation::{Run, simulate};
+use haptic_sim::simulation::Run;
 
 /// Speeds of the study, km/h.
 pub const SPEEDS_KMH: [f64; 9] = [40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0, 120.0];
@@ -83,17 +83,30 @@ pub struct HandoverResults {
 /// Runs every row on all cores; `progress` is called after each.
 ///
 /// # Errors
-/// As [`haptic_sim::scenario::ScenarioBuilder::build`]; none of these scenarios meets one.
+/// As [`haptic_sim::scenario::ScenarioBuilder::build`], none of these scenarios meets one; a run for which lanes and
+/// shipping ECU differ.
 pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
         .flat_map(|kmh| DRIVERS_T_P.map(|t_p| (*kmh, t_p)))
         .collect();
-    let rows: Vec<Vec<HandoverRow>> = cases
-        .into_par_iter()
-        .map(|(kmh, t_p)| rows_of(kmh, t_p, &progress))
-        .collect::<Result<_, String>>()?;
-    let rows: Vec<HandoverRow> = rows.into_iter().flatten().collect();
+    let scenarios = cases
+        .iter()
+        .map(|(kmh, t_p)| scenarios_of(*kmh, *t_p))
+        .collect::<Result<Vec<_>, _>>()?
+        .concat();
+    let peaks = drive_all(&scenarios, scenarios[0].seed(), |number, run| {
+        if number % RUNS_OF_A_CASE != 0 && scenarios[number].failure().kind == FailureKind::None {
+            progress();
+        }
+        let course_m = scenarios[number].course().length_m();
+        let straight_m = LAST_STRAIGHT_M * scenarios[number].speed_kmh() / DEFAULT_SPEED_KMH;
+        Ok([0.0, course_m - straight_m, course_m - 0.5 * straight_m].map(|from_m| peak_m(run, from_m)))
+    })?;
+    let of_cases = cases.iter().zip(peaks.chunks(RUNS_OF_A_CASE));
+    let rows: Vec<HandoverRow> = of_cases
+        .flat_map(|((kmh, t_p), peaks)| rows_of(*kmh, *t_p, peaks))
+        .collect();
     let judged = rows.iter().filter(|row| row.is_judged());
     Ok(HandoverResults {
         largest_judged_ratio: judged.filter_map(|row| row.handover_ratio).fold(0.0, f64::max),
@@ -102,7 +115,15 @@ pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
     })
 }
 
-fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Vec<HandoverRow>, String> {
+/// Reliances of the guided drivers.
+const RELIANCES: [Condition; 3] = [Condition::High, Condition::Mid, Condition::Low];
+/// What fails in the drives of one of them.
+const KINDS: [FailureKind; 3] = [FailureKind::None, FailureKind::Input, FailureKind::Torque];
+/// The manual drive, and the guided ones.
+const RUNS_OF_A_CASE: usize = 1 + RELIANCES.len() * KINDS.len();
+
+/// The runs at a speed with a delay: manual, then each reliance with each failure.
+fn scenarios_of(speed_kmh: f64, t_p: f64) -> Result<Vec<Scenario>, String> {
     let course = stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?;
     let run = |condition: Condition, kind| {
         let scenario = Scenario::builder()
@@ -116,26 +137,31 @@ fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Ve
             .failure(Failure {
                 kind,
                 time_s: FAILURE_S,
-            })
-            .build()?;
-        Ok::<_, String>(simulate(&scenario))
+            });
+        scenario.build().map_err(String::from)
     };
-    let manual = run(Condition::Manual, FailureKind::None)?;
-    let manual_m = peak_m(&manual, 0.0);
-    let straight_m = LAST_STRAIGHT_M * speed_kmh / DEFAULT_SPEED_KMH;
-    let manual_stable =
-        match [straight_m, 0.5 * straight_m].map(|rest_m| peak_m(&manual, course.length_m() - rest_m)) {
-            [Some(whole_m), Some(second_half_m)] => second_half_m < (0.9 * whole_m).max(SETTLED_M),
-            _ => false,
-        };
-    let mut rows = Vec::new();
-    for condition in [Condition::High, Condition::Mid, Condition::Low] {
-        let peak = |kind| run(condition, kind).map(|run| peak_m(&run, 0.0));
-        let nominal_m = peak(FailureKind::None)?;
-        let (handover_m, loss_m) = (peak(FailureKind::Input)?, peak(FailureKind::Torque)?);
+    let guided = RELIANCES
+        .iter()
+        .flat_map(|condition| KINDS.map(|kind| (*condition, kind)));
+    std::iter::once((Condition::Manual, FailureKind::None))
+        .chain(guided)
+        .map(|(condition, kind)| run(condition, kind))
+        .collect()
+}
+
+/// From the peaks of each run, as [`scenarios_of`] has them: over the whole course, the last straight and its second half.
+fn rows_of(speed_kmh: f64, t_p: f64, peaks: &[[Option<f64>; 3]]) -> impl Iterator<Item = HandoverRow> {
+    let [manual_m, straight_m, second_half_m] = peaks[0];
+    let manual_stable = match (straight_m, second_half_m) {
+        (Some(whole_m), Some(second_half_m)) => second_half_m < (0.9 * whole_m).max(SETTLED_M),
+        _ => false,
+    };
+    let of_reliances = RELIANCES.into_iter().zip(peaks[1..].chunks(KINDS.len()));
+    of_reliances.map(move |(condition, peaks)| {
+        let [nominal_m, handover_m, loss_m] = [0, 1, 2].map(|kind: usize| peaks[kind][0]);
         let larger_m = nominal_m.zip(manual_m).map(|(a, b)| a.max(b));
         let ratio = |failed: Option<f64>| failed.zip(larger_m).map(|(a, b)| a / b);
-        rows.push(HandoverRow {
+        HandoverRow {
             speed_kmh,
             t_p,
             condition,
@@ -146,10 +172,8 @@ fn rows_of(speed_kmh: f64, t_p: f64, progress: &(impl Fn() + Sync)) -> Result<Ve
             loss_m,
             handover_ratio: ratio(handover_m),
             loss_ratio: ratio(loss_m),
-        });
-        progress();
-    }
-    Ok(rows)
+        }
+    })
 }
 
 /// Largest lateral error from a place on, m; `None` for a run that diverged.

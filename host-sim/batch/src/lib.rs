@@ -42,6 +42,7 @@ pub mod experiment;
 pub mod files;
 pub mod handover;
 pub mod identify;
+mod lanes;
 mod record;
 pub mod reliance;
 pub mod run;

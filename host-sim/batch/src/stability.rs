@@ -13,10 +13,11 @@ use serde::Serialize;
 use haptic_core::params::Params;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Scenario};
-use haptic_sim::simulation::simulate;
+use haptic_sim::simulation::Run;
 use haptic_sim::stability::{Guided, growth_per_s};
 
 use crate::handover::{peak_m, stretched_curve};
+use crate::lanes::drive_all;
 
 /// Speeds of the map, km/h.
 pub const SPEEDS_KMH: [f64; 12] = [
@@ -102,18 +103,24 @@ pub fn map(base: &Scenario, progress: impl Fn() + Sync) -> Result<Vec<Place>, St
         .iter()
         .flat_map(|kmh| DELAYS_S.map(|t_p| (*kmh, t_p)))
         .collect();
-    places
-        .into_par_iter()
-        .map(|(speed_kmh, t_p)| {
-            let drives = Condition::ALL.map(|condition| drive(base, speed_kmh, t_p, condition));
+    let scenarios = places
+        .iter()
+        .flat_map(|(speed_kmh, t_p)| Condition::ALL.map(|condition| at(base, *speed_kmh, *t_p, condition)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let drives = drive_all(&scenarios, base.seed(), |number, run| {
+        if number % Condition::ALL.len() == 0 {
             progress();
-            Ok(Place {
-                speed_kmh,
-                t_p,
-                drives: drives.into_iter().collect::<Result<_, String>>()?,
-            })
+        }
+        Ok(driven(&scenarios[number], run))
+    })?;
+    let of_places = places.iter().zip(drives.chunks(Condition::ALL.len()));
+    Ok(of_places
+        .map(|((speed_kmh, t_p), drives)| Place {
+            speed_kmh: *speed_kmh,
+            t_p: *t_p,
+            drives: drives.to_vec(),
         })
-        .collect()
+        .collect())
 }
 
 /// What any schedule could do, from the eigenvalues alone.
@@ -182,14 +189,14 @@ fn growth(scenario: &Scenario, law: Option<&Params>) -> f64 {
     )
 }
 
-fn drive(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result<Drive, String> {
-    let scenario = at(base, speed_kmh, t_p, condition)?;
+fn driven(scenario: &Scenario, run: &Run) -> Drive {
     let law = &scenario.guidance().controller;
-    Ok(Drive {
+    let condition = scenario.condition();
+    Drive {
         condition,
-        growth_per_s: growth(&scenario, (condition != Condition::Manual).then_some(law)),
-        peak_m: peak_m(&simulate(&scenario), 0.0),
-    })
+        growth_per_s: growth(scenario, (condition != Condition::Manual).then_some(law)),
+        peak_m: peak_m(run, 0.0),
+    }
 }
 
 #[cfg(test)]
@@ -201,7 +208,10 @@ mod tests {
     /// delays holds at the ends of the map.
     #[test]
     fn the_map_holds_the_evaluation() {
-        let drive = |kmh, t_p, condition| drive(&Scenario::default(), kmh, t_p, condition).unwrap();
+        let drive = |kmh, t_p, condition| {
+            let scenario = at(&Scenario::default(), kmh, t_p, condition).unwrap();
+            driven(&scenario, &haptic_sim::simulation::simulate(&scenario))
+        };
         for (t_p, condition, peak_m) in [
             (0.1, Condition::Manual, 0.1255),
             (0.1, Condition::High, 0.1255),

@@ -1,27 +1,19 @@
 //! One leg: five minutes, one car, one road.
 
-use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
-use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_sim::guidance::{NoGuidance, OverBus};
+use haptic_sim::Scenario;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::scenario::Speed;
 use haptic_sim::seeds::Stream;
-use haptic_sim::simulation::Ending;
-use haptic_sim::{Action, Outcome, Scenario, Simulation};
+use haptic_sim::simulation::{Ending, Run};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 
+use super::drive::{Reported, by_hand, with_ecu};
 use super::roads::falling_and_rising;
-use super::{CARS, LEG_S, Road, WorldKind};
+use super::{CARS, Road, WorldKind};
 
-/// The driver asks for guidance again so long after it has left, ms.
-const AGAIN_MS: u32 = 5000;
-/// A request that was not granted is taken back for 100 ms in every second.
-const ASKS_EVERY_MS: u32 = 1000;
-const LOW_MS: u32 = 100;
 /// Corner of the driver's remnant, Hz: lane keeping wanders slowly.
 const REMNANT_CORNER_HZ: f64 = 0.1;
 
@@ -163,64 +155,63 @@ impl LegNumber {
         Ok(scenario)
     }
 
-    /// Drives it.
+    /// Drives it alone, with the shipping ECU.
     ///
     /// # Errors
     /// As [`LegNumber::scenario`].
     pub fn drive(&self, root: u64) -> Result<Leg, String> {
         let scenario = self.scenario(root)?;
-        let mut simulation = Simulation::with(&scenario, OverBus::new(scenario.setup()));
-        let mut watch = Watch::new();
-        while watch.steps < (LEG_S * 1e3) as u32 && watch.mode != Mode::Fault {
-            let action = watch.action();
-            let Some(outcome) = simulation.step(&action) else {
-                break;
-            };
-            watch.observe(&outcome);
-        }
-        let ended = match simulation.ending() {
-            _ if watch.mode == Mode::Fault => Ended::Latched,
-            Some(Ending::Diverged { .. }) => Ended::Diverged,
-            _ => Ended::Whole,
-        };
-        let samples = watch.samples.max(1.0);
-        let mean_m = watch.sum_m / samples;
-        Ok(Leg {
+        let (run, reported) = with_ecu(&scenario);
+        Ok(self.leg(&scenario, &run, reported, ByHand::of(&by_hand(&scenario))))
+    }
+
+    /// What two drives showed.
+    pub(super) fn leg(&self, scenario: &Scenario, run: &Run, reported: Reported, by_hand: ByHand) -> Leg {
+        let errors_m = || run.trace.samples.iter().map(|sample| sample.lateral_error_m);
+        let samples = (run.trace.samples.len() as f64).max(1.0);
+        let sum = |of: fn(f64) -> f64| errors_m().map(of).fold(0.0, |sum, x| sum + x);
+        let mean_m = sum(|error_m| error_m) / samples;
+        Leg {
             world: self.world.name.into(),
             road: self.road.name.into(),
             number: self.number,
             car: scenario.tolerances().car.unwrap_or_default(),
             speed_kmh: scenario.speed_kmh(),
-            driven_s: f64::from(watch.steps) * 1e-3,
-            active_s: f64::from(watch.active) * 1e-3,
-            sdlp_m: (watch.squares_m2 / samples - mean_m * mean_m).max(0.0).sqrt(),
-            largest_error_m: watch.largest_m,
-            ended,
-            declarations: watch.declarations,
-            by_hand: by_hand(&scenario),
-        })
+            driven_s: f64::from(run.steps) * 1e-3,
+            active_s: f64::from(reported.active) * 1e-3,
+            sdlp_m: (sum(|error_m| error_m * error_m) / samples - mean_m * mean_m)
+                .max(0.0)
+                .sqrt(),
+            largest_error_m: largest_error_m(run),
+            ended: match run.ending {
+                _ if reported.mode == Mode::Fault => Ended::Latched,
+                Ending::Diverged { .. } => Ended::Diverged,
+                Ending::CourseEnd => Ended::Whole,
+            },
+            declarations: reported.declarations,
+            by_hand,
+        }
     }
 }
 
-fn by_hand(scenario: &Scenario) -> ByHand {
-    let mut simulation = Simulation::with(scenario, NoGuidance);
-    let mut largest_error_m = 0.0_f64;
-    while simulation.steps() < (LEG_S * 1e3) as u32 {
-        let Some(outcome) = simulation.step(&Action::default()) else {
-            break;
-        };
-        if let Some(sample) = outcome.sample {
-            largest_error_m = largest_error_m.max(sample.lateral_error_m.abs());
+impl ByHand {
+    pub(super) fn of(run: &Run) -> Self {
+        Self {
+            ended: match run.ending {
+                Ending::Diverged { .. } => Ended::Diverged,
+                Ending::CourseEnd => Ended::Whole,
+            },
+            largest_error_m: largest_error_m(run),
         }
     }
-    let ended = match simulation.ending() {
-        Some(Ending::Diverged { .. }) => Ended::Diverged,
-        _ => Ended::Whole,
-    };
-    ByHand {
-        ended,
-        largest_error_m,
-    }
+}
+
+/// Largest distance from the centreline, m.
+fn largest_error_m(run: &Run) -> f64 {
+    let samples = run.trace.samples.iter();
+    samples
+        .map(|sample| sample.lateral_error_m.abs())
+        .fold(0.0, f64::max)
 }
 
 /// A driver who keeps the lane in a real car. The paper's hold the wheel so loosely (1 N.m/rad) that the friction of a
@@ -242,102 +233,4 @@ fn arm(v_m_per_s: f64, reliance: f64) -> ArmGains {
         k_d: (5.0 - reliance) * (1.0 + 1.5 * heavier) - 1.0,
         k_hg: 1.0 - reliance,
     }
-}
-
-/// Driver, host and listener of a leg.
-struct Watch {
-    receiver: ReceiverState,
-    mode: Mode,
-    faults: FaultSet,
-    /// Steps since guidance left; none while it is there.
-    away: Option<u32>,
-    steps: u32,
-    active: u32,
-    /// Lateral acceleration of the road, left positive.
-    lateral_m_per_s2: f64,
-    samples: f64,
-    sum_m: f64,
-    squares_m2: f64,
-    largest_m: f64,
-    declarations: Vec<Declaration>,
-}
-
-impl Watch {
-    fn new() -> Self {
-        Self {
-            receiver: ReceiverState::TRUSTED,
-            mode: Mode::Active,
-            faults: FaultSet::NONE,
-            away: None,
-            steps: 0,
-            active: 0,
-            lateral_m_per_s2: 0.0,
-            samples: 0.0,
-            sum_m: 0.0,
-            squares_m2: 0.0,
-            largest_m: 0.0,
-            declarations: Vec::new(),
-        }
-    }
-
-    /// What driver and host do next.
-    fn action(&self) -> Action {
-        let engage = match self.away {
-            None => true,
-            // A handover goes on while the request stays.
-            Some(_) if self.mode != Mode::Standby => true,
-            Some(away) => away >= AGAIN_MS && away % ASKS_EVERY_MS >= LOW_MS,
-        };
-        Action {
-            engage: Some(engage),
-            ..Action::default()
-        }
-    }
-
-    fn observe(&mut self, outcome: &Outcome) {
-        self.steps += 1;
-        if let Some(sample) = outcome.sample {
-            let v = sample.speed_m_per_s;
-            self.lateral_m_per_s2 = sample.curvature_1pm * v * v;
-            let error_m = sample.lateral_error_m;
-            self.samples += 1.0;
-            self.sum_m += error_m;
-            self.squares_m2 += error_m * error_m;
-            self.largest_m = self.largest_m.max(error_m.abs());
-        }
-        let frame = outcome.frames_out.first();
-        let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
-        if let Some(guidance) = guidance {
-            if self.mode == Mode::Active && guidance.mode != Mode::Active {
-                let named = guidance.faults.without(self.faults);
-                self.declarations.push(Declaration {
-                    time_s: outcome.time_s(),
-                    faults: names(if named == FaultSet::NONE {
-                        guidance.faults
-                    } else {
-                        named
-                    }),
-                    lateral_m_per_s2: self.lateral_m_per_s2,
-                });
-            }
-            (self.mode, self.faults) = (guidance.mode, guidance.faults);
-        }
-        if self.mode == Mode::Active {
-            (self.active, self.away) = (self.active + 1, None);
-        } else {
-            self.away = Some(self.away.map_or(0, |away| away + 1));
-        }
-    }
-}
-
-fn names(faults: FaultSet) -> String {
-    let named: Vec<String> = Fault::ALL
-        .into_iter()
-        .filter(|fault| faults.contains(*fault))
-        .map(|fault| format!("{fault:?}"))
-        .collect();
-    if named.is_empty() {
-        return "none named".into();
-    }
-    named.join("+")
 }

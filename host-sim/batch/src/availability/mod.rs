@@ -15,16 +15,18 @@
 //!
 //! Not here: what is missed. `haptic-campaign` injects faults into the same world.
 
+mod drive;
 mod leg;
 mod roads;
 
 use haptic_sim::worlds::WorldKind;
-use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 pub use leg::{ByHand, Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
+
+use crate::lanes::in_groups;
 
 /// Length of a leg, s.
 pub const LEG_S: f64 = 300.0;
@@ -213,7 +215,7 @@ impl Availability {
 /// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
 ///
 /// # Errors
-/// A world that is no scenario; the built-in ones are.
+/// A world that is no scenario, the built-in ones are; what `done` says; a drive for which lanes and shipping ECU differ.
 pub fn study(
     plan: &Plan,
     on_record: &[Leg],
@@ -224,14 +226,15 @@ pub fn study(
         .into_iter()
         .filter(|number| !on_record.iter().any(|leg| leg.is(number)))
         .collect();
-    let driven: Vec<Leg> = missing
-        .into_par_iter()
-        .map(|number| {
-            let leg = number.drive(plan.seed)?;
+    let driven: Vec<Leg> = in_groups(&missing, |first, numbers| {
+        let mut legs: Vec<Option<Leg>> = vec![None; numbers.len()];
+        drive::side_by_side(numbers, plan.seed, [first, missing.len()], |place, leg| {
             done(&leg)?;
-            Ok(leg)
-        })
-        .collect::<Result<_, String>>()?;
+            legs[place] = Some(leg);
+            Ok(())
+        })?;
+        Ok(legs.into_iter().flatten().collect())
+    })?;
     let on_record = on_record.iter().filter(|leg| plan.has(leg));
     Ok(summary(plan, &on_record.chain(&driven).collect::<Vec<_>>()))
 }

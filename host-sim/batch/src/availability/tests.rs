@@ -249,3 +249,32 @@ fn braking_in_a_real_world_is_no_fault() {
     }
     assert!(active_s > 1790.0, "{active_s}");
 }
+
+/// Every field of every leg: side by side as alone with the shipping ECU, where all lanes drive, where none can for the
+/// camera, and where some drives are handed back.
+#[test]
+fn legs_are_the_same_side_by_side() {
+    for name in ["calibrated", "everything", "camera", "slippery"] {
+        let world = WORLDS.iter().find(|world| world.name == name).unwrap();
+        let roads = [0, 1, 0].map(|road| &ROADS[road]);
+        let legs: Vec<LegNumber> = (7..10)
+            .zip(roads)
+            .map(|(number, road)| LegNumber { world, road, number })
+            .collect();
+        let mut found = vec![None; legs.len()];
+        let keep = |place: usize, leg| {
+            assert_eq!(found[place].replace(leg), None, "{name} {place}");
+            Ok(())
+        };
+        drive::side_by_side(&legs, 1, [0, legs.len()], keep).unwrap();
+        for (number, leg) in legs.iter().zip(&found) {
+            // As the file has it, which tells 0 from -0.
+            let text = |leg: &Leg| toml::to_string(leg).unwrap();
+            assert_eq!(
+                text(leg.as_ref().unwrap()),
+                text(&number.drive(1).unwrap()),
+                "{name}"
+            );
+        }
+    }
+}

@@ -8,9 +8,10 @@ use haptic_analysis::identify::{Identification, Options, identify_as_published, 
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::drives::driven;
 use super::repetitions::{COMPARED, bound_of, compared};
 use super::spoiled::{POPULATION, Spoiling, spoiled_log};
-use super::{Plan, chosen, driven};
+use super::{Plan, chosen};
 
 /// The ways.
 pub const METHODS: [&str; 4] = ["none", "plain smoother", "default", "published"];

@@ -12,6 +12,7 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
+mod drives;
 mod methods;
 mod recorder;
 mod repetitions;
@@ -35,7 +36,11 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{Participant, PublishedDriver, participants};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
-use haptic_sim::simulation;
+
+use crate::lanes::drive_all;
+pub use drives::recorded;
+use drives::{Driven, drive_logged, scenario_of_drive};
+pub(crate) use drives::{guided_drive, log_group};
 
 /// Standard deviation of the remnant in manual driving, N.m.
 pub const REMNANT_MANUAL_NM: f64 = 0.097;
@@ -110,21 +115,53 @@ pub struct Finding {
 /// Drives, identifies and validates; `done` is called after each drive, from any thread.
 ///
 /// # Errors
-/// An unknown participant; a probe that the controller refuses.
+/// An unknown participant; a probe that the controller refuses; a drive for which lanes and shipping ECU differ.
 pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, String> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])
         .collect();
     let course = Course::paper();
-    let drives = drives
-        .into_par_iter()
-        .map(|(number, truth)| {
-            let drive = one_drive(plan, number, truth);
-            done();
-            drive
+    let scenarios = drives
+        .iter()
+        .map(|(number, truth)| scenario_of_drive(plan, *number, truth, truth.parameters()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let driven = drive_logged(&scenarios, plan.seed)?;
+    let found = driven.par_iter().zip(&drives).map(|(driven, (_, truth))| {
+        let found = identified(driven, truth);
+        done();
+        found
+    });
+    let found: Vec<[Identified; 2]> = found.collect::<Result<_, _>>()?;
+    let again: Vec<Scenario> = found.iter().flatten().map(|f| f.driver.clone()).collect();
+    let paths = drive_all(&again, plan.seed, |_, run| {
+        Ok((path_of(&run.trace), run.diverged()))
+    })?;
+    let paths = found.into_iter().flatten().zip(paths);
+    let mut findings = paths.map(|(found, (again, diverged))| (found.identification, again, diverged));
+    let drives = drives.into_iter().zip(driven).map(|((number, truth), driven)| {
+        let Driven { scenario, log, path } = driven;
+        let mut finding = || {
+            let (identification, again, diverged) = findings.next()?;
+            Some(Finding {
+                trajectory_error_m: (!diverged).then(|| mean_distance(&path, &again)),
+                path: again,
+                identification,
+            })
+        };
+        let (noise_model, paper) = finding().zip(finding())?;
+        Some(Drive {
+            participant: number,
+            guided: truth.k_hg.is_some(),
+            truth,
+            remnant_sd_nm: scenario.driver().remnant_sd_nm,
+            noise_model,
+            paper,
+            path,
+            log,
         })
-        .collect::<Result<_, _>>()?;
+    });
+    let drives = drives.flatten().collect();
     Ok(Experiment {
         course: course.name().into(),
         probe_nm: plan.probe_nm,
@@ -144,79 +181,29 @@ fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, String> {
     numbers.iter().map(find).collect()
 }
 
-/// A drive with what is needed to judge it.
-struct Driven {
-    scenario: Scenario,
-    log: DriveLog,
-    path: Vec<(f64, f64)>,
+/// What a method makes of a log, and the driver that it found.
+struct Identified {
+    identification: Identification,
+    driver: Scenario,
 }
 
-/// Lets a published driver drive, with a remnant and the paper's sensors.
-fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
-    driven_by(plan, number, truth, truth.parameters())
-}
-
-/// The same, by a driver who differs from the published one in what the log does not name.
-fn driven_by(
-    plan: &Plan,
-    number: u32,
-    truth: &PublishedDriver,
-    driver: DriverParameters,
-) -> Result<Driven, String> {
-    let guided = truth.k_hg.is_some();
-    let seed = plan
-        .seed
-        .wrapping_mul(1000)
-        .wrapping_add(u64::from(2 * number) + u64::from(guided));
-    let scenario = scenario_of(plan, truth, seed)?;
-    let remnant_sd_nm = if guided {
-        REMNANT_GUIDED_NM
-    } else {
-        REMNANT_MANUAL_NM
-    };
-    let driver = DriverParameters {
-        remnant_sd_nm,
-        ..driver
-    };
-    let scenario = scenario.to_builder().driver(driver).build()?;
-    let mut recorder = Recorder::new(true);
-    let run = simulation::observe(&scenario, |outcome| recorder.observe(outcome));
-    Ok(Driven {
-        scenario,
-        log: recorder.into_log(),
-        path: path_of(&run.trace),
-    })
-}
-
-fn one_drive(plan: &Plan, number: u32, truth: PublishedDriver) -> Result<Drive, String> {
-    let Driven { scenario, log, path } = driven(plan, number, &truth)?;
-    let guided = truth.k_hg.is_some();
+/// By the default method, and by the published one.
+fn identified(driven: &Driven, truth: &PublishedDriver) -> Result<[Identified; 2], String> {
     let options = Options {
-        manual: !guided,
+        manual: truth.k_hg.is_none(),
         ..Options::default()
     };
-    let finding = |identification: Identification| -> Result<Finding, String> {
-        let driver = identified_driver(&scenario, &identification, identification.muscle(options.muscle))?;
-        let again = simulation::simulate(&driver);
-        let again_path = path_of(&again.trace);
-        Ok(Finding {
-            trajectory_error_m: (!again.diverged()).then(|| mean_distance(&path, &again_path)),
-            path: again_path,
+    let found = |identification: Identification| -> Result<Identified, String> {
+        let muscle = identification.muscle(options.muscle);
+        Ok(Identified {
+            driver: identified_driver(&driven.scenario, &identification, muscle)?,
             identification,
         })
     };
-    let noise_model = finding(identify_with_noise_model(&log, &options))?;
-    let paper = finding(identify_as_published(&log, &options).map_err(|e| e.to_string())?)?;
-    Ok(Drive {
-        participant: number,
-        guided,
-        truth,
-        remnant_sd_nm: scenario.driver().remnant_sd_nm,
-        noise_model,
-        paper,
-        path,
-        log,
-    })
+    Ok([
+        found(identify_with_noise_model(&driven.log, &options))?,
+        found(identify_as_published(&driven.log, &options).map_err(|e| e.to_string())?)?,
+    ])
 }
 
 /// A probe of the controller's.
@@ -249,34 +236,6 @@ impl Probe {
     }
 }
 
-/// A guided drive of a published driver with the remnant and the paper's sensors, on any course (the built-in one if
-/// none), as it is logged.
-///
-/// # Errors
-/// A course that is too short; a probe that the controller refuses.
-pub fn recorded(
-    driver: &PublishedDriver,
-    course: Option<&Course>,
-    probe: Option<Probe>,
-    seed: u64,
-) -> Result<DriveLog, String> {
-    let mut scenario = Scenario::builder()
-        .driver(DriverParameters {
-            remnant_sd_nm: REMNANT_GUIDED_NM,
-            ..driver.parameters()
-        })
-        .condition(Condition::Custom)
-        .gains(driver.gains())
-        .guidance(probe.map_or_else(GuidanceParameters::default, Probe::guidance))
-        .seed(seed);
-    if let Some(course) = course {
-        scenario = scenario.course(course.clone());
-    }
-    let mut recorder = Recorder::new(true);
-    simulation::observe(&scenario.build()?, |outcome| recorder.observe(outcome));
-    Ok(recorder.into_log())
-}
-
 /// What a published driver and the remnant of the guided drives are, for the information bound.
 pub fn truth_of(driver: &PublishedDriver) -> Truth {
     let sum = driver.k_d + Muscle::default().k_nms;
@@ -289,26 +248,6 @@ pub fn truth_of(driver: &PublishedDriver) -> Truth {
         // The torque sensor's rounding to 0.005 N.m.
         sensor_sd_nm: 0.005 / 12.0_f64.sqrt(),
     }
-}
-
-/// The drive of a published driver, without remnant.
-fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, String> {
-    let condition = match driver.k_hg {
-        Some(_) => Condition::Custom,
-        None => Condition::Manual,
-    };
-    let mut guidance = GuidanceParameters::default();
-    if plan.probe_nm != 0.0 && condition != Condition::Manual {
-        guidance.probe = true;
-        guidance.controller.probe_amplitude_nm = plan.probe_nm;
-    }
-    let scenario = Scenario::builder()
-        .driver(driver.parameters())
-        .condition(condition)
-        .gains(driver.gains())
-        .guidance(guidance)
-        .seed(seed);
-    Ok(scenario.build()?)
 }
 
 /// `scenario` with the driver identified in place of its own, without remnant. Where K_d and a_i are not told

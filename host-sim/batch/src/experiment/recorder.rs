@@ -6,6 +6,7 @@
 
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::Outcome;
+use haptic_sim::lanes::Step;
 use haptic_sim::models::{STEPS_PER_SECOND, sensors};
 
 /// Rows a second.
@@ -15,18 +16,8 @@ const RATE_HZ: u32 = 120;
 #[derive(Debug, Clone)]
 pub struct Recorder {
     rounded: bool,
-    last: Option<StepValues>,
+    last: Option<Step>,
     log: DriveLog,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct StepValues {
-    step: u32,
-    e_y_m: f64,
-    e_theta_rad: f64,
-    wheel_angle_rad: f64,
-    guidance_torque_nm: f64,
-    driver_torque_nm: f64,
 }
 
 impl Recorder {
@@ -53,14 +44,18 @@ impl Recorder {
 
     /// Takes in one step.
     pub fn observe(&mut self, outcome: &Outcome) {
-        let now = StepValues {
+        self.take(Step {
             step: outcome.observation.step,
             e_y_m: outcome.preview.e_y_m,
             e_theta_rad: outcome.preview.e_theta_rad,
             wheel_angle_rad: outcome.observation.wheel_angle_rad,
             guidance_torque_nm: outcome.applied_torque_nm,
             driver_torque_nm: outcome.observation.driver_torque_nm,
-        };
+        });
+    }
+
+    /// Takes in one step of the lanes: without errors of sensors, what they have is what is observed.
+    pub(super) fn take(&mut self, now: Step) {
         let Some(last) = self.last.replace(now) else {
             return;
         };

@@ -3,13 +3,15 @@
 //! Terms: *coverage*, the share of repetitions whose 95 % interval contains the truth; *error*, estimate minus
 //! truth, over the repetitions in which the parameter is identified.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Plan, PublishedDriver, chosen, driven, truth_of};
+use super::drives::{log_group, scenario_of_drive};
+use super::{Plan, PublishedDriver, chosen, truth_of};
+use crate::lanes::{Checked, Group, in_groups};
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
 };
+use haptic_sim::scenario::Scenario;
 
 /// What is compared with the truth: the parameters that a torque record can carry.
 pub(super) const COMPARED: usize = 5;
@@ -66,19 +68,29 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
         .into_iter()
         .flat_map(|p| (0..u64::from(repetitions)).map(move |r| (p.number, p.guided, r)))
         .collect();
-    let found: Vec<Judged> = jobs
-        .into_par_iter()
-        .map(|(number, truth, repetition)| {
+    let checked = Checked::new(plan.seed, jobs.len() as u64);
+    // Group by group: the logs of all drives at once would be too many.
+    let found: Vec<Judged> = in_groups(&jobs, |first, jobs| {
+        let scenarios = jobs.iter().map(|(number, truth, repetition)| {
             let plan = Plan {
-                seed: plan.seed.wrapping_add(repetition),
+                seed: plan.seed.wrapping_add(*repetition),
                 ..plan.clone()
             };
-            let log = driven(&plan, number, &truth)?.log;
-            let identification = identify_with_noise_model(&log, &Options::default());
+            scenario_of_drive(&plan, *number, truth, truth.parameters())
+        });
+        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
+        let driven = log_group(Group {
+            scenarios: &scenarios,
+            first: first as u64,
+            checked,
+        })?;
+        let judged = driven.into_iter().zip(jobs).map(|(driven, (_, truth, _))| {
+            let identification = identify_with_noise_model(&driven.log, &Options::default());
             done();
-            Ok(Judged::new(&truth, &identification, bound_of(&log, &truth)))
-        })
-        .collect::<Result<_, String>>()?;
+            Judged::new(truth, &identification, bound_of(&driven.log, truth))
+        });
+        Ok(judged.collect())
+    })?;
     let lines = |participant: Option<u32>, drives: &[Judged]| {
         (0..COMPARED)
             .filter(|_| !drives.is_empty())

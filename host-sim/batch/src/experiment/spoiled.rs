@@ -12,8 +12,9 @@ use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::drives::driven_by;
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
-use super::{Plan, PublishedDriver, chosen, driven_by};
+use super::{Plan, PublishedDriver, chosen};
 
 /// One way to spoil a log.
 #[derive(Debug, Clone, Copy, PartialEq)]

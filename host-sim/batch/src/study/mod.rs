@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 pub use order::Order;
 
+use crate::lanes::drive_all;
 use crate::record::RunRecord;
 
 /// A study, checked.
@@ -159,14 +160,17 @@ impl Study {
     /// checked first: with another session in a place nothing is driven.
     ///
     /// # Errors
-    /// A place with another session in it; what the disk says.
+    /// A place with another session in it; what the disk says; a drive for which lanes and shipping ECU differ.
     pub fn run(&self, out: &Path, done: impl Fn() + Sync) -> Result<(), String> {
         let missing = self.missing(out)?;
-        missing.into_par_iter().try_for_each(|session| {
-            store::drive(self, session, out)?;
+        let scenarios: Vec<Scenario> = missing.iter().map(|session| session.scenario.clone()).collect();
+        let seed = scenarios.first().map_or(0, Scenario::seed);
+        drive_all(&scenarios, seed, |number, run| {
+            store::keep_run(self, missing[number], out, run)?;
             done();
             Ok(())
         })
+        .map(drop)
     }
 
     /// Simulated sessions that are not recorded yet.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use haptic_log::trace::Trace;
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::scenario::{Condition, Scenario};
-use haptic_sim::simulation::{Ending, Run, simulate};
+use haptic_sim::simulation::{Ending, Run};
 use serde::{Deserialize, Serialize};
 
 use super::{Session, Source, Study};
@@ -112,9 +112,8 @@ fn measured(session: &Session, trace: Trace, diverged: bool) -> RunRecord {
     )
 }
 
-/// Drives a simulated participant, and keeps what was recorded.
-pub(super) fn drive(study: &Study, session: &Session, out: &Path) -> Result<(), String> {
-    let run = simulate(&session.scenario);
+/// Keeps what a simulated participant drove.
+pub(super) fn keep_run(study: &Study, session: &Session, out: &Path, run: &Run) -> Result<(), String> {
     let mut csv = Vec::new();
     run.trace.write_csv(&mut csv).map_err(|e| e.to_string())?;
     keep(study, session, out, &csv, Source::Simulated, run.diverged())

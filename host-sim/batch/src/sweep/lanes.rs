@@ -1,19 +1,13 @@
-//! A chunk in lanes ([`haptic_sim::lanes`]): many drives side by side, and the shipping ECU where they are not enough.
-//!
-//! What the lanes cannot drive, and every drive in which something could have ended guidance, is driven alone with the
-//! shipping ECU. So is one drive in [`CHECKED_OF`], whatever the lanes say of it: a bit that differs is an error, because the
-//! table must not depend on who drove.
+//! A chunk in lanes ([`crate::lanes`]): many drives side by side, and the shipping ECU where they are not enough.
 
 use haptic_sim::input::InputError;
-use haptic_sim::lanes::{Width, drive};
+use haptic_sim::lanes::{Asked, Event};
 use haptic_sim::scenario::{Failure, FailureKind, Scenario};
-use haptic_sim::seeds::{self, Stream};
+use haptic_sim::simulation::{Run, simulate};
 
 use super::{Chunk, Driven, Sweep};
+use crate::lanes::{Checked, Group};
 use crate::record::nominal_peak_m;
-
-/// One in so many drives of the lanes is driven by the shipping ECU too.
-const CHECKED_OF: u64 = 100;
 
 impl Sweep {
     /// Drives a chunk. What it gives follows from the sweep and the number alone.
@@ -24,17 +18,9 @@ impl Sweep {
         let drives = self.drives_of(number);
         let scenarios = drives.clone().map(|drive| self.scenario(&self.point(drive)));
         let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
-        let in_lanes = self.drive_in_lanes(&scenarios)?;
-        let rows = drives.zip(&scenarios).zip(in_lanes);
-        let rows = rows.map(|((drive, scenario), row)| match row {
-            Some(row) if self.is_checked(drive) => {
-                let alone = self.drive_alone(scenario)?;
-                self.agree(drive, &row, &alone)?;
-                Ok(row)
-            }
-            Some(row) => Ok(row),
-            None => self.drive_alone(scenario),
-        });
+        let rows = self.drive_in_lanes(drives.start, &scenarios)?;
+        let rows = rows.into_iter().zip(&scenarios);
+        let rows = rows.map(|(row, scenario)| row.map_or_else(|| self.drive_alone(scenario), Ok));
         Ok(Chunk {
             number,
             rows: rows.collect::<Result<_, _>>()?,
@@ -42,7 +28,7 @@ impl Sweep {
     }
 
     /// What the lanes give; `None` for a drive that they hand back.
-    fn drive_in_lanes(&self, scenarios: &[Scenario]) -> Result<Vec<Option<Driven>>, InputError> {
+    fn drive_in_lanes(&self, first: u64, scenarios: &[Scenario]) -> Result<Vec<Option<Driven>>, InputError> {
         let mut peaks: Vec<Option<Option<f64>>> = vec![Some(None); scenarios.len()];
         // First the same drives without their failures, where a metric asks for them.
         let (mut places, mut nominals) = (Vec::new(), Vec::new());
@@ -55,49 +41,42 @@ impl Sweep {
                 let nominal = scenario.to_builder().failure(failure).build();
                 nominals.push(nominal.map_err(|e| InputError::new(&self.name, e))?);
                 places.push(place);
+                peaks[place] = None;
             }
         }
-        drive(&nominals, Width::Widest, |number, run| {
+        self.in_lanes(first, &nominals, |number, run| {
             let scenario = &scenarios[places[number]];
-            peaks[places[number]] =
-                run.map(|run| nominal_peak_m(run, self.window_of(scenario), scenario.failure().time_s));
-        });
+            let peak_m = nominal_peak_m(run, self.window_of(scenario), scenario.failure().time_s);
+            peaks[places[number]] = Some(peak_m);
+        })?;
         let mut rows: Vec<Option<Driven>> = vec![None; scenarios.len()];
-        drive(scenarios, Width::Widest, |number, run| {
-            let known = run.zip(peaks[number]);
-            rows[number] = known.map(|(run, peak_m)| self.measured(&scenarios[number], run, peak_m));
-        });
+        self.in_lanes(first, scenarios, |number, run| {
+            rows[number] = peaks[number].map(|peak_m| self.measured(&scenarios[number], run, peak_m));
+        })?;
         Ok(rows)
     }
 
-    fn is_checked(&self, drive: u64) -> bool {
-        seeds::nth(Stream::Design.seed(self.seed), drive).is_multiple_of(CHECKED_OF)
-    }
-
-    /// Whether two rows are the same to the last bit.
-    fn agree(&self, drive: u64, lanes: &Driven, alone: &Driven) -> Result<(), InputError> {
-        let bits = |value: Option<f64>| value.map(f64::to_bits);
-        let own = [
-            (
-                "diverged",
-                Some(f64::from(lanes.diverged)),
-                Some(f64::from(alone.diverged)),
-            ),
-            ("end_m", Some(lanes.end_m), Some(alone.end_m)),
-        ];
-        let metrics = self.metrics.iter().zip(lanes.metrics.iter().zip(&alone.metrics));
-        let metrics = metrics.map(|(metric, (lanes, alone))| (metric.name, *lanes, *alone));
-        let mut all = own.into_iter().chain(metrics);
-        match all.find(|(_, lanes, alone)| bits(*lanes) != bits(*alone)) {
-            None => Ok(()),
-            Some((name, lanes, alone)) => Err(InputError::new(
-                &self.name,
-                format!(
-                    "drive {drive}: {name} is {lanes:?} in lanes and {alone:?} with the shipping ECU. This is a fault of \
-                     this program, not of the sweep: please report it, with the text of --replay {drive}"
-                ),
-            )),
-        }
+    /// Takes what the lanes drive, and leaves what they hand back.
+    fn in_lanes(
+        &self,
+        first: u64,
+        scenarios: &[Scenario],
+        mut take: impl FnMut(usize, &Run),
+    ) -> Result<(), InputError> {
+        let group = Group {
+            scenarios,
+            first,
+            checked: Checked::new(self.seed, self.drives()),
+        };
+        let on = |place: usize, event: Event| {
+            if let Event::Ended(run) = event {
+                take(place, run);
+            }
+            Ok(())
+        };
+        let alone = |place: usize| simulate(&scenarios[place]);
+        let handed_back = group.in_lanes(Asked::default(), alone, on);
+        handed_back.map(drop).map_err(|e| InputError::new(&self.name, e))
     }
 }
 

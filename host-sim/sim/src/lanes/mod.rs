@@ -10,6 +10,7 @@
 //! lanes cannot drive at all, [`why_not`] names.
 //!
 //! - [`drive`]: runs of many scenarios.
+//! - [`drive_asked`]: the same, every step reported, or only the first seconds of each.
 //! - [`why_not`]: what keeps a scenario out.
 //!
 //! Not here: metrics, threads, and whether a lane's run is what the shipping ECU makes of it (`haptic-batch` drives one in
@@ -61,15 +62,67 @@ pub enum Width {
     Portable,
 }
 
+/// What is asked of the lanes beside runs.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Asked {
+    /// Which instructions move them.
+    pub width: Width,
+    /// Every step is reported.
+    pub every_step: bool,
+    /// Runs are cut after so many seconds; none: they go to their ends.
+    pub most_s: Option<u32>,
+}
+
+/// The truth of one step, as the plant moves on from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Its number.
+    pub step: u32,
+    /// Lane errors at the driver's points, m and rad.
+    pub e_y_m: f64,
+    /// See `e_y_m`.
+    pub e_theta_rad: f64,
+    /// Angle of the steering wheel, rad.
+    pub wheel_angle_rad: f64,
+    /// Torque of the guidance that acts, N.m.
+    pub guidance_torque_nm: f64,
+    /// Torque of the driver, remnant and all, N.m.
+    pub driver_torque_nm: f64,
+}
+
+/// What the lanes have of a run.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// The next steps, in order, where every step is asked for. A run that is handed back may have had some.
+    Steps(&'a [Step]),
+    /// The whole run, or as much as was asked for. Its samples are used again afterwards.
+    Ended(&'a Run),
+    /// It is suspect, or [`why_not`] keeps it out: nothing that came of it counts.
+    HandedBack,
+}
+
 /// Drives scenarios side by side. For each, in no order, `done` gets its number and its run, or `None` for one that is
 /// suspect or that [`why_not`] keeps out. The run's samples are used again when `done` returns.
 pub fn drive(scenarios: &[Scenario], width: Width, mut done: impl FnMut(usize, Option<&Run>)) {
+    let asked = Asked {
+        width,
+        ..Asked::default()
+    };
+    drive_asked(scenarios, asked, |number, event| match event {
+        Event::Steps(_) => (),
+        Event::Ended(run) => done(number, Some(run)),
+        Event::HandedBack => done(number, None),
+    });
+}
+
+/// As [`drive`], with what else is asked: `on` gets everything that comes of each run, its number first.
+pub fn drive_asked(scenarios: &[Scenario], asked: Asked, mut on: impl FnMut(usize, Event)) {
     let mut waiting = Vec::with_capacity(scenarios.len());
     for (number, scenario) in scenarios.iter().enumerate() {
         if why_not(scenario).is_none() {
             waiting.push((number, scenario));
         } else {
-            done(number, None);
+            on(number, Event::HandedBack);
         }
     }
     waiting.reverse();
@@ -77,13 +130,20 @@ pub fn drive(scenarios: &[Scenario], width: Width, mut done: impl FnMut(usize, O
         .iter()
         .map(|(_, scenario)| (scenario.driver().t_p / STEP_S) as usize);
     let Some(whole) = whole.max() else { return };
-    let mut lanes = Lanes::<LANES>::new(whole + 1, waiting[0].1);
+    let mut lanes = Lanes::<LANES>::new(whole + 1, waiting[0].1, asked.every_step);
+    let mut steps = Vec::new();
     loop {
         let mut is_empty = true;
         for lane in 0..LANES {
+            if let Some(number) = lanes.steps_of_block(lane, &mut steps) {
+                on(number, Event::Steps(&steps));
+            }
+            if let Some(most_s) = asked.most_s {
+                lanes.cut(lane, most_s);
+            }
             if lanes.is_free(lane) {
                 if let Some((number, run)) = lanes.take(lane) {
-                    done(number, run);
+                    on(number, run.map_or(Event::HandedBack, Event::Ended));
                 }
                 if let Some((number, scenario)) = waiting.pop() {
                     lanes.begin(lane, number, scenario);
@@ -94,7 +154,7 @@ pub fn drive(scenarios: &[Scenario], width: Width, mut done: impl FnMut(usize, O
         if is_empty {
             return;
         }
-        match width {
+        match asked.width {
             Width::Widest => block(&mut lanes),
             Width::Avx2 => block_of_avx2(&mut lanes),
             Width::Portable => lanes.block(),

@@ -6,17 +6,17 @@ use std::sync::Arc;
 
 use haptic_log::trace::{Sample, Trace};
 
-use super::ALIVE;
 use super::checks::Checks;
 use super::ecu::{Ecus, TIMEOUT_MS};
 use super::sensing::Senses;
 use super::speeds::Speeds;
 use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, Worlds, YAW_RATE};
+use super::{ALIVE, Step};
 use crate::guidance::NoGuidance;
-use crate::models::STEP_S;
 use crate::models::driver::Remnant;
 use crate::models::road::Centreline;
 use crate::models::sensors::camera_looks;
+use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::wrapped;
 use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
 use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Simulation, step_of};
@@ -24,6 +24,16 @@ use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Sim
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
 /// then has the others' rhythm.
 const BLOCK: u32 = 50;
+
+/// One step of every run, as [`Step`] has it of one.
+#[derive(Debug, Clone, Copy)]
+struct Steps<const N: usize> {
+    e_y_m: [f64; N],
+    e_theta_rad: [f64; N],
+    wheel_angle_rad: [f64; N],
+    guidance_torque_nm: [f64; N],
+    driver_torque_nm: [f64; N],
+}
 
 /// What a lane has of its run beside the arrays.
 struct Slot {
@@ -52,12 +62,14 @@ pub(super) struct Lanes<const N: usize> {
     looks: [u64; N],
     /// Whether something is planned in some lane within this block.
     has_events: bool,
+    /// The steps of the last block, where they are asked for.
+    steps: Option<Vec<Steps<N>>>,
     roads: [Arc<Centreline>; N],
     slots: [Slot; N],
 }
 
 impl<const N: usize> Lanes<N> {
-    pub(super) fn new(whole: usize, any: &Scenario) -> Self {
+    pub(super) fn new(whole: usize, any: &Scenario, every_step: bool) -> Self {
         let road = any.course().centreline();
         Self {
             worlds: Worlds::new(whole),
@@ -68,6 +80,7 @@ impl<const N: usize> Lanes<N> {
             own: [0; N],
             looks: [0; N],
             has_events: false,
+            steps: every_step.then(|| Vec::with_capacity(BLOCK as usize)),
             roads: std::array::from_fn(|_| Arc::clone(&road)),
             slots: std::array::from_fn(|_| Slot {
                 scenario: None,
@@ -165,9 +178,37 @@ impl<const N: usize> Lanes<N> {
         Some((number, slot.is_whole.then_some(&slot.run)))
     }
 
+    /// Ends a run after so many seconds.
+    pub(super) fn cut(&mut self, lane: usize, most_s: u32) {
+        if self.is_under_way(lane) && self.own[lane] as u32 >= most_s.saturating_mul(STEPS_PER_SECOND) {
+            self.end_run(lane);
+        }
+    }
+
+    /// The steps of a lane's run in the last block, and the run's number; none where there are none.
+    pub(super) fn steps_of_block(&self, lane: usize, found: &mut Vec<Step>) -> Option<usize> {
+        let (steps, slot) = (self.steps.as_ref()?, &self.slots[lane]);
+        let number = slot.scenario?;
+        let first = self.own[lane] as u32 - steps.len() as u32;
+        let end = if slot.is_whole { slot.run.steps } else { u32::MAX };
+        found.clear();
+        found.extend((first..end).zip(steps).map(|(step, all)| Step {
+            step,
+            e_y_m: all.e_y_m[lane],
+            e_theta_rad: all.e_theta_rad[lane],
+            wheel_angle_rad: all.wheel_angle_rad[lane],
+            guidance_torque_nm: all.guidance_torque_nm[lane],
+            driver_torque_nm: all.driver_torque_nm[lane],
+        }));
+        Some(number)
+    }
+
     /// Steps until everything periodic is where it was.
     #[inline(always)]
     pub(super) fn block(&mut self) {
+        if let Some(steps) = &mut self.steps {
+            steps.clear();
+        }
         self.has_events = (0..N).any(|lane| {
             let left = self.slots[lane].event.wrapping_sub(self.own[lane] as u32);
             self.worlds.alive[lane] == ALIVE && left < BLOCK
@@ -219,6 +260,15 @@ impl<const N: usize> Lanes<N> {
             self.speeds.locate(self.worlds.body.s());
             self.record(&driver_nm, &torque_nm);
         }
+        if let Some(steps) = &mut self.steps {
+            steps.push(Steps {
+                e_y_m: self.worlds.driver.e_y,
+                e_theta_rad: self.worlds.driver.e_theta,
+                wheel_angle_rad: self.worlds.state[WHEEL],
+                guidance_torque_nm: torque_nm,
+                driver_torque_nm: driver_nm,
+            });
+        }
         let speeds = self.speeds.of_step(&self.own);
         self.worlds.move_on(&torque_nm, speeds);
         self.speeds.go_on(&mut self.worlds, &self.roads);
@@ -243,12 +293,16 @@ impl<const N: usize> Lanes<N> {
     fn end_runs(&mut self) {
         for lane in 0..N {
             if self.worlds.alive[lane] == ALIVE && self.worlds.is_at_its_end(lane) {
-                let slot = &mut self.slots[lane];
-                slot.is_whole = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) == 0;
-                slot.run.steps = self.own[lane] as u32;
-                self.worlds.alive[lane] = 0;
+                self.end_run(lane);
             }
         }
+    }
+
+    fn end_run(&mut self, lane: usize) {
+        let slot = &mut self.slots[lane];
+        slot.is_whole = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) == 0;
+        slot.run.steps = self.own[lane] as u32;
+        self.worlds.alive[lane] = 0;
     }
 
     /// A sample of each run.

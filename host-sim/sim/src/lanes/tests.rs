@@ -264,6 +264,58 @@ fn speeds_that_change_are_the_same_in_lanes_and_few_are_suspect() {
     assert!(suspects < 30, "{suspects} of 40");
 }
 
+/// Every step that is reported, and the samples of runs that are cut after 7 s, against the shipping ECU.
+#[test]
+fn every_step_is_reported_and_runs_are_cut_where_it_is_asked() {
+    let mut scenarios = random(20, 11, |builder, _| builder);
+    scenarios.extend(random(12, 12, real));
+    let mut steps: Vec<Vec<Step>> = vec![Vec::new(); scenarios.len()];
+    let (mut cut, mut whole) = (Vec::new(), 0);
+    let mut asked = Asked {
+        every_step: true,
+        ..Asked::default()
+    };
+    drive_asked(&scenarios, asked, |number, event| match event {
+        Event::Steps(more) => steps[number].extend(more),
+        Event::Ended(run) => {
+            whole += 1;
+            let mut alone = Vec::new();
+            crate::simulation::observe(&scenarios[number], |outcome| {
+                alone.push(Step {
+                    step: outcome.observation.step,
+                    e_y_m: outcome.preview.e_y_m,
+                    e_theta_rad: outcome.preview.e_theta_rad,
+                    wheel_angle_rad: outcome.observation.wheel_angle_rad,
+                    guidance_torque_nm: outcome.applied_torque_nm,
+                    driver_torque_nm: outcome.observation.driver_torque_nm,
+                });
+            });
+            assert_eq!(run.steps as usize, alone.len());
+            // Debug has the shortest digits that give the same bits back, and signs of zeros.
+            assert_eq!(format!("{:?}", steps[number]), format!("{alone:?}"), "{number}");
+        }
+        Event::HandedBack => (),
+    });
+    assert!(whole > 12, "{whole}");
+    asked = Asked {
+        most_s: Some(7),
+        ..Asked::default()
+    };
+    drive_asked(&scenarios, asked, |number, event| {
+        if let Event::Ended(run) = event {
+            cut.push((number, run.clone()));
+        }
+    });
+    assert!(cut.len() >= whole, "{} of {whole}", cut.len());
+    for (number, run) in cut {
+        let mut alone = simulate(&scenarios[number]);
+        assert!(alone.steps > 7000);
+        alone.trace.samples.truncate(1400);
+        alone.steps = 7000;
+        assert_eq!((run.steps, bits(&run)), (alone.steps, bits(&alone)), "{number}");
+    }
+}
+
 #[test]
 fn every_width_gives_the_same() {
     let mut scenarios = random(16, 2, |builder, _| builder);

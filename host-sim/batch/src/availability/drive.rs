@@ -1,0 +1,237 @@
+//! The drives of legs: with guidance and by hand, side by side where lanes can.
+
+use haptic_core::bus::e2e::ReceiverState;
+use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
+use haptic_core::faults::{Fault, FaultSet};
+use haptic_core::modes::Mode;
+use haptic_log::trace::{Sample, Trace};
+use haptic_sim::guidance::{NoGuidance, OverBus};
+use haptic_sim::lanes::{Asked, Event};
+use haptic_sim::models::driver::ArmGains;
+use haptic_sim::scenario::Condition;
+use haptic_sim::simulation::{Ending, Run, SAMPLE_RATE_HZ};
+use haptic_sim::{Action, Outcome, Scenario, Simulation};
+
+use super::{ByHand, Declaration, LEG_S, Leg, LegNumber};
+use crate::lanes::{Checked, Group};
+
+const LEG_STEPS: u32 = (LEG_S * 1e3) as u32;
+/// The driver asks for guidance again so long after it has left, ms.
+const AGAIN_MS: u32 = 5000;
+/// A request that was not granted is taken back for 100 ms in every second.
+const ASKS_EVERY_MS: u32 = 1000;
+const LOW_MS: u32 = 100;
+
+/// Drives legs, in lanes where these can, both with guidance and by hand; `done` gets each with its place, in no order. A run
+/// that lanes drive with guidance is one in which the ECU leaves nothing.
+///
+/// # Errors
+/// As [`LegNumber::scenario`]; a drive for which lanes and shipping ECU differ; what `done` says.
+pub(super) fn side_by_side(
+    legs: &[LegNumber],
+    root: u64,
+    [first, of]: [usize; 2],
+    mut done: impl FnMut(usize, Leg) -> Result<(), String>,
+) -> Result<(), String> {
+    let guided = legs.iter().map(|leg| leg.scenario(root));
+    let guided: Vec<Scenario> = guided.collect::<Result<_, _>>()?;
+    let manual: Vec<Scenario> = guided.iter().map(manual).collect::<Result<_, _>>()?;
+    let asked = Asked {
+        most_s: Some(LEG_S as u32),
+        ..Asked::default()
+    };
+    let group = |scenarios| Group {
+        scenarios,
+        first: first as u64,
+        checked: Checked::new(root, of as u64),
+    };
+    let mut hands: Vec<Option<ByHand>> = vec![None; legs.len()];
+    let handed_back = group(&manual).in_lanes(
+        asked,
+        |place| by_hand(&guided[place]),
+        |place, event| {
+            if let Event::Ended(run) = event {
+                hands[place] = Some(ByHand::of(run));
+            }
+            Ok(())
+        },
+    )?;
+    for place in handed_back {
+        hands[place] = Some(ByHand::of(&by_hand(&guided[place])));
+    }
+    let hands: Vec<ByHand> = hands.into_iter().flatten().collect();
+    let handed_back = group(&guided).in_lanes(
+        asked,
+        |place| with_ecu(&guided[place]).0,
+        |place, event| match event {
+            Event::Ended(run) => {
+                let reported = Reported {
+                    mode: Mode::Active,
+                    active: run.steps,
+                    declarations: Vec::new(),
+                };
+                done(
+                    place,
+                    legs[place].leg(&guided[place], run, reported, hands[place]),
+                )
+            }
+            _ => Ok(()),
+        },
+    )?;
+    handed_back.into_iter().try_for_each(|place| {
+        let (run, reported) = with_ecu(&guided[place]);
+        done(
+            place,
+            legs[place].leg(&guided[place], &run, reported, hands[place]),
+        )
+    })
+}
+
+/// The same driver without guidance: what this driver would make of its torque does not matter where there is none.
+fn manual(scenario: &Scenario) -> Result<Scenario, String> {
+    let gains = ArmGains {
+        k_hg: 0.0,
+        ..scenario.gains()
+    };
+    let manual = scenario.to_builder().condition(Condition::Manual).gains(gains);
+    Ok(manual.build()?)
+}
+
+/// A leg's drive by hand.
+pub(super) fn by_hand(scenario: &Scenario) -> Run {
+    let mut simulation = Simulation::with(scenario, NoGuidance);
+    let mut samples = room();
+    while simulation.steps() < LEG_STEPS {
+        let Some(outcome) = simulation.step(&Action::default()) else {
+            break;
+        };
+        samples.extend(outcome.sample);
+    }
+    run_of(samples, simulation.ending(), simulation.steps())
+}
+
+/// A leg's drive with the shipping ECU, and what it reported.
+pub(super) fn with_ecu(scenario: &Scenario) -> (Run, Reported) {
+    let mut simulation = Simulation::with(scenario, OverBus::new(scenario.setup()));
+    let (mut watch, mut samples) = (Watch::new(), room());
+    while watch.steps < LEG_STEPS && watch.reported.mode != Mode::Fault {
+        let action = watch.action();
+        let Some(outcome) = simulation.step(&action) else {
+            break;
+        };
+        samples.extend(outcome.sample);
+        watch.observe(&outcome);
+    }
+    (run_of(samples, simulation.ending(), watch.steps), watch.reported)
+}
+
+/// For the samples of a leg.
+fn room() -> Vec<Sample> {
+    Vec::with_capacity((LEG_S * f64::from(SAMPLE_RATE_HZ)) as usize + 1)
+}
+
+fn run_of(samples: Vec<Sample>, ending: Option<Ending>, steps: u32) -> Run {
+    Run {
+        trace: Trace {
+            sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
+            samples,
+        },
+        ending: ending.unwrap_or(Ending::CourseEnd),
+        steps,
+    }
+}
+
+/// Driver, host and listener of a leg.
+struct Watch {
+    receiver: ReceiverState,
+    reported: Reported,
+    faults: FaultSet,
+    /// Steps since guidance left; none while it is there.
+    away: Option<u32>,
+    steps: u32,
+    /// Lateral acceleration of the road, left positive.
+    lateral_m_per_s2: f64,
+}
+
+/// What the ECU did in a leg.
+pub(super) struct Reported {
+    /// At its end.
+    pub(super) mode: Mode,
+    /// Steps with guidance.
+    pub(super) active: u32,
+    /// What took guidance away.
+    pub(super) declarations: Vec<Declaration>,
+}
+
+impl Watch {
+    fn new() -> Self {
+        Self {
+            receiver: ReceiverState::TRUSTED,
+            reported: Reported {
+                mode: Mode::Active,
+                active: 0,
+                declarations: Vec::new(),
+            },
+            faults: FaultSet::NONE,
+            away: None,
+            steps: 0,
+            lateral_m_per_s2: 0.0,
+        }
+    }
+
+    /// What driver and host do next.
+    fn action(&self) -> Action {
+        let engage = match self.away {
+            None => true,
+            // A handover goes on while the request stays.
+            Some(_) if self.reported.mode != Mode::Standby => true,
+            Some(away) => away >= AGAIN_MS && away % ASKS_EVERY_MS >= LOW_MS,
+        };
+        Action {
+            engage: Some(engage),
+            ..Action::default()
+        }
+    }
+
+    fn observe(&mut self, outcome: &Outcome) {
+        self.steps += 1;
+        if let Some(sample) = outcome.sample {
+            let v = sample.speed_m_per_s;
+            self.lateral_m_per_s2 = sample.curvature_1pm * v * v;
+        }
+        let frame = outcome.frames_out.first();
+        let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
+        if let Some(guidance) = guidance {
+            if self.reported.mode == Mode::Active && guidance.mode != Mode::Active {
+                let named = guidance.faults.without(self.faults);
+                self.reported.declarations.push(Declaration {
+                    time_s: outcome.time_s(),
+                    faults: names(if named == FaultSet::NONE {
+                        guidance.faults
+                    } else {
+                        named
+                    }),
+                    lateral_m_per_s2: self.lateral_m_per_s2,
+                });
+            }
+            (self.reported.mode, self.faults) = (guidance.mode, guidance.faults);
+        }
+        if self.reported.mode == Mode::Active {
+            (self.reported.active, self.away) = (self.reported.active + 1, None);
+        } else {
+            self.away = Some(self.away.map_or(0, |away| away + 1));
+        }
+    }
+}
+
+fn names(faults: FaultSet) -> String {
+    let named: Vec<String> = Fault::ALL
+        .into_iter()
+        .filter(|fault| faults.contains(*fault))
+        .map(|fault| format!("{fault:?}"))
+        .collect();
+    if named.is_empty() {
+        return "none named".into();
+    }
+    named.join("+")
+}

@@ -1,0 +1,222 @@
+//! The drives of published drivers, logged: side by side in lanes where these can, which report every step.
+
+use haptic_analysis::identify::DriveLog;
+use haptic_sim::lanes::{Asked, Event};
+use haptic_sim::models::driver::DriverParameters;
+use haptic_sim::models::road::Course;
+use haptic_sim::participants::PublishedDriver;
+use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
+use haptic_sim::simulation;
+
+use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, path_of};
+use crate::lanes::{Checked, Group, in_groups};
+
+/// A drive with what is needed to judge it.
+pub(crate) struct Driven {
+    pub(super) scenario: Scenario,
+    pub(crate) log: DriveLog,
+    pub(super) path: Vec<(f64, f64)>,
+}
+
+/// Lets a published driver drive alone, with a remnant and the paper's sensors.
+pub(super) fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
+    driven_by(plan, number, truth, truth.parameters())
+}
+
+/// The same, by a driver who differs from the published one in what the log does not name.
+pub(super) fn driven_by(
+    plan: &Plan,
+    number: u32,
+    truth: &PublishedDriver,
+    driver: DriverParameters,
+) -> Result<Driven, String> {
+    Ok(driven_alone(&scenario_of_drive(plan, number, truth, driver)?))
+}
+
+/// What a published driver drives with a remnant and the paper's sensors.
+pub(super) fn scenario_of_drive(
+    plan: &Plan,
+    number: u32,
+    truth: &PublishedDriver,
+    driver: DriverParameters,
+) -> Result<Scenario, String> {
+    let guided = truth.k_hg.is_some();
+    let seed = plan
+        .seed
+        .wrapping_mul(1000)
+        .wrapping_add(u64::from(2 * number) + u64::from(guided));
+    let scenario = scenario_of(plan, truth, seed)?;
+    let remnant_sd_nm = if guided {
+        REMNANT_GUIDED_NM
+    } else {
+        REMNANT_MANUAL_NM
+    };
+    let driver = DriverParameters {
+        remnant_sd_nm,
+        ..driver
+    };
+    Ok(scenario.to_builder().driver(driver).build()?)
+}
+
+pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
+    let mut recorder = Recorder::new(true);
+    let run = simulation::observe(scenario, |outcome| recorder.observe(outcome));
+    Driven {
+        scenario: scenario.clone(),
+        log: recorder.into_log(),
+        path: path_of(&run.trace),
+    }
+}
+
+/// Drives scenarios on all cores, in lanes where these can, and logs them.
+pub(super) fn drive_logged(scenarios: &[Scenario], seed: u64) -> Result<Vec<Driven>, String> {
+    let checked = Checked::new(seed, scenarios.len() as u64);
+    in_groups(scenarios, |first, scenarios| {
+        log_group(Group {
+            scenarios,
+            first: first as u64,
+            checked,
+        })
+    })
+}
+
+/// The same in one thread.
+pub(crate) fn log_group(group: Group) -> Result<Vec<Driven>, String> {
+    let scenarios = group.scenarios;
+    let asked = Asked {
+        every_step: true,
+        ..Asked::default()
+    };
+    let mut recorders = vec![Recorder::new(true); scenarios.len()];
+    let mut all: Vec<Option<Driven>> = scenarios.iter().map(|_| None).collect();
+    let alone = |place: usize| simulation::simulate(&scenarios[place]);
+    let handed_back = group.in_lanes(asked, alone, |place, event| {
+        match event {
+            Event::Steps(steps) => steps.iter().for_each(|step| recorders[place].take(*step)),
+            Event::Ended(run) => {
+                all[place] = Some(Driven {
+                    scenario: scenarios[place].clone(),
+                    log: std::mem::replace(&mut recorders[place], Recorder::new(true)).into_log(),
+                    path: path_of(&run.trace),
+                });
+            }
+            Event::HandedBack => (),
+        }
+        Ok(())
+    })?;
+    for place in handed_back {
+        all[place] = Some(driven_alone(&scenarios[place]));
+    }
+    Ok(all.into_iter().flatten().collect())
+}
+
+/// A guided drive of a published driver with the remnant and the paper's sensors, on any course (the built-in one if
+/// none), as it is logged.
+///
+/// # Errors
+/// A course that is too short; a probe that the controller refuses.
+pub fn recorded(
+    driver: &PublishedDriver,
+    course: Option<&Course>,
+    probe: Option<Probe>,
+    seed: u64,
+) -> Result<DriveLog, String> {
+    Ok(driven_alone(&guided_drive(driver, course, probe, seed)?).log)
+}
+
+/// The scenario of that drive.
+///
+/// # Errors
+/// A course that is too short; a probe that the controller refuses.
+pub(crate) fn guided_drive(
+    driver: &PublishedDriver,
+    course: Option<&Course>,
+    probe: Option<Probe>,
+    seed: u64,
+) -> Result<Scenario, String> {
+    let mut scenario = Scenario::builder()
+        .driver(DriverParameters {
+            remnant_sd_nm: REMNANT_GUIDED_NM,
+            ..driver.parameters()
+        })
+        .condition(Condition::Custom)
+        .gains(driver.gains())
+        .guidance(probe.map_or_else(GuidanceParameters::default, Probe::guidance))
+        .seed(seed);
+    if let Some(course) = course {
+        scenario = scenario.course(course.clone());
+    }
+    Ok(scenario.build()?)
+}
+
+/// The drive of a published driver, without remnant.
+fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, String> {
+    let condition = match driver.k_hg {
+        Some(_) => Condition::Custom,
+        None => Condition::Manual,
+    };
+    let mut guidance = GuidanceParameters::default();
+    if plan.probe_nm != 0.0 && condition != Condition::Manual {
+        guidance.probe = true;
+        guidance.controller.probe_amplitude_nm = plan.probe_nm;
+    }
+    let scenario = Scenario::builder()
+        .driver(driver.parameters())
+        .condition(condition)
+        .gains(driver.gains())
+        .guidance(guidance)
+        .seed(seed);
+    Ok(scenario.build()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::chosen;
+
+    /// Every value of every row: from the steps of the lanes as from those of the shipping ECU, with and without guidance
+    /// and probe, and where lanes hand a run back.
+    #[test]
+    fn a_log_does_not_depend_on_lanes() {
+        let plan = |probe_nm| Plan {
+            participants: vec![2, 9],
+            probe_nm,
+            seed: 3,
+        };
+        let mut scenarios = Vec::new();
+        for participant in chosen(&plan(0.0).participants).unwrap() {
+            for truth in [participant.manual, participant.guided] {
+                for probe_nm in [0.0, 0.2] {
+                    let plan = plan(probe_nm);
+                    let scenario = scenario_of_drive(&plan, participant.number, &truth, truth.parameters());
+                    scenarios.push(scenario.unwrap());
+                }
+            }
+        }
+        let exact = scenarios[2]
+            .to_builder()
+            .sensors(haptic_sim::scenario::Sensors::Exact);
+        scenarios.push(exact.build().unwrap());
+        let out = |scenario: &&Scenario| haptic_sim::lanes::why_not(scenario).is_some();
+        assert_eq!(scenarios.iter().filter(out).count(), 1);
+        let bits = |driven: &Driven| {
+            let log = &driven.log;
+            let columns = [
+                &log.e_y_m,
+                &log.e_theta_rad,
+                &log.wheel_angle_rad,
+                &log.guidance_torque_nm,
+                &log.driver_torque_nm,
+            ];
+            columns.map(|column| column.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+        };
+        let found = drive_logged(&scenarios, 1).unwrap();
+        assert_eq!(found.len(), scenarios.len());
+        for (driven, scenario) in found.iter().zip(&scenarios) {
+            let alone = driven_alone(scenario);
+            assert!(driven.log.len() > 20_000);
+            assert_eq!(bits(driven), bits(&alone));
+            assert_eq!((&driven.path, &driven.scenario), (&alone.path, scenario));
+        }
+    }
+}

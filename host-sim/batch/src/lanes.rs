@@ -1,0 +1,328 @@
+//! Many runs: side by side in lanes ([`haptic_sim::lanes`]) first, and with the shipping ECU where these are not enough.
+//!
+//! What the lanes cannot drive, and every run in which something could have ended guidance, is handed back, to be driven alone
+//! with the shipping ECU. So that no result depends on who drove, one run in [`CHECKED_OF`], and one of each study at least,
+//! is driven by both: a bit that differs, in any field of any sample, is an error.
+//!
+//! - [`drive_all`]: the runs of a study, on all cores.
+//! - [`Group`]: some of them, in one thread.
+
+use haptic_log::trace::CHANNELS;
+use haptic_sim::lanes::{Asked, Event, LANES, drive_asked};
+use haptic_sim::scenario::Scenario;
+use haptic_sim::seeds::{self, Stream};
+use haptic_sim::simulation::{Run, simulate};
+use rayon::prelude::*;
+
+/// One in so many runs of the lanes is driven by the shipping ECU too.
+const CHECKED_OF: u64 = 100;
+/// Fewer runs than this are as soon done one by one: a block of lanes takes its time however few are under way.
+const FEWEST: usize = LANES / 4;
+/// Most runs of a group: the more, the less often lanes wait for the last run, and the fewer threads share the work.
+const MOST_OF_A_GROUP: usize = 4 * LANES;
+
+/// Which runs are driven twice.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Checked {
+    seed: u64,
+    of: u64,
+}
+
+impl Checked {
+    /// Of a study of so many runs, drawn by its seed.
+    pub(crate) fn new(seed: u64, of: u64) -> Self {
+        Self {
+            seed: Stream::Design.seed(seed),
+            of: of.max(1),
+        }
+    }
+
+    fn has(self, number: u64) -> bool {
+        seeds::nth(self.seed, number).is_multiple_of(CHECKED_OF) || number == self.seed % self.of
+    }
+}
+
+/// Runs that are driven in one thread: those of a study from a number on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Group<'a> {
+    /// Each run's scenario.
+    pub(crate) scenarios: &'a [Scenario],
+    /// Number of the first of them in the study.
+    pub(crate) first: u64,
+    /// Which of the study's are driven twice.
+    pub(crate) checked: Checked,
+}
+
+impl Group<'_> {
+    /// Drives the group: `take` gets each run with its place in the group, in no order.
+    ///
+    /// # Errors
+    /// A run for which lanes and shipping ECU differ; what `take` says.
+    pub(crate) fn drive(
+        &self,
+        mut take: impl FnMut(usize, &Run) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let alone = |place: usize| simulate(&self.scenarios[place]);
+        let handed_back = self.in_lanes(Asked::default(), alone, |place, event| match event {
+            Event::Ended(run) => take(place, run),
+            _ => Ok(()),
+        })?;
+        handed_back
+            .into_iter()
+            .try_for_each(|place| take(place, &alone(place)))
+    }
+
+    /// Drives in lanes what these can; gives the places of those that they hand back. `alone` is a run by the shipping ECU,
+    /// against which some are held.
+    ///
+    /// # Errors
+    /// As [`Group::drive`].
+    pub(crate) fn in_lanes(
+        &self,
+        asked: Asked,
+        alone: impl Fn(usize) -> Run,
+        on: impl FnMut(usize, Event) -> Result<(), String>,
+    ) -> Result<Vec<usize>, String> {
+        self.with(|on| drive_in_lanes(self.scenarios, asked, on), alone, on)
+    }
+
+    /// The same by whatever drives side by side.
+    fn with(
+        &self,
+        drive: impl FnOnce(&mut dyn FnMut(usize, Event)),
+        alone: impl Fn(usize) -> Run,
+        mut on: impl FnMut(usize, Event) -> Result<(), String>,
+    ) -> Result<Vec<usize>, String> {
+        let (mut handed_back, mut result) = (Vec::new(), Ok(()));
+        drive(&mut |place, event| {
+            let number = self.first + place as u64;
+            result = match (&result, event) {
+                (Err(_), _) => return,
+                (Ok(()), Event::HandedBack) => {
+                    handed_back.push(place);
+                    return;
+                }
+                (Ok(()), Event::Ended(run)) if self.checked.has(number) => {
+                    agree(number, run, &alone(place)).and_then(|()| on(place, Event::Ended(run)))
+                }
+                (Ok(()), event) => on(place, event),
+            };
+        });
+        result.map(|()| handed_back)
+    }
+}
+
+fn drive_in_lanes(scenarios: &[Scenario], asked: Asked, on: &mut dyn FnMut(usize, Event)) {
+    if scenarios.len() < FEWEST {
+        (0..scenarios.len()).for_each(|place| on(place, Event::HandedBack));
+    } else {
+        drive_asked(scenarios, asked, on);
+    }
+}
+
+/// Whether two runs are the same to the last bit, signs of zeros included.
+fn agree(number: u64, lanes: &Run, alone: &Run) -> Result<(), String> {
+    let differ = |what: String| {
+        Err(format!(
+            "run {number}: {what} in lanes and with the shipping ECU. This is a fault of this program, not of what it was \
+             given: please report it, with all that is needed to start it again"
+        ))
+    };
+    if (lanes.steps, lanes.ending) != (alone.steps, alone.ending) {
+        return differ(format!(
+            "{} steps and {}, {:?} and {:?}",
+            lanes.steps, alone.steps, lanes.ending, alone.ending
+        ));
+    }
+    for (mine, shipping) in lanes.trace.samples.iter().zip(&alone.trace.samples) {
+        for channel in &CHANNELS {
+            let values = [mine, shipping].map(|sample| (channel.value)(sample));
+            if values[0].to_bits() != values[1].to_bits() {
+                let [a, b] = values;
+                return differ(format!(
+                    "{} at {} s is {a:?} and {b:?}",
+                    channel.name, mine.time_s
+                ));
+            }
+        }
+    }
+    match [lanes, alone].map(|run| run.trace.samples.len()) {
+        [a, b] if a != b => differ(format!("there are {a} and {b} samples")),
+        _ => Ok(()),
+    }
+}
+
+/// Drives the runs of a study on all cores, and gives what `measure` makes of each, in their order. The runs that are driven
+/// twice are drawn by the seed.
+///
+/// # Errors
+/// As [`Group::drive`].
+pub(crate) fn drive_all<T: Send>(
+    scenarios: &[Scenario],
+    seed: u64,
+    measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
+) -> Result<Vec<T>, String> {
+    let checked = Checked::new(seed, scenarios.len() as u64);
+    in_groups(scenarios, |first, scenarios| {
+        let mut found: Vec<Option<T>> = scenarios.iter().map(|_| None).collect();
+        let group = Group {
+            scenarios,
+            first: first as u64,
+            checked,
+        };
+        group.drive(|place, run| {
+            found[place] = Some(measure(first + place, run)?);
+            Ok(())
+        })?;
+        Ok(found.into_iter().flatten().collect())
+    })
+}
+
+/// As [`drive_all`], but what the lanes hand back is nothing: whoever asks has a better way to drive it.
+///
+/// # Errors
+/// As [`Group::drive`].
+pub(crate) fn first_in_lanes<T: Send>(
+    scenarios: &[Scenario],
+    seed: u64,
+    measure: impl Fn(usize, &Run) -> T + Sync,
+) -> Result<Vec<Option<T>>, String> {
+    let checked = Checked::new(seed, scenarios.len() as u64);
+    in_groups(scenarios, |first, scenarios| {
+        let mut found: Vec<Option<T>> = scenarios.iter().map(|_| None).collect();
+        let group = Group {
+            scenarios,
+            first: first as u64,
+            checked,
+        };
+        let alone = |place: usize| simulate(&scenarios[place]);
+        group.in_lanes(Asked::default(), alone, |place, event| {
+            if let Event::Ended(run) = event {
+                found[place] = Some(measure(first + place, run));
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    })
+}
+
+/// What `of_group` makes of the parts of a list, on all cores, in the list's order; it gets the place of the part's first.
+///
+/// # Errors
+/// What `of_group` says.
+pub(crate) fn in_groups<J: Sync, T: Send>(
+    jobs: &[J],
+    of_group: impl Fn(usize, &[J]) -> Result<Vec<T>, String> + Sync,
+) -> Result<Vec<T>, String> {
+    let share = jobs.len().div_ceil(rayon::current_num_threads()).max(1);
+    let size = if share < 2 * LANES {
+        share
+    } else {
+        // Several groups for each thread, so that none waits long for the last.
+        (share / 2).next_multiple_of(LANES).min(MOST_OF_A_GROUP)
+    };
+    let groups: Vec<Vec<T>> = jobs
+        .par_chunks(size)
+        .enumerate()
+        .map(|(number, group)| of_group(number * size, group))
+        .collect::<Result<_, String>>()?;
+    Ok(groups.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use haptic_sim::scenario::{Condition, Sensors};
+    use haptic_sim::simulation::Ending;
+
+    use super::*;
+
+    fn scenario(condition: Condition) -> Scenario {
+        let course = crate::handover::stretched_curve(0.5).unwrap();
+        let scenario = Scenario::builder().course(course).condition(condition);
+        scenario.build().unwrap()
+    }
+
+    /// Lies of lanes that one run in a study of one must not get away with: each field of each sample, the sign of a zero
+    /// too, the number of samples and steps, and the ending.
+    #[test]
+    fn a_bit_that_differs_is_an_error() {
+        let scenarios = [scenario(Condition::High)];
+        let honest = simulate(&scenarios[0]);
+        let group = Group {
+            scenarios: &scenarios,
+            first: 0,
+            checked: Checked::new(1, 1),
+        };
+        let told = |run: &Run| {
+            let lanes = |on: &mut dyn FnMut(usize, Event)| on(0, Event::Ended(run));
+            let mut taken = 0;
+            let result = group.with(
+                lanes,
+                |_| honest.clone(),
+                |_, _| {
+                    taken += 1;
+                    Ok(())
+                },
+            );
+            (result, taken)
+        };
+        assert_eq!(told(&honest), (Ok(vec![]), 1));
+        let lie = |change: &dyn Fn(&mut Run)| {
+            let mut run = honest.clone();
+            change(&mut run);
+            let (result, taken) = told(&run);
+            assert_eq!(taken, 0, "what is wrong is not taken");
+            result.unwrap_err()
+        };
+        let error = lie(&|run| run.trace.samples[700].yaw_rate_rad_per_s += 1e-18);
+        assert!(error.starts_with("run 0: yaw_rate"), "{error}");
+        let zero = honest
+            .trace
+            .samples
+            .iter()
+            .position(|s| s.guidance_torque_nm.to_bits() == 0);
+        let error = lie(&|run| run.trace.samples[zero.unwrap()].guidance_torque_nm = -0.0);
+        assert!(error.contains("is -0.0 and 0.0 in lanes and"), "{error}");
+        let error = lie(&|run| run.trace.samples.truncate(5));
+        assert!(error.starts_with("run 0: there are 5 and"), "{error}");
+        lie(&|run| run.steps += 1);
+        lie(&|run| run.ending = Ending::Diverged { s_m: 1.0 });
+    }
+
+    #[test]
+    fn one_in_a_hundred_is_checked_and_one_of_each_study() {
+        let count = |of: u64| {
+            let checked = Checked::new(7, of);
+            (0..of).filter(|number| checked.has(*number)).count()
+        };
+        for of in 1..30 {
+            assert!((1..5).contains(&count(of)), "{of}: {}", count(of));
+        }
+        // Binomial: 1000 and four standard deviations of 31.
+        assert!((875..1126).contains(&count(100_000)), "{}", count(100_000));
+    }
+
+    /// With lanes that hand back (exact sensors) and lanes that drive: each run once, in its place.
+    #[test]
+    fn every_run_is_driven_once_whoever_drives_it() {
+        let scenarios: Vec<Scenario> = (0..21)
+            .map(|i| {
+                let builder = scenario(Condition::ALL[i % 4]).to_builder().seed(i as u64);
+                let exact = i % 3 == 0;
+                let sensors = if exact { Sensors::Exact } else { Sensors::Paper };
+                builder.sensors(sensors).build().unwrap()
+            })
+            .collect();
+        let runs = drive_all(&scenarios, 1, |number, run| Ok((number, run.clone()))).unwrap();
+        assert_eq!(runs.len(), 21);
+        for (place, (number, run)) in runs.iter().enumerate() {
+            assert_eq!((place, run), (*number, &simulate(&scenarios[place])));
+        }
+        let refused = drive_all(
+            &scenarios,
+            1,
+            |number, _| if number == 5 { Err("5".into()) } else { Ok(()) },
+        );
+        assert_eq!(refused, Err("5".into()));
+    }
+}
