@@ -2,6 +2,7 @@
 
 mod hear;
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use haptic_log::trace::{Sample, Trace};
@@ -24,6 +25,12 @@ use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Sim
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
 /// then has the others' rhythm.
 const BLOCK: u32 = 50;
+
+thread_local! {
+    /// Room for the samples of a lane each, from the runs before: new room of some megabytes a run would be handed back to
+    /// the system and asked for again with every call, page by page.
+    static ROOM: Cell<Vec<Vec<Sample>>> = const { Cell::new(Vec::new()) };
+}
 
 /// What a lane has of its run beside the arrays.
 struct Slot {
@@ -50,6 +57,7 @@ pub(super) struct Lanes<const N: usize> {
     own: [i32; N],
     /// All bits where there is a camera for the guidance.
     looks: [u64; N],
+    has_remnants: bool,
     /// Whether something is planned in some lane within this block.
     has_events: bool,
     roads: [Arc<Centreline>; N],
@@ -59,6 +67,7 @@ pub(super) struct Lanes<const N: usize> {
 impl<const N: usize> Lanes<N> {
     pub(super) fn new(whole: usize, any: &Scenario) -> Self {
         let road = any.course().centreline();
+        let mut room = ROOM.take();
         Self {
             worlds: Worlds::new(whole),
             ecus: Ecus::new(),
@@ -67,6 +76,7 @@ impl<const N: usize> Lanes<N> {
             speeds: Speeds::new(),
             own: [0; N],
             looks: [0; N],
+            has_remnants: false,
             has_events: false,
             roads: std::array::from_fn(|_| Arc::clone(&road)),
             slots: std::array::from_fn(|_| Slot {
@@ -76,7 +86,7 @@ impl<const N: usize> Lanes<N> {
                 run: Run {
                     trace: Trace {
                         sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
-                        samples: Vec::new(),
+                        samples: room.pop().unwrap_or_default(),
                     },
                     ending: Ending::CourseEnd,
                     steps: 0,
@@ -117,6 +127,7 @@ impl<const N: usize> Lanes<N> {
         }
         slot.remnant = (simulation.remnant.scale_nm != 0.0).then_some(simulation.remnant);
         slot.plan = Some(simulation.plan);
+        self.has_remnants = self.slots.iter().any(|slot| slot.remnant.is_some());
         self.happen(lane);
     }
 
@@ -229,6 +240,9 @@ impl<const N: usize> Lanes<N> {
 
     #[inline(always)]
     fn draw_remnants(&mut self) {
+        if !self.has_remnants {
+            return;
+        }
         for (lane, slot) in self.slots.iter_mut().enumerate() {
             if let Some(remnant) = &mut slot.remnant {
                 // As a hand's torque of zero is added there.
@@ -244,8 +258,11 @@ impl<const N: usize> Lanes<N> {
         for lane in 0..N {
             if self.worlds.alive[lane] == ALIVE && self.worlds.is_at_its_end(lane) {
                 let slot = &mut self.slots[lane];
-                slot.is_whole = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) == 0;
                 slot.run.steps = self.own[lane] as u32;
+                let is_recorded =
+                    slot.run.trace.samples.len() as u32 == slot.run.steps.div_ceil(STEPS_PER_SAMPLE);
+                let is_suspect = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) != 0;
+                slot.is_whole = is_recorded && !is_suspect;
                 self.worlds.alive[lane] = 0;
             }
         }
@@ -264,10 +281,12 @@ impl<const N: usize> Lanes<N> {
             ..
         } = &self.worlds;
         for (l, slot) in self.slots.iter_mut().enumerate() {
-            if alive[l] != ALIVE {
+            let samples = &mut slot.run.trace.samples;
+            // There is room for the whole run; the compiler has to see it, or it makes each sample twice.
+            if alive[l] != ALIVE || samples.len() == samples.capacity() {
                 continue;
             }
-            slot.run.trace.samples.push(Sample {
+            samples.push(Sample {
                 time_s: f64::from(self.own[l]) * STEP_S,
                 s_m: body.s()[l],
                 lateral_error_m: body.offset[l],
@@ -287,5 +306,16 @@ impl<const N: usize> Lanes<N> {
                 guidance_limited: self.ecus.is_limited(l),
             });
         }
+    }
+}
+
+impl<const N: usize> Drop for Lanes<N> {
+    fn drop(&mut self) {
+        ROOM.set(
+            self.slots
+                .iter_mut()
+                .map(|slot| std::mem::take(&mut slot.run.trace.samples))
+                .collect(),
+        );
     }
 }
