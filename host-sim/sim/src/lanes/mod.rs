@@ -24,6 +24,7 @@
 mod band;
 mod checks;
 mod counts;
+mod divide;
 mod ecu;
 mod gate;
 mod probe;
@@ -37,6 +38,7 @@ mod tracked;
 mod world;
 
 use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
 
 use crate::models::STEP_S;
 use crate::scenario::Scenario;
@@ -49,6 +51,12 @@ pub use gate::{Reason, why_not};
 pub const LANES: usize = 8;
 /// All bits of a lane that is under way.
 const ALIVE: u64 = u64::MAX;
+
+/// Where the widest vectors lie within one line of the cache. What a step keeps on the stack is in it: with one such
+/// local the compiler aligns its own spilled vectors too, which it otherwise does not.
+#[repr(C, align(64))]
+struct Aligned<T>(T);
+
 /// Which instructions move the lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Width {
@@ -97,17 +105,25 @@ pub fn drive(scenarios: &[Scenario], width: Width, mut done: impl FnMut(usize, O
         match width {
             Width::Widest => block(&mut lanes),
             Width::Avx2 => block_of_avx2(&mut lanes),
-            Width::Portable => lanes.block(),
+            Width::Portable => lanes.block::<false>(),
         }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl+fma", "x86_64+avx2+fma"))]
 fn block(lanes: &mut Lanes<LANES>) {
-    lanes.block();
+    if target_cfg_f!(target_feature = "fma") {
+        lanes.block::<true>();
+    } else {
+        lanes.block::<false>();
+    }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn block_of_avx2(lanes: &mut Lanes<LANES>) {
-    lanes.block();
+    if target_cfg_f!(target_feature = "fma") {
+        lanes.block::<true>();
+    } else {
+        lanes.block::<false>();
+    }
 }

@@ -178,7 +178,7 @@ impl<const N: usize> Lanes<N> {
 
     /// Steps until everything periodic is where it was.
     #[inline(always)]
-    pub(super) fn block(&mut self) {
+    pub(super) fn block<const FUSED: bool>(&mut self) {
         self.has_events = (0..N).any(|lane| {
             let left = self.slots[lane].event.wrapping_sub(self.own[lane] as u32);
             self.worlds.alive[lane] == ALIVE && left < BLOCK
@@ -195,14 +195,14 @@ impl<const N: usize> Lanes<N> {
                 self.ecus.let_time_pass();
                 self.checks.let_time_pass();
             }
-            self.step(phase);
+            self.step::<FUSED>(phase);
         }
     }
 
     /// One millisecond of every run.
     #[inline(always)]
-    fn step(&mut self, phase: u32) {
-        if self.worlds.driver_looks(&self.roads) {
+    fn step<const FUSED: bool>(&mut self, phase: u32) {
+        if self.worlds.driver_looks::<FUSED>(&self.roads) {
             self.end_runs();
         }
         let is_sample = phase.is_multiple_of(STEPS_PER_SAMPLE);
@@ -214,7 +214,7 @@ impl<const N: usize> Lanes<N> {
                     asked[l] &= self.looks[l];
                 }
             }
-            self.worlds.camera_looks(&self.roads, &asked);
+            self.worlds.camera_looks::<FUSED>(&self.roads, &asked);
         }
         self.draw_remnants();
         let mut driver_nm = [0.0; N];
@@ -226,12 +226,12 @@ impl<const N: usize> Lanes<N> {
         self.ecus.decide(&self.own, phase == 0, is_sample);
         let torque_nm = self.ecus.torque_nm();
         if is_sample {
-            self.worlds.locate(&self.roads);
+            self.worlds.locate::<FUSED>(&self.roads);
             self.speeds.locate(self.worlds.body.s());
             self.record(&driver_nm, &torque_nm);
         }
         let speeds = self.speeds.of_step(&self.own);
-        self.worlds.move_on(&torque_nm, speeds);
+        self.worlds.move_on::<FUSED>(&torque_nm, speeds);
         self.speeds.go_on(&mut self.worlds, &self.roads);
         for own in &mut self.own {
             *own = own.wrapping_add(1);

@@ -4,9 +4,10 @@
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use super::ALIVE;
+use super::divide::{SIX, TWENTY_FOUR};
 use super::real::{Acting, Reals};
-use super::tracked::Tracked;
+use super::tracked::{ALL, HEADING, OFFSET, Tracked};
+use super::{ALIVE, Aligned};
 use crate::guidance::NoGuidance;
 use crate::models::STEP_S;
 use crate::models::plant::{COLUMNS, STATES, Transition};
@@ -181,11 +182,12 @@ impl<const N: usize> Worlds<N> {
 
     /// The driver looks at the road; returns whether a run that is alive has come to its end.
     #[inline(always)]
-    pub(super) fn driver_looks(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
+    pub(super) fn driver_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
         let asked = self.alive;
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
-        self.driver.look(roads, place, &chi, &asked, &mut self.suspect);
+        self.driver
+            .look::<FUSED>(roads, place, &chi, &asked, &mut self.suspect);
         let mut ended = 0;
         for l in 0..N {
             ended |= if self.driver.far.s()[l] >= self.end[l] {
@@ -204,16 +206,19 @@ impl<const N: usize> Worlds<N> {
 
     /// The camera looks at the road in the runs that are asked for.
     #[inline(always)]
-    pub(super) fn camera_looks(&mut self, roads: &[Arc<Centreline>; N], asked: &[u64; N]) {
+    pub(super) fn camera_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N], asked: &[u64; N]) {
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
-        self.camera.look(roads, place, &chi, asked, &mut self.suspect);
+        self.camera
+            .look::<FUSED>(roads, place, &chi, asked, &mut self.suspect);
     }
 
     /// Where the centres of gravity are on their roads.
     #[inline(always)]
-    pub(super) fn locate(&mut self, roads: &[Arc<Centreline>; N]) {
-        let lost = self.body.project(roads, &self.x, &self.y, &self.alive);
+    pub(super) fn locate<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) {
+        let lost = self
+            .body
+            .project::<FUSED, ALL>(roads, &self.x, &self.y, &self.alive);
         for l in 0..N {
             let is_off = self.body.offset[l].abs() > crate::simulation::DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
@@ -223,30 +228,29 @@ impl<const N: usize> Worlds<N> {
 
     /// The drivers' eyes and arms, columns and vehicles move for a millisecond, from one speed to the next.
     #[inline(always)]
-    pub(super) fn move_on(&mut self, torque_nm: &[f64; N], speeds: [&[f64; N]; 2]) {
-        let mut next_target = [0.0; N];
-        self.vision(&mut next_target);
+    pub(super) fn move_on<const FUSED: bool>(&mut self, torque_nm: &[f64; N], speeds: [&[f64; N]; 2]) {
+        let mut places = Aligned(([[0.0; N]; STATES], [0.0; N]));
+        let (next, next_target) = (&mut places.0.0, &mut places.0.1);
+        self.vision(next_target);
         let before = self.direction_rad();
-        let mut next = [[0.0; N]; STATES];
-        self.linear(&next_target, torque_nm, &mut next);
+        self.linear(next_target, torque_nm, next);
         let acting = Acting {
             target: &self.target,
-            next_target: &next_target,
+            next_target,
             torque_nm,
             speeds,
             remnant_nm: &self.remnant_nm,
             alive: &self.alive,
         };
-        self.real
-            .step(&self.state, &acting, &mut next, &mut self.distance);
-        (self.state, self.target) = (next, next_target);
+        self.real.step(&self.state, &acting, next, &mut self.distance);
+        (self.state, self.target) = places.0;
         for l in 0..N {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);
             let square = half_turn * half_turn;
             self.suspect[l] |= if square < 1e-6 { 0 } else { ALIVE };
             let (sin, cos) = (
-                half_turn * (1.0 - square / 6.0),
-                1.0 - square * (0.5 - square / 24.0),
+                half_turn * (1.0 - SIX.of::<FUSED>(square)),
+                1.0 - square * (0.5 - TWENTY_FOUR.of::<FUSED>(square)),
             );
             let [x, y] = rotated([self.direction[0][l], self.direction[1][l]], sin, cos);
             self.x[l] += self.distance[l] * x;
@@ -311,7 +315,7 @@ impl<const N: usize> Worlds<N> {
 
 impl<const N: usize> Points<N> {
     #[inline(always)]
-    fn look(
+    fn look<const FUSED: bool>(
         &mut self,
         roads: &[Arc<Centreline>; N],
         (x, y, direction): (&[f64; N], &[f64; N], &[[f64; N]; 2]),
@@ -324,12 +328,12 @@ impl<const N: usize> Points<N> {
             px[l] = x[l] + self.near_m[l] * direction[0][l];
             py[l] = y[l] + self.near_m[l] * direction[1][l];
         }
-        let lost_near = self.near.project(roads, &px, &py, asked);
+        let lost_near = self.near.project::<FUSED, OFFSET>(roads, &px, &py, asked);
         for l in 0..N {
             px[l] = x[l] + self.far_m[l] * direction[0][l];
             py[l] = y[l] + self.far_m[l] * direction[1][l];
         }
-        let lost_far = self.far.project(roads, &px, &py, asked);
+        let lost_far = self.far.project::<FUSED, HEADING>(roads, &px, &py, asked);
         for l in 0..N {
             // An angle that would have to be wrapped is that of a run that turns.
             let e_theta = self.far.found_heading[l] - chi[l];
