@@ -69,9 +69,8 @@ pub(super) struct Ecus<const N: usize> {
     e_theta_rate: [i32; N],
     /// Age of the lane sample, as a share of a second in 2^-32.
     age: [i32; N],
-    /// The torque of the last step and whether a limit held it.
+    /// The torque of the last step.
     pub(super) applied: [i32; N],
-    limited: [i32; N],
     anchor: [i32; N],
     anchor_step: [i32; N],
     pub(super) driver: [i32; N],
@@ -86,7 +85,11 @@ pub(super) struct Ecus<const N: usize> {
     pub(super) suspect: [i32; N],
     ramp_from: [i32; N],
     ramp_done: [i32; N],
+    /// Whether a limit held the torque of the last step. Not beside it: the compiler would take both for one vector.
+    limited: [i32; N],
     past: [[i32; N]; PAST],
+    /// How many torques were kept so far.
+    kept: usize,
     band: Band<N>,
     probes: Probes<N>,
 }
@@ -134,6 +137,7 @@ impl<const N: usize> Ecus<N> {
             ramp_from: zero(),
             ramp_done: zero(),
             past: [zero(); PAST],
+            kept: 0,
             band: Band::new(),
             probes: Probes::new(),
         }
@@ -205,8 +209,9 @@ impl<const N: usize> Ecus<N> {
 
     /// The lane preview is stale: the last torque from before it was lost fades.
     pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
-        let last = (step - TIMEOUT_MS - 1) / 5;
-        let (trusted, applied) = (self.past[last as usize % PAST][lane], self.applied[lane]);
+        let before = (step - 1) / 5 - (step - TIMEOUT_MS - 1) / 5;
+        let trusted = self.past[self.kept.wrapping_sub(1 + before as usize) % PAST][lane];
+        let applied = self.applied[lane];
         // Half a wave of the probe does not stand for two seconds, and what the other half took does not come back.
         let applied = smaller_of_same_sign(applied, applied.wrapping_sub(self.probes.applied[lane]));
         self.mode[lane] = HANDOVER;
@@ -305,15 +310,18 @@ impl<const N: usize> Ecus<N> {
         self.envelope(&wanted, &mut torque);
         self.probes.hold(&torque, &self.limited);
         if is_kept {
+            let kept = &mut self.past[self.kept % PAST];
             for l in 0..N {
-                self.past[(own[l] / 5) as usize % PAST][l] = torque[l].wrapping_sub(self.probes.applied[l]);
+                kept[l] = torque[l].wrapping_sub(self.probes.applied[l]);
             }
+            self.kept = self.kept.wrapping_add(1);
         }
         for l in 0..N {
             // Toward zero.
             let rounded = (torque[l].wrapping_add((torque[l] >> 31) & (TORQUE_LSB - 1)) >> 12) << 12;
-            self.applied[l] = if self.mode[l] == OFF { 0 } else { rounded };
-            self.limited[l] = if self.mode[l] == OFF { 0 } else { self.limited[l] };
+            let is_on = flag(self.mode[l] != OFF);
+            self.applied[l] = rounded & is_on;
+            self.limited[l] &= is_on;
         }
         self.band
             .judge(&self.applied, &self.mode, &self.matters, &mut self.suspect);

@@ -202,9 +202,6 @@ impl<const N: usize> Lanes<N> {
     /// One millisecond of every run.
     #[inline(always)]
     fn step<const FUSED: bool>(&mut self, phase: u32) {
-        if self.worlds.driver_looks::<FUSED>(&self.roads) {
-            self.end_runs();
-        }
         let is_sample = phase.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = camera_looks(phase);
         if looks || is_sample {
@@ -225,6 +222,11 @@ impl<const N: usize> Lanes<N> {
         self.hear_motors(phase);
         self.ecus.decide(&self.own, phase == 0, is_sample);
         let torque_nm = self.ecus.torque_nm();
+        // Not before: the ECUs do not wait for where the cars moved to, so that the processor has work meanwhile. A run that
+        // ends here has decided once more, and nobody has heard it.
+        if self.worlds.driver_looks::<FUSED>(&self.roads) {
+            self.end_runs();
+        }
         if is_sample {
             self.worlds.locate::<FUSED>(&self.roads);
             self.speeds.locate(self.worlds.body.s());
