@@ -24,7 +24,7 @@ pub(super) const WINDOW_GROWTH: i32 = 20_132_659;
 const WINDOW_STEPS: i32 = 250;
 pub(super) const OVERRIDE_FROM: i32 = 13_421_773;
 const OVERRIDE_SLOPE: i32 = 3;
-const MAX_RATE: u64 = 1000 << 20;
+const MAX_RATE: i32 = 1000 << 20;
 /// The largest honest step of a lane sample, 0.3 m and 0.1 rad.
 pub(super) const LANE_STEP: i32 = 5_033_165;
 pub(super) const YAW_STEP: i32 = 1_677_722;
@@ -52,7 +52,7 @@ pub(super) struct Ecus<const N: usize> {
     /// Gains of the law, on e_y, its rate, e_theta and its rate.
     gains: [[i32; N]; 4],
     /// Of the rates' filter, 2^-8 us.
-    tau: [u32; N],
+    tau: [i32; N],
     /// Share of the law's torque at this speed.
     scheduled: [i32; N],
     limit: [i32; N],
@@ -94,13 +94,20 @@ pub(super) struct Ecus<const N: usize> {
     probes: Probes<N>,
 }
 
-/// One update of a filtered rate.
-fn filtered(tau: u32, rate: i32, from: i32, to: i32, dt_us: u32) -> i32 {
-    let change = (i64::from(to) - i64::from(from)) * (1_000_000 << 4);
+/// One update of a filtered rate: core's rounded quotient. A quotient of doubles is off by one at most, which what is left
+/// of the dividend shows: no machine divides integers for several lanes at once.
+#[inline(always)]
+fn filtered(tau: i32, rate: i32, change: i32, dt_us: i32) -> i32 {
+    let change = i64::from(change).wrapping_mul(1_000_000 << 4);
     let sum = i64::from(tau).wrapping_mul(i64::from(rate)).wrapping_add(change);
-    let span = tau.wrapping_add(dt_us << 8).max(1);
-    let size = (sum.unsigned_abs().wrapping_add(u64::from(span >> 1)) / u64::from(span)).min(MAX_RATE) as i32;
-    if sum < 0 { -size } else { size }
+    let span = tau.wrapping_add(dt_us << 8);
+    let size = sum.wrapping_abs().wrapping_add(i64::from(span >> 1));
+    let near = whole((size as f64 / f64::from(span)).min(f64::from(MAX_RATE)));
+    let rest = size.wrapping_sub(i64::from(near).wrapping_mul(i64::from(span)));
+    let more = if rest >= i64::from(span) { 1 } else { 0 };
+    let less = if rest < 0 { 1 } else { 0 };
+    let size = near.wrapping_add(more).wrapping_sub(less).min(MAX_RATE);
+    if sum < 0 { size.wrapping_neg() } else { size }
 }
 
 impl<const N: usize> Ecus<N> {
@@ -151,7 +158,7 @@ impl<const N: usize> Ecus<N> {
         for (all, gain) in self.gains.iter_mut().zip(gains) {
             all[lane] = bits(gain);
         }
-        self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
+        self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as i32;
         self.scheduled[lane] = scheduled(&p, speed_heard(scenario));
         self.limit[lane] = bits(p.torque_limit_nm);
         self.growth_in_a_step[lane] = per_second(bits(p.wind_up_nm_per_s), MS);
@@ -258,18 +265,28 @@ impl<const N: usize> Ecus<N> {
             seen[0][l] = f64::from(e_y) * (1.0 / ONE);
             seen[1][l] = f64::from(e_theta) * (1.0 / ONE);
         }
+        let dt_us = (dt_ms * 1000) as i32;
         for l in 0..N {
-            if self.hears[l] == 0 {
-                continue;
-            }
             let (e_y, e_theta) = (whole(seen[0][l] * ONE), whole(seen[1][l] * ONE));
-            if self.first[l] == 0 {
-                let (tau, dt_us) = (self.tau[l], dt_ms * 1000);
-                self.e_y_rate[l] = filtered(tau, self.e_y_rate[l], self.e_y[l], e_y, dt_us);
-                self.e_theta_rate[l] = filtered(tau, self.e_theta_rate[l], self.e_theta[l], e_theta, dt_us);
-            }
-            (self.e_y[l], self.e_theta[l]) = (e_y, e_theta);
-            (self.first[l], self.age[l]) = (0, 0);
+            let (moved, turned) = (
+                e_y.wrapping_sub(self.e_y[l]),
+                e_theta.wrapping_sub(self.e_theta[l]),
+            );
+            let e_y_rate = filtered(self.tau[l], self.e_y_rate[l], moved, dt_us);
+            let e_theta_rate = filtered(self.tau[l], self.e_theta_rate[l], turned, dt_us);
+            let hears = self.hears[l] != 0;
+            // The first picture tells of no rate.
+            let has_rate = hears & (self.first[l] == 0);
+            self.e_y_rate[l] = if has_rate { e_y_rate } else { self.e_y_rate[l] };
+            self.e_theta_rate[l] = if has_rate {
+                e_theta_rate
+            } else {
+                self.e_theta_rate[l]
+            };
+            self.e_y[l] = if hears { e_y } else { self.e_y[l] };
+            self.e_theta[l] = if hears { e_theta } else { self.e_theta[l] };
+            self.first[l] = if hears { 0 } else { self.first[l] };
+            self.age[l] = if hears { 0 } else { self.age[l] };
         }
         self.band.picture(&seen, own, &self.hears);
         seen

@@ -112,18 +112,10 @@ pub fn drive(scenarios: &[Scenario], width: Width, mut done: impl FnMut(usize, O
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl+fma", "x86_64+avx2+fma"))]
 fn block(lanes: &mut Lanes<LANES>) {
-    if target_cfg_f!(target_feature = "fma") {
-        lanes.block::<true>();
-    } else {
-        lanes.block::<false>();
-    }
+    lanes.block::<{ target_cfg_f!(target_feature = "fma") }>();
 }
 
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn block_of_avx2(lanes: &mut Lanes<LANES>) {
-    if target_cfg_f!(target_feature = "fma") {
-        lanes.block::<true>();
-    } else {
-        lanes.block::<false>();
-    }
+    lanes.block::<{ target_cfg_f!(target_feature = "fma") }>();
 }

@@ -233,7 +233,8 @@ impl<const N: usize> Lanes<N> {
             self.record(&driver_nm, &torque_nm);
         }
         let speeds = self.speeds.of_step(&self.own);
-        self.worlds.move_on::<FUSED>(&torque_nm, speeds);
+        self.worlds
+            .move_on::<FUSED>(&torque_nm, speeds, self.has_remnants);
         self.speeds.go_on(&mut self.worlds, &self.roads);
         for own in &mut self.own {
             *own = own.wrapping_add(1);

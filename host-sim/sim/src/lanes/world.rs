@@ -228,12 +228,22 @@ impl<const N: usize> Worlds<N> {
 
     /// The drivers' eyes and arms, columns and vehicles move for a millisecond, from one speed to the next.
     #[inline(always)]
-    pub(super) fn move_on<const FUSED: bool>(&mut self, torque_nm: &[f64; N], speeds: [&[f64; N]; 2]) {
+    pub(super) fn move_on<const FUSED: bool>(
+        &mut self,
+        torque_nm: &[f64; N],
+        speeds: [&[f64; N]; 2],
+        has_remnants: bool,
+    ) {
         let mut places = Aligned(([[0.0; N]; STATES], [0.0; N]));
         let (next, next_target) = (&mut places.0.0, &mut places.0.1);
         self.vision(next_target);
         let before = self.direction_rad();
-        self.linear(next_target, torque_nm, next);
+        // Nothing times something added to a sum that began with zero changes no bit of it.
+        if has_remnants {
+            self.linear::<true>(next_target, torque_nm, next);
+        } else {
+            self.linear::<false>(next_target, torque_nm, next);
+        }
         let acting = Acting {
             target: &self.target,
             next_target,
@@ -284,14 +294,19 @@ impl<const N: usize> Worlds<N> {
 
     /// Equations (1) to (6) and (8), in the plant's order of sums.
     #[inline(always)]
-    fn linear(&self, next_target: &[f64; N], torque_nm: &[f64; N], next: &mut [[f64; N]; STATES]) {
+    fn linear<const WITH_REMNANT: bool>(
+        &self,
+        next_target: &[f64; N],
+        torque_nm: &[f64; N],
+        next: &mut [[f64; N]; STATES],
+    ) {
         let [beta, yaw_rate, wheel, wheel_rate, arm, yaw] = &self.state;
         let [c0, c1, c2, c3, c4, c5, c6, c7, c8] = &self.columns;
         let (target, remnant) = (&self.target, &self.remnant_nm);
         // All rows in one loop over the lanes: the compiler then takes as many lanes at once as there are.
         for l in 0..N {
             let row = |row: usize, start: f64| {
-                start
+                let sum = start
                     + c0[row][l] * beta[l]
                     + c1[row][l] * yaw_rate[l]
                     + c2[row][l] * wheel[l]
@@ -299,8 +314,12 @@ impl<const N: usize> Worlds<N> {
                     + c4[row][l] * arm[l]
                     + c5[row][l] * target[l]
                     + c6[row][l] * next_target[l]
-                    + c7[row][l] * torque_nm[l]
-                    + c8[row][l] * remnant[l]
+                    + c7[row][l] * torque_nm[l];
+                if WITH_REMNANT {
+                    sum + c8[row][l] * remnant[l]
+                } else {
+                    sum
+                }
             };
             // Every sum begins with a zero, which keeps the signs of zeros.
             next[BETA][l] = row(BETA, 0.0);
