@@ -323,9 +323,9 @@ impl<const N: usize> Ecus<N> {
             is_guided[l] = flag(self.mode[l] == GUIDED);
         }
         self.probes.add(&is_guided, &mut wanted);
-        let mut torque = [0; N];
-        self.envelope(&wanted, &mut torque);
-        self.probes.hold(&torque, &self.limited);
+        let (mut torque, mut limited) = ([0; N], [0; N]);
+        self.envelope(&wanted, &mut torque, &mut limited);
+        self.probes.hold(&torque, &limited);
         if is_kept {
             let kept = &mut self.past[self.kept % PAST];
             for l in 0..N {
@@ -338,7 +338,7 @@ impl<const N: usize> Ecus<N> {
             let rounded = (torque[l].wrapping_add((torque[l] >> 31) & (TORQUE_LSB - 1)) >> 12) << 12;
             let is_on = flag(self.mode[l] != OFF);
             self.applied[l] = rounded & is_on;
-            self.limited[l] &= is_on;
+            self.limited[l] = limited[l] & is_on;
         }
         self.band
             .judge(&self.applied, &self.mode, &self.matters, &mut self.suspect);
@@ -392,13 +392,13 @@ impl<const N: usize> Ecus<N> {
 
     /// The nearest torque within the limits, and whether one of them acted.
     #[inline(always)]
-    fn envelope(&mut self, wanted: &[i32; N], torque: &mut [i32; N]) {
+    fn envelope(&mut self, wanted: &[i32; N], torque: &mut [i32; N], limited: &mut [i32; N]) {
         for l in 0..N {
             let (limit, applied) = (self.limit[l], self.applied[l]);
-            let mut limited = 0;
+            let mut is_limited = 0;
             let mut hold = |command: i32, low: i32, high: i32| {
                 let held = command.max(low).min(high);
-                limited |= held ^ command;
+                is_limited |= held ^ command;
                 held
             };
             let command = hold(wanted[l], limit.wrapping_neg(), limit);
@@ -425,7 +425,7 @@ impl<const N: usize> Ecus<N> {
             // A driver who overrides: the monitor has its own bound for that.
             self.suspect[l] |= flag(held != command) & self.matters[l];
             torque[l] = held;
-            self.limited[l] = limited;
+            limited[l] = is_limited;
         }
     }
 
