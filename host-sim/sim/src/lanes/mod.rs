@@ -2,7 +2,7 @@
 //!
 //! World and ECU of [`LANES`] runs are kept as a structure of arrays, so that an instruction moves four or eight of them at
 //! once. The widest instructions that the machine has are chosen when a program runs; sums and products are the same in the
-//! same order at any width, and none is contracted. Where a quotient by a constant is a product ([`divide`]), it is the same
+//! same order at any width, and none is contracted. Where a quotient by a constant is a product (`divide`), it is the same
 //! quotient. A lane whose run ended takes the next one.
 //!
 //! The ECU in here is a lean one: it does what the shipping one does while nothing is wrong. Whatever could end guidance is
