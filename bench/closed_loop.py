@@ -295,14 +295,14 @@ def main():
 
     road = Road(PAPER_COURSE)
     a, b = discretise()
-    start = time.perf_counter()
+    start = time.thread_time()
     result = run(options, road, a, b)
-    wall = time.perf_counter() - start
+    spent = time.thread_time() - start
     inputs = dict(
         program="numpy", sensors=options.sensors, guidance=options.guidance == "on", t_p=options.t_p,
         k_d=options.k_d, k_hg=options.k_hg, failure_time_s=options.failure_time,
     )
-    result |= dict(wall_seconds=wall, times_real_time=result["simulated_seconds"] / wall)
+    result |= dict(processor_seconds=spent, times_real_time=result["simulated_seconds"] / spent)
     print(json.dumps(inputs | result, default=float))
 
 

@@ -2,6 +2,7 @@
 //!
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
+mod account;
 mod bench;
 mod bindings_agree;
 mod boards;

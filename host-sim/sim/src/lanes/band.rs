@@ -115,8 +115,12 @@ impl<const N: usize> Band<N> {
         matters: &[i32; N],
         suspect: &mut [i32; N],
     ) {
+        let mut torques = [0; N];
         for l in 0..N {
-            let torque = (applied[l] >> 12).wrapping_mul(1000) / 4096;
+            torques[l] = (applied[l] >> 12).wrapping_mul(1000) / 4096;
+        }
+        for l in 0..N {
+            let torque = torques[l];
             let is_within = (torque >= self.low[l]) & (torque <= self.high[l]);
             let is_falling = torque.wrapping_abs() < self.torque[l].wrapping_abs();
             let longer = self.astray[l].wrapping_add(if is_falling { 0 } else { 1 });

@@ -24,7 +24,7 @@ pub(super) const WINDOW_GROWTH: i32 = 20_132_659;
 const WINDOW_STEPS: i32 = 250;
 pub(super) const OVERRIDE_FROM: i32 = 13_421_773;
 const OVERRIDE_SLOPE: i32 = 3;
-const MAX_RATE: u64 = 1000 << 20;
+const MAX_RATE: i32 = 1000 << 20;
 /// The largest honest step of a lane sample, 0.3 m and 0.1 rad.
 pub(super) const LANE_STEP: i32 = 5_033_165;
 pub(super) const YAW_STEP: i32 = 1_677_722;
@@ -52,7 +52,7 @@ pub(super) struct Ecus<const N: usize> {
     /// Gains of the law, on e_y, its rate, e_theta and its rate.
     gains: [[i32; N]; 4],
     /// Of the rates' filter, 2^-8 us.
-    tau: [u32; N],
+    tau: [i32; N],
     /// Share of the law's torque at this speed.
     scheduled: [i32; N],
     limit: [i32; N],
@@ -69,9 +69,8 @@ pub(super) struct Ecus<const N: usize> {
     e_theta_rate: [i32; N],
     /// Age of the lane sample, as a share of a second in 2^-32.
     age: [i32; N],
-    /// The torque of the last step and whether a limit held it.
+    /// The torque of the last step.
     pub(super) applied: [i32; N],
-    limited: [i32; N],
     anchor: [i32; N],
     anchor_step: [i32; N],
     pub(super) driver: [i32; N],
@@ -86,18 +85,29 @@ pub(super) struct Ecus<const N: usize> {
     pub(super) suspect: [i32; N],
     ramp_from: [i32; N],
     ramp_done: [i32; N],
+    /// Whether a limit held the torque of the last step. Not beside it: the compiler would take both for one vector.
+    limited: [i32; N],
     past: [[i32; N]; PAST],
+    /// How many torques were kept so far.
+    kept: usize,
     band: Band<N>,
     probes: Probes<N>,
 }
 
-/// One update of a filtered rate.
-fn filtered(tau: u32, rate: i32, from: i32, to: i32, dt_us: u32) -> i32 {
-    let change = (i64::from(to) - i64::from(from)) * (1_000_000 << 4);
+/// One update of a filtered rate: core's rounded quotient. A quotient of doubles is off by one at most, which what is left
+/// of the dividend shows: no machine divides integers for several lanes at once.
+#[inline(always)]
+fn filtered(tau: i32, rate: i32, change: i32, dt_us: i32) -> i32 {
+    let change = i64::from(change).wrapping_mul(1_000_000 << 4);
     let sum = i64::from(tau).wrapping_mul(i64::from(rate)).wrapping_add(change);
-    let span = tau.wrapping_add(dt_us << 8).max(1);
-    let size = (sum.unsigned_abs().wrapping_add(u64::from(span >> 1)) / u64::from(span)).min(MAX_RATE) as i32;
-    if sum < 0 { -size } else { size }
+    let span = tau.wrapping_add(dt_us << 8);
+    let size = sum.wrapping_abs().wrapping_add(i64::from(span >> 1));
+    let near = whole((size as f64 / f64::from(span)).min(f64::from(MAX_RATE)));
+    let rest = size.wrapping_sub(i64::from(near).wrapping_mul(i64::from(span)));
+    let more = if rest >= i64::from(span) { 1 } else { 0 };
+    let less = if rest < 0 { 1 } else { 0 };
+    let size = near.wrapping_add(more).wrapping_sub(less).min(MAX_RATE);
+    if sum < 0 { size.wrapping_neg() } else { size }
 }
 
 impl<const N: usize> Ecus<N> {
@@ -134,6 +144,7 @@ impl<const N: usize> Ecus<N> {
             ramp_from: zero(),
             ramp_done: zero(),
             past: [zero(); PAST],
+            kept: 0,
             band: Band::new(),
             probes: Probes::new(),
         }
@@ -147,7 +158,7 @@ impl<const N: usize> Ecus<N> {
         for (all, gain) in self.gains.iter_mut().zip(gains) {
             all[lane] = bits(gain);
         }
-        self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32;
+        self.tau[lane] = (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as i32;
         self.scheduled[lane] = scheduled(&p, speed_heard(scenario));
         self.limit[lane] = bits(p.torque_limit_nm);
         self.growth_in_a_step[lane] = per_second(bits(p.wind_up_nm_per_s), MS);
@@ -205,8 +216,9 @@ impl<const N: usize> Ecus<N> {
 
     /// The lane preview is stale: the last torque from before it was lost fades.
     pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
-        let last = (step - TIMEOUT_MS - 1) / 5;
-        let (trusted, applied) = (self.past[last as usize % PAST][lane], self.applied[lane]);
+        let before = (step - 1) / 5 - (step - TIMEOUT_MS - 1) / 5;
+        let trusted = self.past[self.kept.wrapping_sub(1 + before as usize) % PAST][lane];
+        let applied = self.applied[lane];
         // Half a wave of the probe does not stand for two seconds, and what the other half took does not come back.
         let applied = smaller_of_same_sign(applied, applied.wrapping_sub(self.probes.applied[lane]));
         self.mode[lane] = HANDOVER;
@@ -253,18 +265,28 @@ impl<const N: usize> Ecus<N> {
             seen[0][l] = f64::from(e_y) * (1.0 / ONE);
             seen[1][l] = f64::from(e_theta) * (1.0 / ONE);
         }
+        let dt_us = (dt_ms * 1000) as i32;
         for l in 0..N {
-            if self.hears[l] == 0 {
-                continue;
-            }
             let (e_y, e_theta) = (whole(seen[0][l] * ONE), whole(seen[1][l] * ONE));
-            if self.first[l] == 0 {
-                let (tau, dt_us) = (self.tau[l], dt_ms * 1000);
-                self.e_y_rate[l] = filtered(tau, self.e_y_rate[l], self.e_y[l], e_y, dt_us);
-                self.e_theta_rate[l] = filtered(tau, self.e_theta_rate[l], self.e_theta[l], e_theta, dt_us);
-            }
-            (self.e_y[l], self.e_theta[l]) = (e_y, e_theta);
-            (self.first[l], self.age[l]) = (0, 0);
+            let (moved, turned) = (
+                e_y.wrapping_sub(self.e_y[l]),
+                e_theta.wrapping_sub(self.e_theta[l]),
+            );
+            let e_y_rate = filtered(self.tau[l], self.e_y_rate[l], moved, dt_us);
+            let e_theta_rate = filtered(self.tau[l], self.e_theta_rate[l], turned, dt_us);
+            let hears = self.hears[l] != 0;
+            // The first picture tells of no rate.
+            let has_rate = hears & (self.first[l] == 0);
+            self.e_y_rate[l] = if has_rate { e_y_rate } else { self.e_y_rate[l] };
+            self.e_theta_rate[l] = if has_rate {
+                e_theta_rate
+            } else {
+                self.e_theta_rate[l]
+            };
+            self.e_y[l] = if hears { e_y } else { self.e_y[l] };
+            self.e_theta[l] = if hears { e_theta } else { self.e_theta[l] };
+            self.first[l] = if hears { 0 } else { self.first[l] };
+            self.age[l] = if hears { 0 } else { self.age[l] };
         }
         self.band.picture(&seen, own, &self.hears);
         seen
@@ -301,19 +323,22 @@ impl<const N: usize> Ecus<N> {
             is_guided[l] = flag(self.mode[l] == GUIDED);
         }
         self.probes.add(&is_guided, &mut wanted);
-        let mut torque = [0; N];
-        self.envelope(&wanted, &mut torque);
-        self.probes.hold(&torque, &self.limited);
+        let (mut torque, mut limited) = ([0; N], [0; N]);
+        self.envelope(&wanted, &mut torque, &mut limited);
+        self.probes.hold(&torque, &limited);
         if is_kept {
+            let kept = &mut self.past[self.kept % PAST];
             for l in 0..N {
-                self.past[(own[l] / 5) as usize % PAST][l] = torque[l].wrapping_sub(self.probes.applied[l]);
+                kept[l] = torque[l].wrapping_sub(self.probes.applied[l]);
             }
+            self.kept = self.kept.wrapping_add(1);
         }
         for l in 0..N {
             // Toward zero.
             let rounded = (torque[l].wrapping_add((torque[l] >> 31) & (TORQUE_LSB - 1)) >> 12) << 12;
-            self.applied[l] = if self.mode[l] == OFF { 0 } else { rounded };
-            self.limited[l] = if self.mode[l] == OFF { 0 } else { self.limited[l] };
+            let is_on = flag(self.mode[l] != OFF);
+            self.applied[l] = rounded & is_on;
+            self.limited[l] = limited[l] & is_on;
         }
         self.band
             .judge(&self.applied, &self.mode, &self.matters, &mut self.suspect);
@@ -367,13 +392,13 @@ impl<const N: usize> Ecus<N> {
 
     /// The nearest torque within the limits, and whether one of them acted.
     #[inline(always)]
-    fn envelope(&mut self, wanted: &[i32; N], torque: &mut [i32; N]) {
+    fn envelope(&mut self, wanted: &[i32; N], torque: &mut [i32; N], limited: &mut [i32; N]) {
         for l in 0..N {
             let (limit, applied) = (self.limit[l], self.applied[l]);
-            let mut limited = 0;
+            let mut is_limited = 0;
             let mut hold = |command: i32, low: i32, high: i32| {
                 let held = command.max(low).min(high);
-                limited |= held ^ command;
+                is_limited |= held ^ command;
                 held
             };
             let command = hold(wanted[l], limit.wrapping_neg(), limit);
@@ -400,7 +425,7 @@ impl<const N: usize> Ecus<N> {
             // A driver who overrides: the monitor has its own bound for that.
             self.suspect[l] |= flag(held != command) & self.matters[l];
             torque[l] = held;
-            self.limited[l] = limited;
+            limited[l] = is_limited;
         }
     }
 

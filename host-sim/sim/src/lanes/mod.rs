@@ -2,7 +2,8 @@
 //!
 //! World and ECU of [`LANES`] runs are kept as a structure of arrays, so that an instruction moves four or eight of them at
 //! once. The widest instructions that the machine has are chosen when a program runs; sums and products are the same in the
-//! same order at any width, and none is contracted. A lane whose run ended takes the next one.
+//! same order at any width, and none is contracted. Where a quotient by a constant is a product (`divide`), it is the same
+//! quotient. A lane whose run ended takes the next one.
 //!
 //! The ECU in here is a lean one: it does what the shipping one does while nothing is wrong. Whatever could end guidance is
 //! watched a little more strictly than the shipping ECU watches it, and the run of a lane in which it could is *suspect*:
@@ -25,8 +26,10 @@
 mod band;
 mod checks;
 mod counts;
+mod divide;
 mod ecu;
 mod gate;
+mod points;
 mod probe;
 mod real;
 mod runs;
@@ -38,6 +41,7 @@ mod tracked;
 mod world;
 
 use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
 
 use crate::models::STEP_S;
 use crate::scenario::Scenario;
@@ -50,6 +54,12 @@ pub use gate::{Reason, why_not};
 pub const LANES: usize = 8;
 /// All bits of a lane that is under way.
 const ALIVE: u64 = u64::MAX;
+
+/// Where the widest vectors lie within one line of the cache. What a step keeps on the stack is in it: with one such
+/// local the compiler aligns its own spilled vectors too, which it otherwise does not.
+#[repr(C, align(64))]
+struct Aligned<T>(T);
+
 /// Which instructions move the lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Width {
@@ -157,17 +167,17 @@ pub fn drive_asked(scenarios: &[Scenario], asked: Asked, mut on: impl FnMut(usiz
         match asked.width {
             Width::Widest => block(&mut lanes),
             Width::Avx2 => block_of_avx2(&mut lanes),
-            Width::Portable => lanes.block(),
+            Width::Portable => lanes.block::<false>(),
         }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl+fma", "x86_64+avx2+fma"))]
 fn block(lanes: &mut Lanes<LANES>) {
-    lanes.block();
+    lanes.block::<{ target_cfg_f!(target_feature = "fma") }>();
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn block_of_avx2(lanes: &mut Lanes<LANES>) {
-    lanes.block();
+    lanes.block::<{ target_cfg_f!(target_feature = "fma") }>();
 }

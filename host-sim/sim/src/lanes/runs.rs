@@ -2,6 +2,7 @@
 
 mod hear;
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use haptic_log::trace::{Sample, Trace};
@@ -35,6 +36,12 @@ struct Steps<const N: usize> {
     driver_torque_nm: [f64; N],
 }
 
+thread_local! {
+    /// Room for the samples of a lane each, from the runs before: new room of some megabytes a run would be handed back to
+    /// the system and asked for again with every call, page by page.
+    static ROOM: Cell<Vec<Vec<Sample>>> = const { Cell::new(Vec::new()) };
+}
+
 /// What a lane has of its run beside the arrays.
 struct Slot {
     /// The scenario's number, while its run is under way or not yet handed on.
@@ -60,6 +67,7 @@ pub(super) struct Lanes<const N: usize> {
     own: [i32; N],
     /// All bits where there is a camera for the guidance.
     looks: [u64; N],
+    has_remnants: bool,
     /// Whether something is planned in some lane within this block.
     has_events: bool,
     /// The steps of the last block, where they are asked for.
@@ -71,6 +79,7 @@ pub(super) struct Lanes<const N: usize> {
 impl<const N: usize> Lanes<N> {
     pub(super) fn new(whole: usize, any: &Scenario, every_step: bool) -> Self {
         let road = any.course().centreline();
+        let mut room = ROOM.take();
         Self {
             worlds: Worlds::new(whole),
             ecus: Ecus::new(),
@@ -79,6 +88,7 @@ impl<const N: usize> Lanes<N> {
             speeds: Speeds::new(),
             own: [0; N],
             looks: [0; N],
+            has_remnants: false,
             has_events: false,
             steps: every_step.then(|| Vec::with_capacity(BLOCK as usize)),
             roads: std::array::from_fn(|_| Arc::clone(&road)),
@@ -89,7 +99,7 @@ impl<const N: usize> Lanes<N> {
                 run: Run {
                     trace: Trace {
                         sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
-                        samples: Vec::new(),
+                        samples: room.pop().unwrap_or_default(),
                     },
                     ending: Ending::CourseEnd,
                     steps: 0,
@@ -130,6 +140,7 @@ impl<const N: usize> Lanes<N> {
         }
         slot.remnant = (simulation.remnant.scale_nm != 0.0).then_some(simulation.remnant);
         slot.plan = Some(simulation.plan);
+        self.has_remnants = self.slots.iter().any(|slot| slot.remnant.is_some());
         self.happen(lane);
     }
 
@@ -205,7 +216,7 @@ impl<const N: usize> Lanes<N> {
 
     /// Steps until everything periodic is where it was.
     #[inline(always)]
-    pub(super) fn block(&mut self) {
+    pub(super) fn block<const FUSED: bool>(&mut self) {
         if let Some(steps) = &mut self.steps {
             steps.clear();
         }
@@ -225,16 +236,13 @@ impl<const N: usize> Lanes<N> {
                 self.ecus.let_time_pass();
                 self.checks.let_time_pass();
             }
-            self.step(phase);
+            self.step::<FUSED>(phase);
         }
     }
 
     /// One millisecond of every run.
     #[inline(always)]
-    fn step(&mut self, phase: u32) {
-        if self.worlds.driver_looks(&self.roads) {
-            self.end_runs();
-        }
+    fn step<const FUSED: bool>(&mut self, phase: u32) {
         let is_sample = phase.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = camera_looks(phase);
         if looks || is_sample {
@@ -244,7 +252,7 @@ impl<const N: usize> Lanes<N> {
                     asked[l] &= self.looks[l];
                 }
             }
-            self.worlds.camera_looks(&self.roads, &asked);
+            self.worlds.camera_looks::<FUSED>(&self.roads, &asked);
         }
         self.draw_remnants();
         let mut driver_nm = [0.0; N];
@@ -255,8 +263,13 @@ impl<const N: usize> Lanes<N> {
         self.hear_motors(phase);
         self.ecus.decide(&self.own, phase == 0, is_sample);
         let torque_nm = self.ecus.torque_nm();
+        // Not before: the ECUs do not wait for where the cars moved to, so that the processor has work meanwhile. A run that
+        // ends here has decided once more, and nobody has heard it.
+        if self.worlds.driver_looks::<FUSED>(&self.roads) {
+            self.end_runs();
+        }
         if is_sample {
-            self.worlds.locate(&self.roads);
+            self.worlds.locate::<FUSED>(&self.roads);
             self.speeds.locate(self.worlds.body.s());
             self.record(&driver_nm, &torque_nm);
         }
@@ -270,7 +283,8 @@ impl<const N: usize> Lanes<N> {
             });
         }
         let speeds = self.speeds.of_step(&self.own);
-        self.worlds.move_on(&torque_nm, speeds);
+        self.worlds
+            .move_on::<FUSED>(&torque_nm, speeds, self.has_remnants);
         self.speeds.go_on(&mut self.worlds, &self.roads);
         for own in &mut self.own {
             *own = own.wrapping_add(1);
@@ -279,6 +293,9 @@ impl<const N: usize> Lanes<N> {
 
     #[inline(always)]
     fn draw_remnants(&mut self) {
+        if !self.has_remnants {
+            return;
+        }
         for (lane, slot) in self.slots.iter_mut().enumerate() {
             if let Some(remnant) = &mut slot.remnant {
                 // As a hand's torque of zero is added there.
@@ -300,8 +317,10 @@ impl<const N: usize> Lanes<N> {
 
     fn end_run(&mut self, lane: usize) {
         let slot = &mut self.slots[lane];
-        slot.is_whole = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) == 0;
         slot.run.steps = self.own[lane] as u32;
+        let is_recorded = slot.run.trace.samples.len() as u32 == slot.run.steps.div_ceil(STEPS_PER_SAMPLE);
+        let is_suspect = (self.worlds.suspect[lane] | self.ecus.suspect[lane] as u64) != 0;
+        slot.is_whole = is_recorded && !is_suspect;
         self.worlds.alive[lane] = 0;
     }
 
@@ -318,10 +337,12 @@ impl<const N: usize> Lanes<N> {
             ..
         } = &self.worlds;
         for (l, slot) in self.slots.iter_mut().enumerate() {
-            if alive[l] != ALIVE {
+            let samples = &mut slot.run.trace.samples;
+            // There is room for the whole run; the compiler has to see it, or it makes each sample twice.
+            if alive[l] != ALIVE || samples.len() == samples.capacity() {
                 continue;
             }
-            slot.run.trace.samples.push(Sample {
+            samples.push(Sample {
                 time_s: f64::from(self.own[l]) * STEP_S,
                 s_m: body.s()[l],
                 lateral_error_m: body.offset[l],
@@ -341,5 +362,16 @@ impl<const N: usize> Lanes<N> {
                 guidance_limited: self.ecus.is_limited(l),
             });
         }
+    }
+}
+
+impl<const N: usize> Drop for Lanes<N> {
+    fn drop(&mut self) {
+        ROOM.set(
+            self.slots
+                .iter_mut()
+                .map(|slot| std::mem::take(&mut slot.run.trace.samples))
+                .collect(),
+        );
     }
 }

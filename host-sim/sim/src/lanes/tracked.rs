@@ -5,7 +5,8 @@
 
 use std::sync::Arc;
 
-use super::ALIVE;
+use super::divide::{FORTY, SIX, TWENTY_FOUR};
+use super::{ALIVE, Aligned};
 use crate::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Tracker};
 
 /// Steps of a search, of which one or two are the rule.
@@ -36,9 +37,16 @@ pub(super) struct Tracked<const N: usize> {
     pub(super) found_heading: [f64; N],
     pub(super) found_curvature: [f64; N],
     cell: [usize; N],
-    /// The most bent of the cells that the points are in.
+    /// Of the cell of each point, and the most bent of them.
+    shapes: [u8; N],
     shape: u8,
 }
+
+/// What of a projection is kept.
+pub(super) const OFFSET: u8 = 1;
+pub(super) const HEADING: u8 = 2;
+pub(super) const ALL: u8 = 7;
+const CURVATURE: u8 = 4;
 
 const STRAIGHT: u8 = 0;
 const ARC: u8 = 1;
@@ -66,6 +74,7 @@ impl<const N: usize> Tracked<N> {
             found_heading: [0.0; N],
             found_curvature: [0.0; N],
             cell: [0; N],
+            shapes: [STRAIGHT; N],
             shape: STRAIGHT,
         }
     }
@@ -93,7 +102,9 @@ impl<const N: usize> Tracked<N> {
     }
 
     fn enter(&mut self, lane: usize, road: &Centreline, index: usize) {
-        let cell = &road.cells()[index];
+        let Some(cell) = road.cells().get(index) else {
+            return;
+        };
         self.cell[lane] = index;
         self.low[lane] = cell.s_m - cell.half_m;
         self.high[lane] = cell.s_m + cell.half_m;
@@ -105,21 +116,23 @@ impl<const N: usize> Tracked<N> {
         self.curvature[lane] = cell.curvature_1pm + 0.0;
         self.slope[lane] = cell.curvature_slope_1pm2 + 0.0;
         [self.square_over_6[lane], self.cube[lane]] = cell.curvature_powers;
-        self.shape = if self.slope.iter().any(|slope| *slope != 0.0) {
-            CLOTHOID
-        } else if self.curvature.iter().any(|curvature| *curvature != 0.0) {
-            ARC
-        } else {
-            STRAIGHT
+        let shape = match (cell.curvature_slope_1pm2 != 0.0, cell.curvature_1pm != 0.0) {
+            (true, _) => CLOTHOID,
+            (false, true) => ARC,
+            (false, false) => STRAIGHT,
         };
+        if shape != self.shapes[lane] {
+            self.shapes[lane] = shape;
+            self.shape = self.shapes.iter().fold(STRAIGHT, |most, shape| most.max(*shape));
+        }
     }
 
-    /// Walks to the cells that the searches are in now.
+    /// Walks to the cells that the searches which left theirs are in now.
     #[cold]
     #[inline(never)]
-    fn walk(&mut self, roads: &[Arc<Centreline>; N], at: &[f64; N], open: &[u64; N]) {
+    fn walk(&mut self, roads: &[Arc<Centreline>; N], at: &[f64; N], outside: &[u64; N]) {
         for lane in 0..N {
-            if open[lane] != ALIVE {
+            if outside[lane] != ALIVE {
                 continue;
             }
             let cells = roads[lane].cells();
@@ -138,31 +151,33 @@ impl<const N: usize> Tracked<N> {
 
     /// Projects a point of each run that is asked for; returns which of them found no foot.
     #[inline(always)]
-    pub(super) fn project(
+    pub(super) fn project<const FUSED: bool, const KEPT: u8>(
         &mut self,
         roads: &[Arc<Centreline>; N],
         px: &[f64; N],
         py: &[f64; N],
         asked: &[u64; N],
     ) -> [u64; N] {
-        let mut at = [0.0; N];
+        let mut places = Aligned(([0.0; N], [0; N]));
+        let (at, outside) = (&mut places.0.0, &mut places.0.1);
         let mut open = *asked;
         for l in 0..N {
             at[l] = self.s[l] + self.advance[l];
         }
         for _ in 0..MOST_STEPS {
-            let mut outside = 0;
+            let mut is_any_outside = 0;
             for l in 0..N {
                 let is_outside = (at[l] > self.high[l]) | (at[l] < self.low[l]);
-                outside |= if is_outside { open[l] } else { 0 };
+                outside[l] = if is_outside { open[l] } else { 0 };
+                is_any_outside |= outside[l];
             }
-            if outside != 0 {
-                self.walk(roads, &at, &open);
+            if is_any_outside != 0 {
+                self.walk(roads, at, outside);
             }
             let left = match self.shape {
-                STRAIGHT => self.search::<STRAIGHT>(px, py, &mut at, &mut open),
-                ARC => self.search::<ARC>(px, py, &mut at, &mut open),
-                _ => self.search::<CLOTHOID>(px, py, &mut at, &mut open),
+                STRAIGHT => self.search::<STRAIGHT, FUSED, KEPT>(px, py, at, &mut open),
+                ARC => self.search::<ARC, FUSED, KEPT>(px, py, at, &mut open),
+                _ => self.search::<CLOTHOID, FUSED, KEPT>(px, py, at, &mut open),
             };
             if left == 0 {
                 break;
@@ -174,7 +189,7 @@ impl<const N: usize> Tracked<N> {
     /// One step of every search that is open; returns whether any still is. A shape's formula is that of the next one
     /// without the terms that vanish, to the same bits.
     #[inline(always)]
-    fn search<const SHAPE: u8>(
+    fn search<const SHAPE: u8, const FUSED: bool, const KEPT: u8>(
         &mut self,
         px: &[f64; N],
         py: &[f64; N],
@@ -193,7 +208,7 @@ impl<const N: usize> Tracked<N> {
                 ARC => (
                     sigma * k0,
                     sigma - sigma2 * sigma * self.square_over_6[l],
-                    sigma2 * (0.5 * k0 - self.cube[l] * sigma2 / 24.0),
+                    sigma2 * (0.5 * k0 - TWENTY_FOUR.of::<FUSED>(self.cube[l] * sigma2)),
                     k0,
                 ),
                 _ => (
@@ -201,14 +216,20 @@ impl<const N: usize> Tracked<N> {
                     sigma
                         - sigma2
                             * sigma
-                            * (self.square_over_6[l] + k1 * sigma * (k0 / 8.0 + k1 * sigma / 40.0)),
-                    sigma2 * (0.5 * k0 + k1 * sigma / 6.0 - self.cube[l] * sigma2 / 24.0),
+                            * (self.square_over_6[l]
+                                + k1 * sigma * (k0 / 8.0 + FORTY.of::<FUSED>(k1 * sigma))),
+                    sigma2
+                        * (0.5 * k0 + SIX.of::<FUSED>(k1 * sigma)
+                            - TWENTY_FOUR.of::<FUSED>(self.cube[l] * sigma2)),
                     k0 + k1 * sigma,
                 ),
             };
             let (cos, sin) = match SHAPE {
                 STRAIGHT => (1.0, 0.0),
-                _ => (1.0 - 0.5 * theta * theta, theta - theta * theta * theta / 6.0),
+                _ => (
+                    1.0 - 0.5 * theta * theta,
+                    theta - SIX.of::<FUSED>(theta * theta * theta),
+                ),
             };
             let (ahead, left_of) = (dx * tx + dy * ty - along, dy * tx - dx * ty - across);
             let distance = ahead * cos + left_of * sin;
@@ -219,12 +240,18 @@ impl<const N: usize> Tracked<N> {
             let is_sound = (determinant >= MIN_DETERMINANT) & (s >= -OVERRUN_M) & (s <= self.end[l]);
             let is_found = is_sound & (step.abs() < CONVERGED_M);
             let take = if is_found { open[l] } else { 0 };
-            let heading = self.heading[l] + theta + curvature * step;
             self.advance[l] = either(take, s - self.s[l], self.advance[l]);
             self.s[l] = either(take, s, self.s[l]);
-            self.offset[l] = either(take, offset, self.offset[l]);
-            self.found_heading[l] = either(take, heading, self.found_heading[l]);
-            self.found_curvature[l] = either(take, curvature, self.found_curvature[l]);
+            if KEPT & OFFSET != 0 {
+                self.offset[l] = either(take, offset, self.offset[l]);
+            }
+            if KEPT & HEADING != 0 {
+                let heading = self.heading[l] + theta + curvature * step;
+                self.found_heading[l] = either(take, heading, self.found_heading[l]);
+            }
+            if KEPT & CURVATURE != 0 {
+                self.found_curvature[l] = either(take, curvature, self.found_curvature[l]);
+            }
             // What is not sound stays open for ever.
             at[l] = if is_sound { s } else { f64::NAN };
             open[l] &= !take;

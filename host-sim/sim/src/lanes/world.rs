@@ -1,12 +1,13 @@
 //! The world of several runs: plant, driver and the points that they look at, to the same bits as
 //! [`crate::simulation::Simulation`] has them one by one.
 
-use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use super::ALIVE;
+use super::divide::{SIX, TWENTY_FOUR};
+use super::points::Points;
 use super::real::{Acting, Reals};
-use super::tracked::Tracked;
+use super::tracked::{ALL, Tracked};
+use super::{ALIVE, Aligned};
 use crate::guidance::NoGuidance;
 use crate::models::STEP_S;
 use crate::models::plant::{COLUMNS, STATES, Transition};
@@ -20,20 +21,6 @@ pub(super) const WHEEL: usize = 2;
 pub(super) const WHEEL_RATE: usize = 3;
 pub(super) const ARM: usize = 4;
 pub(super) const YAW: usize = 5;
-
-/// A near and a far point of each run.
-#[repr(C, align(64))]
-pub(super) struct Points<const N: usize> {
-    /// How far ahead they are, s and m.
-    times_s: [[f64; N]; 2],
-    near_m: [f64; N],
-    far_m: [f64; N],
-    near: Tracked<N>,
-    pub(super) far: Tracked<N>,
-    /// The errors found.
-    pub(super) e_y: [f64; N],
-    pub(super) e_theta: [f64; N],
-}
 
 /// The worlds.
 #[repr(C, align(64))]
@@ -64,28 +51,6 @@ pub(super) struct Worlds<const N: usize> {
     delayed: Vec<[f64; N]>,
     next: usize,
     whole: [usize; N],
-}
-
-impl<const N: usize> Points<N> {
-    fn new() -> Self {
-        Self {
-            times_s: [[0.0; N]; 2],
-            near_m: [0.0; N],
-            far_m: [0.0; N],
-            near: Tracked::new(),
-            far: Tracked::new(),
-            e_y: [0.0; N],
-            e_theta: [0.0; N],
-        }
-    }
-
-    fn begin(&mut self, lane: usize, road: &Centreline, points: &crate::preview::PreviewPoints) {
-        (self.near_m[lane], self.far_m[lane]) = (points.near_m, points.far_m);
-        [self.times_s[0][lane], self.times_s[1][lane]] = points.times_s;
-        self.near.begin(lane, road, &points.near);
-        self.far.begin(lane, road, &points.far);
-        (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
-    }
 }
 
 impl<const N: usize> Worlds<N> {
@@ -181,11 +146,12 @@ impl<const N: usize> Worlds<N> {
 
     /// The driver looks at the road; returns whether a run that is alive has come to its end.
     #[inline(always)]
-    pub(super) fn driver_looks(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
+    pub(super) fn driver_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) -> bool {
         let asked = self.alive;
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
-        self.driver.look(roads, place, &chi, &asked, &mut self.suspect);
+        self.driver
+            .look::<FUSED>(roads, place, &chi, &asked, &mut self.suspect);
         let mut ended = 0;
         for l in 0..N {
             ended |= if self.driver.far.s()[l] >= self.end[l] {
@@ -204,16 +170,19 @@ impl<const N: usize> Worlds<N> {
 
     /// The camera looks at the road in the runs that are asked for.
     #[inline(always)]
-    pub(super) fn camera_looks(&mut self, roads: &[Arc<Centreline>; N], asked: &[u64; N]) {
+    pub(super) fn camera_looks<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N], asked: &[u64; N]) {
         let chi = self.direction_rad();
         let place = (&self.x, &self.y, &self.direction);
-        self.camera.look(roads, place, &chi, asked, &mut self.suspect);
+        self.camera
+            .look::<FUSED>(roads, place, &chi, asked, &mut self.suspect);
     }
 
     /// Where the centres of gravity are on their roads.
     #[inline(always)]
-    pub(super) fn locate(&mut self, roads: &[Arc<Centreline>; N]) {
-        let lost = self.body.project(roads, &self.x, &self.y, &self.alive);
+    pub(super) fn locate<const FUSED: bool>(&mut self, roads: &[Arc<Centreline>; N]) {
+        let lost = self
+            .body
+            .project::<FUSED, ALL>(roads, &self.x, &self.y, &self.alive);
         for l in 0..N {
             let is_off = self.body.offset[l].abs() > crate::simulation::DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
@@ -223,30 +192,39 @@ impl<const N: usize> Worlds<N> {
 
     /// The drivers' eyes and arms, columns and vehicles move for a millisecond, from one speed to the next.
     #[inline(always)]
-    pub(super) fn move_on(&mut self, torque_nm: &[f64; N], speeds: [&[f64; N]; 2]) {
-        let mut next_target = [0.0; N];
-        self.vision(&mut next_target);
+    pub(super) fn move_on<const FUSED: bool>(
+        &mut self,
+        torque_nm: &[f64; N],
+        speeds: [&[f64; N]; 2],
+        has_remnants: bool,
+    ) {
+        let mut places = Aligned(([[0.0; N]; STATES], [0.0; N]));
+        let (next, next_target) = (&mut places.0.0, &mut places.0.1);
+        self.vision(next_target);
         let before = self.direction_rad();
-        let mut next = [[0.0; N]; STATES];
-        self.linear(&next_target, torque_nm, &mut next);
+        // Nothing times something added to a sum that began with zero changes no bit of it.
+        if has_remnants {
+            self.linear::<true>(next_target, torque_nm, next);
+        } else {
+            self.linear::<false>(next_target, torque_nm, next);
+        }
         let acting = Acting {
             target: &self.target,
-            next_target: &next_target,
+            next_target,
             torque_nm,
             speeds,
             remnant_nm: &self.remnant_nm,
             alive: &self.alive,
         };
-        self.real
-            .step(&self.state, &acting, &mut next, &mut self.distance);
-        (self.state, self.target) = (next, next_target);
+        self.real.step(&self.state, &acting, next, &mut self.distance);
+        (self.state, self.target) = places.0;
         for l in 0..N {
             let half_turn = 0.5 * ((self.state[YAW][l] + self.state[BETA][l]) - before[l]);
             let square = half_turn * half_turn;
             self.suspect[l] |= if square < 1e-6 { 0 } else { ALIVE };
             let (sin, cos) = (
-                half_turn * (1.0 - square / 6.0),
-                1.0 - square * (0.5 - square / 24.0),
+                half_turn * (1.0 - SIX.of::<FUSED>(square)),
+                1.0 - square * (0.5 - TWENTY_FOUR.of::<FUSED>(square)),
             );
             let [x, y] = rotated([self.direction[0][l], self.direction[1][l]], sin, cos);
             self.x[l] += self.distance[l] * x;
@@ -280,14 +258,19 @@ impl<const N: usize> Worlds<N> {
 
     /// Equations (1) to (6) and (8), in the plant's order of sums.
     #[inline(always)]
-    fn linear(&self, next_target: &[f64; N], torque_nm: &[f64; N], next: &mut [[f64; N]; STATES]) {
+    fn linear<const WITH_REMNANT: bool>(
+        &self,
+        next_target: &[f64; N],
+        torque_nm: &[f64; N],
+        next: &mut [[f64; N]; STATES],
+    ) {
         let [beta, yaw_rate, wheel, wheel_rate, arm, yaw] = &self.state;
         let [c0, c1, c2, c3, c4, c5, c6, c7, c8] = &self.columns;
         let (target, remnant) = (&self.target, &self.remnant_nm);
         // All rows in one loop over the lanes: the compiler then takes as many lanes at once as there are.
         for l in 0..N {
             let row = |row: usize, start: f64| {
-                start
+                let sum = start
                     + c0[row][l] * beta[l]
                     + c1[row][l] * yaw_rate[l]
                     + c2[row][l] * wheel[l]
@@ -295,8 +278,12 @@ impl<const N: usize> Worlds<N> {
                     + c4[row][l] * arm[l]
                     + c5[row][l] * target[l]
                     + c6[row][l] * next_target[l]
-                    + c7[row][l] * torque_nm[l]
-                    + c8[row][l] * remnant[l]
+                    + c7[row][l] * torque_nm[l];
+                if WITH_REMNANT {
+                    sum + c8[row][l] * remnant[l]
+                } else {
+                    sum
+                }
             };
             // Every sum begins with a zero, which keeps the signs of zeros.
             next[BETA][l] = row(BETA, 0.0);
@@ -305,38 +292,6 @@ impl<const N: usize> Worlds<N> {
             next[WHEEL_RATE][l] = row(WHEEL_RATE, 0.0);
             next[ARM][l] = row(ARM, 0.0);
             next[YAW][l] = row(YAW, yaw[l]);
-        }
-    }
-}
-
-impl<const N: usize> Points<N> {
-    #[inline(always)]
-    fn look(
-        &mut self,
-        roads: &[Arc<Centreline>; N],
-        (x, y, direction): (&[f64; N], &[f64; N], &[[f64; N]; 2]),
-        chi: &[f64; N],
-        asked: &[u64; N],
-        suspect: &mut [u64; N],
-    ) {
-        let (mut px, mut py) = ([0.0; N], [0.0; N]);
-        for l in 0..N {
-            px[l] = x[l] + self.near_m[l] * direction[0][l];
-            py[l] = y[l] + self.near_m[l] * direction[1][l];
-        }
-        let lost_near = self.near.project(roads, &px, &py, asked);
-        for l in 0..N {
-            px[l] = x[l] + self.far_m[l] * direction[0][l];
-            py[l] = y[l] + self.far_m[l] * direction[1][l];
-        }
-        let lost_far = self.far.project(roads, &px, &py, asked);
-        for l in 0..N {
-            // An angle that would have to be wrapped is that of a run that turns.
-            let e_theta = self.far.found_heading[l] - chi[l];
-            let is_sound = e_theta.abs() < FRAC_PI_2;
-            suspect[l] |= lost_near[l] | lost_far[l] | if is_sound { 0 } else { asked[l] };
-            self.e_y[l] = -self.near.offset[l];
-            self.e_theta[l] = e_theta;
         }
     }
 }

@@ -1,0 +1,76 @@
+//! The points that driver and camera look at in several runs, to the same bits as [`crate::preview::PreviewPoints`] has them.
+
+use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+use super::tracked::{HEADING, OFFSET, Tracked};
+use crate::models::road::Centreline;
+use crate::preview::PreviewPoints;
+
+/// A near and a far point of each run.
+#[repr(C, align(64))]
+pub(super) struct Points<const N: usize> {
+    /// How far ahead they are, s and m.
+    pub(super) times_s: [[f64; N]; 2],
+    pub(super) near_m: [f64; N],
+    pub(super) far_m: [f64; N],
+    near: Tracked<N>,
+    pub(super) far: Tracked<N>,
+    /// The errors found.
+    pub(super) e_y: [f64; N],
+    pub(super) e_theta: [f64; N],
+}
+
+impl<const N: usize> Points<N> {
+    pub(super) fn new() -> Self {
+        Self {
+            times_s: [[0.0; N]; 2],
+            near_m: [0.0; N],
+            far_m: [0.0; N],
+            near: Tracked::new(),
+            far: Tracked::new(),
+            e_y: [0.0; N],
+            e_theta: [0.0; N],
+        }
+    }
+
+    pub(super) fn begin(&mut self, lane: usize, road: &Centreline, points: &PreviewPoints) {
+        (self.near_m[lane], self.far_m[lane]) = (points.near_m, points.far_m);
+        [self.times_s[0][lane], self.times_s[1][lane]] = points.times_s;
+        self.near.begin(lane, road, &points.near);
+        self.far.begin(lane, road, &points.far);
+        (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
+    }
+
+    /// Looks at the road from a place in a direction, as a unit vector and as an angle, in the runs that are asked for.
+    /// Which of them has no foot, or an angle that would have to be wrapped, becomes suspect.
+    #[inline(always)]
+    pub(super) fn look<const FUSED: bool>(
+        &mut self,
+        roads: &[Arc<Centreline>; N],
+        (x, y, direction): (&[f64; N], &[f64; N], &[[f64; N]; 2]),
+        chi: &[f64; N],
+        asked: &[u64; N],
+        suspect: &mut [u64; N],
+    ) {
+        let (mut px, mut py) = ([0.0; N], [0.0; N]);
+        for l in 0..N {
+            px[l] = x[l] + self.near_m[l] * direction[0][l];
+            py[l] = y[l] + self.near_m[l] * direction[1][l];
+        }
+        let lost_near = self.near.project::<FUSED, OFFSET>(roads, &px, &py, asked);
+        for l in 0..N {
+            px[l] = x[l] + self.far_m[l] * direction[0][l];
+            py[l] = y[l] + self.far_m[l] * direction[1][l];
+        }
+        let lost_far = self.far.project::<FUSED, HEADING>(roads, &px, &py, asked);
+        for l in 0..N {
+            // An angle that would have to be wrapped is that of a run that turns.
+            let e_theta = self.far.found_heading[l] - chi[l];
+            let is_sound = e_theta.abs() < FRAC_PI_2;
+            suspect[l] |= lost_near[l] | lost_far[l] | if is_sound { 0 } else { asked[l] };
+            self.e_y[l] = -self.near.offset[l];
+            self.e_theta[l] = e_theta;
+        }
+    }
+}
