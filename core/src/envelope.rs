@@ -86,8 +86,6 @@ pub struct Situation {
     pub elapsed: Micros,
     /// The driver's torque on the wheel.
     pub driver: Torque,
-    /// Whether the lane that asked for the applied torque is implausible.
-    pub distrusted: bool,
 }
 
 /// Growth per [`WINDOW`].
@@ -123,6 +121,16 @@ impl EnvelopeState {
 }
 
 impl Envelope {
+    /// The same for a torque that an implausible lane asked for: it falls faster.
+    #[must_use]
+    #[cold]
+    pub fn distrusted(&self) -> Self {
+        Self {
+            reduction: TorqueRate::from_bits(self.reduction.bits().saturating_mul(DISTRUSTED)),
+            ..*self
+        }
+    }
+
     /// The nearest torque within the envelope, and which limit held it back.
     #[must_use]
     pub fn step(
@@ -161,12 +169,7 @@ impl Envelope {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
         let step = |rate: TorqueRate| Torque::from_bits(per_second(rate.bits(), elapsed));
         let growth = step(self.wind_up);
-        let reduction = if at.distrusted {
-            TorqueRate::from_bits(self.reduction.bits().saturating_mul(DISTRUSTED))
-        } else {
-            self.reduction
-        };
-        let fall = step(reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
+        let fall = step(self.reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
         // Judged in the frame where the applied torque is positive.
         let mirror = at.applied.bits().is_negative();
         let turn = |t: Torque| if mirror { t.opposite() } else { t };

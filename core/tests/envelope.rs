@@ -67,7 +67,11 @@ impl Case {
                 applied: Torque::from_nm(applied),
                 elapsed: Micros::from_us(self.elapsed_us),
                 driver: Torque::from_nm(self.driver),
-                distrusted: self.distrusted,
+            };
+            let envelope = if self.distrusted {
+                &envelope.distrusted()
+            } else {
+                envelope
             };
             envelope.step(&mut state, now, Torque::from_nm(wanted), &at)
         };
@@ -227,7 +231,6 @@ fn the_anchor_moves_every_250_ms_to_the_torque_applied() {
                 applied: Torque::from_nm(applied),
                 elapsed: Micros::from_ms(1),
                 driver: Torque::ZERO,
-                distrusted: false,
             };
             let now = start.after(Micros::from_us(after_us));
             let (torque, reason) = envelope.step(&mut state, now, Torque::MAX, &at);
@@ -395,7 +398,6 @@ fn random_sequences_stay_inside_the_f64_bounds_and_reach_them() {
                 applied,
                 elapsed: Micros::from_us(elapsed_us),
                 driver: driver_nm,
-                distrusted: false,
             };
             let now = Instant::from_us(now_us as u32);
             let (torque, reason) = envelope.step(&mut state, now, Torque::from_nm(wanted), &at);

@@ -364,11 +364,15 @@ impl<I: Injection> Step<'_, I> {
         mode: Mode,
         faults: FaultSet,
     ) -> (Torque, Option<Torque>, LimitReason) {
+        let asked = if matches!(mode, Mode::Active | Mode::Handover) {
+            self.guidance(v, changed)
+        } else {
+            Torque::ZERO
+        };
         let (wanted, probe) = match mode {
             Mode::Active => {
-                let guidance = self.guidance(v, changed).unwrap_or(Torque::ZERO);
                 let probe = self.probe(v);
-                (with(guidance, probe), probe)
+                (with(asked, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
             Mode::Fade | Mode::Handover => {
@@ -382,7 +386,12 @@ impl<I: Injection> Step<'_, I> {
                 let passed = Micros::from_us(self.elapsed.us().saturating_mul(pace));
                 changed.add(Changed::RAMP);
                 let ending = smaller_of_same_sign(v.ramp.step(passed), self.applied);
-                (self.within_law(v, changed, mode, ending), None)
+                // While the lane still comes, no more than the law asks for: the curve may end before the ramp does.
+                if mode == Mode::Handover && self.inputs.lane.value().is_some() {
+                    (smaller_of_same_sign(ending, asked), None)
+                } else {
+                    (ending, None)
+                }
             }
             // At once: what is behind these modes must not move the wheel for another tick.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
@@ -399,12 +408,15 @@ impl<I: Injection> Step<'_, I> {
             applied: self.applied,
             elapsed: self.elapsed,
             driver,
-            distrusted: mode == Mode::Handover && faults.contains(Fault::LaneImplausible),
         };
-        let (torque, limit) = self
-            .config
-            .envelope
-            .step(&mut v.hot.envelope, self.now, wanted, &situation);
+        let distrusted;
+        let envelope = if mode == Mode::Handover && faults.contains(Fault::LaneImplausible) {
+            distrusted = self.config.envelope.distrusted();
+            &distrusted
+        } else {
+            &self.config.envelope
+        };
+        let (torque, limit) = envelope.step(&mut v.hot.envelope, self.now, wanted, &situation);
         match limit {
             LimitReason::None if mode != Mode::Active => (torque, probe, LimitReason::Mode),
             LimitReason::None => (torque, probe, limit),
@@ -419,35 +431,25 @@ impl<I: Injection> Step<'_, I> {
         self.config.probe.step(&mut v.hot.probe, self.elapsed, wanted)
     }
 
-    /// What is left of the torque of a handover where the lane still comes: no more than the law asks for, and nothing where
-    /// it asks for the other side. The curve may end sooner than the ramp.
-    fn within_law(&self, v: &mut Memory, changed: &mut Changed, mode: Mode, ending: Torque) -> Torque {
-        if mode != Mode::Handover {
-            return ending;
-        }
-        self.guidance(v, changed)
-            .map_or(ending, |asked| smaller_of_same_sign(ending, asked))
-    }
-
-    /// The law's torque, scaled by the authority: of the last request, or all of it where none is heard any more. `None`
-    /// without a lane.
-    fn guidance(&self, v: &mut Memory, changed: &mut Changed) -> Option<Torque> {
-        let sample = self.inputs.lane.value()?;
-        if !v.law.knows(&sample) {
-            changed.add(Changed::LAW);
-            self.config.law.take(&mut v.law, sample);
-        }
-        let asked = self
-            .config
-            .law
-            .asked(&v.law, self.now, self.since(v, sample).as_ref());
+    /// The law's torque, scaled by the authority: of the last request, or all of it where none is heard any more. Zero without
+    /// a lane.
+    fn guidance(&self, v: &mut Memory, changed: &mut Changed) -> Torque {
+        let asked = self.inputs.lane.value().map_or(Torque::ZERO, |sample| {
+            if !v.law.knows(&sample) {
+                changed.add(Changed::LAW);
+                self.config.law.take(&mut v.law, sample);
+            }
+            self.config
+                .law
+                .asked(&v.law, self.now, self.since(v, sample).as_ref())
+        });
         let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
         // Neither is more than one.
         let share = share_of(authority.bits(), v.share.bits());
-        Some(Torque::from_bits(share_of(share, asked.bits())))
+        Torque::from_bits(share_of(share, asked.bits()))
     }
 }
 
