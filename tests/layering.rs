@@ -339,6 +339,7 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/experiment.rs", "one report, section by section"),
     ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
+    ("host-sim/sim/src/lanes/runs.rs", "one block of all runs, read from top to bottom"),
     ("host-sim/sim/src/lanes/ecu.rs", "one step of the lean ECU, read from top to bottom"),
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
