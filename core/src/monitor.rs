@@ -5,12 +5,13 @@
 //! bytes that leave and arrive, with its own limits, and uses nothing of the law, the envelope or the bus
 //! module: a mistake there must not repeat itself here. It shares how memory is guarded, and nothing else.
 //!
-//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (in Handover four
-//! times as fast as elsewhere; unless the mode says that it ends at once, or the driver overrides), in a mode without torque, against a driver who
-//! overrides, on lane data that is too old, or, in Active, away from the torque that lane errors ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and
-//! rates over 50 ms, 0.3 N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count:
-//! the envelope may still be bringing an honest change about. While the host asks for the probe, and for a second
-//! after, the band is wider by the probe's amplitude.
+//! What it refuses: a torque beyond the limit, growing too fast (in Fade and Handover at all), falling too fast (in Handover
+//! four times as fast as elsewhere; unless the mode says that it ends at once, or the driver overrides), in a mode without
+//! torque, against a driver who overrides, on lane data that is too old, or, in Active, away from the torque that lane errors
+//! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
+//! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
+//! an honest change about. While the host asks for the probe, and for a second after, the band is wider by the probe's
+//! amplitude.
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
