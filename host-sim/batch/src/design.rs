@@ -10,12 +10,10 @@
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::{PublishedDriver, participants};
-use haptic_sim::scenario::Scenario;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::experiment::{Probe, guided_drive, log_group, recorded, truth_of};
-use crate::lanes::{Checked, Group, in_groups};
+use crate::experiment::{Probe, guided_drive, log_each, recorded, truth_of};
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -114,29 +112,22 @@ fn cells(
             }
         }
     }
-    let checked = Checked::new(question.seed, jobs.len() as u64);
-    in_groups(&jobs, |first, jobs| {
-        let scenarios = jobs.iter().map(|&(course, probe, number, driver)| {
+    log_each(
+        &jobs,
+        question.seed,
+        |&(course, probe, number, driver)| {
             let seed = question.seed.wrapping_mul(1000).wrapping_add(u64::from(number));
             guided_drive(&driver, Some(&question.courses[course]), probe, seed)
-        });
-        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
-        let driven = log_group(Group {
-            scenarios: &scenarios,
-            first: first as u64,
-            checked,
-        })?;
-        let cells = driven.into_iter().zip(jobs);
-        let cells = cells.map(|(driven, &(course, probe, _, driver))| {
+        },
+        |driven, &(course, probe, _, driver)| {
             done();
             Cell {
                 course,
                 probe,
                 information: information(&driven.log, &Options::default(), &truth_of(&driver)),
             }
-        });
-        Ok(cells.collect())
-    })
+        },
+    )
 }
 
 /// Answers `question`; `done` is called after each drive.

@@ -170,7 +170,7 @@ fn drive(
         .iter()
         .flat_map(|family| std::iter::once(&family.nominal).chain(&family.failing));
     let scenarios: Vec<Scenario> = all.cloned().collect();
-    let mut runs = first_in_lanes(&scenarios, seed, |_, run| run.clone())?.into_iter();
+    let mut runs = first_in_lanes(&scenarios, seed, |_, run| Ok(run.clone()))?.into_iter();
     let with_runs: Vec<(Family, Vec<Option<Run>>)> = families
         .into_iter()
         .map(|family| {

@@ -54,29 +54,11 @@ pub(crate) struct Group<'a> {
 }
 
 impl Group<'_> {
-    /// Drives the group: `take` gets each run with its place in the group, in no order.
-    ///
-    /// # Errors
-    /// A run for which lanes and shipping ECU differ; what `take` says.
-    pub(crate) fn drive(
-        &self,
-        mut take: impl FnMut(usize, &Run) -> Result<(), String>,
-    ) -> Result<(), String> {
-        let alone = |place: usize| simulate(&self.scenarios[place]);
-        let handed_back = self.in_lanes(Asked::default(), alone, |place, event| match event {
-            Event::Ended(run) => take(place, run),
-            _ => Ok(()),
-        })?;
-        handed_back
-            .into_iter()
-            .try_for_each(|place| take(place, &alone(place)))
-    }
-
     /// Drives in lanes what these can; gives the places of those that they hand back. `alone` is a run by the shipping ECU,
     /// against which some are held.
     ///
     /// # Errors
-    /// As [`Group::drive`].
+    /// A run for which lanes and shipping ECU differ; what `on` says.
     pub(crate) fn in_lanes(
         &self,
         asked: Asked,
@@ -156,36 +138,29 @@ fn agree(number: u64, lanes: &Run, alone: &Run) -> Result<(), String> {
 /// twice are drawn by the seed.
 ///
 /// # Errors
-/// As [`Group::drive`].
+/// As [`Group::in_lanes`]; what `measure` says.
 pub(crate) fn drive_all<T: Send>(
     scenarios: &[Scenario],
     seed: u64,
     measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
 ) -> Result<Vec<T>, String> {
-    let checked = Checked::new(seed, scenarios.len() as u64);
-    in_groups(scenarios, |first, scenarios| {
-        let mut found: Vec<Option<T>> = scenarios.iter().map(|_| None).collect();
-        let group = Group {
-            scenarios,
-            first: first as u64,
-            checked,
-        };
-        group.drive(|place, run| {
-            found[place] = Some(measure(first + place, run)?);
-            Ok(())
-        })?;
-        Ok(found.into_iter().flatten().collect())
-    })
+    let found = first_in_lanes(scenarios, seed, &measure)?
+        .into_par_iter()
+        .zip(scenarios);
+    let found = found
+        .enumerate()
+        .map(|(number, (found, scenario))| found.map_or_else(|| measure(number, &simulate(scenario)), Ok));
+    found.collect()
 }
 
-/// As [`drive_all`], but what the lanes hand back is nothing: whoever asks has a better way to drive it.
+/// As [`drive_all`], but what the lanes hand back is nothing: whoever asks may have a better way to drive it.
 ///
 /// # Errors
-/// As [`Group::drive`].
+/// As [`drive_all`].
 pub(crate) fn first_in_lanes<T: Send>(
     scenarios: &[Scenario],
     seed: u64,
-    measure: impl Fn(usize, &Run) -> T + Sync,
+    measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
 ) -> Result<Vec<Option<T>>, String> {
     let checked = Checked::new(seed, scenarios.len() as u64);
     in_groups(scenarios, |first, scenarios| {
@@ -198,7 +173,7 @@ pub(crate) fn first_in_lanes<T: Send>(
         let alone = |place: usize| simulate(&scenarios[place]);
         group.in_lanes(Asked::default(), alone, |place, event| {
             if let Event::Ended(run) = event {
-                found[place] = Some(measure(first + place, run));
+                found[place] = Some(measure(first + place, run)?);
             }
             Ok(())
         })?;
@@ -221,11 +196,17 @@ pub(crate) fn in_groups<J: Sync, T: Send>(
         // Several groups for each thread, so that none waits long for the last.
         (share / 2).next_multiple_of(LANES).min(MOST_OF_A_GROUP)
     };
-    let groups: Vec<Vec<T>> = jobs
-        .par_chunks(size)
-        .enumerate()
-        .map(|(number, group)| of_group(number * size, group))
-        .collect::<Result<_, String>>()?;
+    let one = |(number, group): (usize, &[J])| {
+        let found = of_group(number * size, group)?;
+        // One less would give every later job another's result.
+        if found.len() == group.len() {
+            Ok(found)
+        } else {
+            Err(format!("{} of {} runs came back", found.len(), group.len()))
+        }
+    };
+    let groups = jobs.par_chunks(size).enumerate().map(one);
+    let groups: Vec<Vec<T>> = groups.collect::<Result<_, String>>()?;
     Ok(groups.into_iter().flatten().collect())
 }
 

@@ -68,20 +68,35 @@ pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
     }
 }
 
-/// Drives scenarios on all cores, in lanes where these can, and logs them.
-pub(super) fn drive_logged(scenarios: &[Scenario], seed: u64) -> Result<Vec<Driven>, String> {
-    let checked = Checked::new(seed, scenarios.len() as u64);
-    in_groups(scenarios, |first, scenarios| {
-        log_group(Group {
-            scenarios,
+/// Drives a scenario for each job on all cores, in lanes where these can, and gives what `judge` makes of its log. Group by
+/// group: the logs of all drives at once may be too many.
+///
+/// # Errors
+/// What `scenario` says; a drive for which lanes and shipping ECU differ.
+pub(crate) fn log_each<J: Sync, T: Send>(
+    jobs: &[J],
+    seed: u64,
+    scenario: impl Fn(&J) -> Result<Scenario, String> + Sync,
+    judge: impl Fn(Driven, &J) -> T + Sync,
+) -> Result<Vec<T>, String> {
+    let checked = Checked::new(seed, jobs.len() as u64);
+    in_groups(jobs, |first, jobs| {
+        let scenarios: Vec<Scenario> = jobs.iter().map(&scenario).collect::<Result<_, _>>()?;
+        let driven = log_group(Group {
+            scenarios: &scenarios,
             first: first as u64,
             checked,
-        })
+        })?;
+        Ok(driven
+            .into_iter()
+            .zip(jobs)
+            .map(|(driven, job)| judge(driven, job))
+            .collect())
     })
 }
 
-/// The same in one thread.
-pub(crate) fn log_group(group: Group) -> Result<Vec<Driven>, String> {
+/// The drives of a group, logged.
+fn log_group(group: Group) -> Result<Vec<Driven>, String> {
     let scenarios = group.scenarios;
     let asked = Asked {
         every_step: true,
@@ -210,7 +225,8 @@ mod tests {
             ];
             columns.map(|column| column.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
         };
-        let found = drive_logged(&scenarios, 1).unwrap();
+        let clone = |scenario: &Scenario| Ok(scenario.clone());
+        let found = log_each(&scenarios, 1, clone, |driven, _| driven).unwrap();
         assert_eq!(found.len(), scenarios.len());
         for (driven, scenario) in found.iter().zip(&scenarios) {
             let alone = driven_alone(scenario);

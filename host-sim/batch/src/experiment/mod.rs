@@ -39,8 +39,8 @@ use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioErro
 
 use crate::lanes::drive_all;
 pub use drives::recorded;
-use drives::{Driven, drive_logged, scenario_of_drive};
-pub(crate) use drives::{guided_drive, log_group};
+use drives::{Driven, scenario_of_drive};
+pub(crate) use drives::{guided_drive, log_each};
 
 /// Standard deviation of the remnant in manual driving, N.m.
 pub const REMNANT_MANUAL_NM: f64 = 0.097;
@@ -122,11 +122,10 @@ pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, Str
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])
         .collect();
     let course = Course::paper();
-    let scenarios = drives
-        .iter()
-        .map(|(number, truth)| scenario_of_drive(plan, *number, truth, truth.parameters()))
-        .collect::<Result<Vec<_>, _>>()?;
-    let driven = drive_logged(&scenarios, plan.seed)?;
+    let scenario = |(number, truth): &(u32, PublishedDriver)| {
+        scenario_of_drive(plan, *number, truth, truth.parameters())
+    };
+    let driven = log_each(&drives, plan.seed, scenario, |driven, _| driven)?;
     let found = driven.par_iter().zip(&drives).map(|(driven, (_, truth))| {
         let found = identified(driven, truth);
         done();

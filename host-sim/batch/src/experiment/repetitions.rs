@@ -5,13 +5,11 @@
 
 use serde::Serialize;
 
-use super::drives::{log_group, scenario_of_drive};
+use super::drives::{log_each, scenario_of_drive};
 use super::{Plan, PublishedDriver, chosen, truth_of};
-use crate::lanes::{Checked, Group, in_groups};
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
 };
-use haptic_sim::scenario::Scenario;
 
 /// What is compared with the truth: the parameters that a torque record can carry.
 pub(super) const COMPARED: usize = 5;
@@ -68,29 +66,22 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
         .into_iter()
         .flat_map(|p| (0..u64::from(repetitions)).map(move |r| (p.number, p.guided, r)))
         .collect();
-    let checked = Checked::new(plan.seed, jobs.len() as u64);
-    // Group by group: the logs of all drives at once would be too many.
-    let found: Vec<Judged> = in_groups(&jobs, |first, jobs| {
-        let scenarios = jobs.iter().map(|(number, truth, repetition)| {
+    let found: Vec<Judged> = log_each(
+        &jobs,
+        plan.seed,
+        |(number, truth, repetition)| {
             let plan = Plan {
                 seed: plan.seed.wrapping_add(*repetition),
                 ..plan.clone()
             };
             scenario_of_drive(&plan, *number, truth, truth.parameters())
-        });
-        let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
-        let driven = log_group(Group {
-            scenarios: &scenarios,
-            first: first as u64,
-            checked,
-        })?;
-        let judged = driven.into_iter().zip(jobs).map(|(driven, (_, truth, _))| {
+        },
+        |driven, (_, truth, _)| {
             let identification = identify_with_noise_model(&driven.log, &Options::default());
             done();
             Judged::new(truth, &identification, bound_of(&driven.log, truth))
-        });
-        Ok(judged.collect())
-    })?;
+        },
+    )?;
     let lines = |participant: Option<u32>, drives: &[Judged]| {
         (0..COMPARED)
             .filter(|_| !drives.is_empty())
