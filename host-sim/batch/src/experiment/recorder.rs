@@ -44,14 +44,7 @@ impl Recorder {
 
     /// Takes in one step.
     pub fn observe(&mut self, outcome: &Outcome) {
-        self.take(Step {
-            step: outcome.observation.step,
-            e_y_m: outcome.preview.e_y_m,
-            e_theta_rad: outcome.preview.e_theta_rad,
-            wheel_angle_rad: outcome.observation.wheel_angle_rad,
-            guidance_torque_nm: outcome.applied_torque_nm,
-            driver_torque_nm: outcome.observation.driver_torque_nm,
-        });
+        self.take(Step::from(outcome));
     }
 
     /// Takes in one step of the lanes: without errors of sensors, what they have is what is observed.

@@ -45,7 +45,7 @@ use multiversion::target::target_cfg_f;
 
 use crate::models::STEP_S;
 use crate::scenario::Scenario;
-use crate::simulation::Run;
+use crate::simulation::{Outcome, Run};
 use runs::Lanes;
 
 pub use gate::{Reason, why_not};
@@ -98,6 +98,20 @@ pub struct Step {
     pub guidance_torque_nm: f64,
     /// Torque of the driver, remnant and all, N.m.
     pub driver_torque_nm: f64,
+}
+
+impl From<&Outcome<'_>> for Step {
+    /// Of a run alone, without errors of sensors: what they have is what is true.
+    fn from(outcome: &Outcome<'_>) -> Self {
+        Self {
+            step: outcome.observation.step,
+            e_y_m: outcome.preview.e_y_m,
+            e_theta_rad: outcome.preview.e_theta_rad,
+            wheel_angle_rad: outcome.observation.wheel_angle_rad,
+            guidance_torque_nm: outcome.applied_torque_nm,
+            driver_torque_nm: outcome.observation.driver_torque_nm,
+        }
+    }
 }
 
 /// What the lanes have of a run.

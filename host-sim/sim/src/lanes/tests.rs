@@ -281,14 +281,7 @@ fn every_step_is_reported_and_runs_are_cut_where_it_is_asked() {
             whole += 1;
             let mut alone = Vec::new();
             crate::simulation::observe(&scenarios[number], |outcome| {
-                alone.push(Step {
-                    step: outcome.observation.step,
-                    e_y_m: outcome.preview.e_y_m,
-                    e_theta_rad: outcome.preview.e_theta_rad,
-                    wheel_angle_rad: outcome.observation.wheel_angle_rad,
-                    guidance_torque_nm: outcome.applied_torque_nm,
-                    driver_torque_nm: outcome.observation.driver_torque_nm,
-                });
+                alone.push(Step::from(outcome));
             });
             assert_eq!(run.steps as usize, alone.len());
             // Debug has the shortest digits that give the same bits back, and signs of zeros.
