@@ -73,7 +73,8 @@ pub struct CaseResult {
     pub excess_m: Option<f64>,
     /// Runs in which the vehicle left its lane and the fault-free one did not.
     pub left_lane: u64,
-    /// Runs in which it went more than a lane's width aside with the torque dropped as well; these are not judged by it.
+    /// Runs in which it went more than a lane's width aside with the torque dropped as well, or was there without the fault
+    /// too when the ECU left; these are not judged by it.
     pub off_road: u64,
     /// What failed, by seed.
     pub failures: Vec<FailedTrial>,

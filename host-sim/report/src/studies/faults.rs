@@ -22,7 +22,8 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
     let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
                    they must keep. A fault without a mark on the left has no deadline. The deviation is that from the \
                    fault-free run, beside what it is if the torque is dropped in the step in which the ECU leaves. Off road: runs \
-                   that go more than 3.6 m aside with the torque dropped as well, whose excess is not judged."
+                   that go more than 3.6 m aside with the torque dropped as well, or that are so far aside without the fault \
+                   too when the ECU leaves; their excess is not judged."
         .into();
     let mut blocks = vec![Block::Figure { figure, caption }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
