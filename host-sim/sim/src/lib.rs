@@ -45,6 +45,7 @@ pub mod input;
 pub mod lanes;
 pub mod models;
 pub mod participants;
+pub mod population;
 mod preview;
 pub mod scenario;
 pub mod seeds;

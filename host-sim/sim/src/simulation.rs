@@ -21,7 +21,7 @@ use haptic_log::trace::{Sample, Trace};
 use crate::action::{Action, Request, WorldFaults};
 use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
 use crate::models::disturbances::{ErringCamera, ErringGyro, SensorErrors};
-use crate::models::driver::{ArmGains, Remnant, Vision};
+use crate::models::driver::{Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::real::RealPlant;
 use crate::models::road::{Centreline, Projection, Tracker};
@@ -452,7 +452,7 @@ impl Plan {
             ahead_s: [scenario.longest_look_ahead_s(), driver.t_f],
             duration_s: scenario.duration_s(),
             relying: transition(scenario.gains()),
-            manual: transition(ArmGains::MANUAL),
+            manual: transition(scenario.manual_gains()),
             changed: scenario
                 .driver_change()
                 .map(|change| (step_of(change.time_s), transition(change.gains()))),

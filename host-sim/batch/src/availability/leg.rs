@@ -2,7 +2,7 @@
 
 use haptic_core::modes::Mode;
 use haptic_sim::Scenario;
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::population::LaneKeeper;
 use haptic_sim::scenario::Speed;
 use haptic_sim::seeds::Stream;
 use haptic_sim::simulation::{Ending, Run};
@@ -13,9 +13,6 @@ use serde::{Deserialize, Serialize};
 use super::drive::{Reported, by_hand, with_ecu};
 use super::roads::falling_and_rising;
 use super::{CARS, Road, WorldKind};
-
-/// Corner of the driver's remnant, Hz: lane keeping wanders slowly.
-const REMNANT_CORNER_HZ: f64 = 0.1;
 
 /// Which leg.
 #[derive(Debug, Clone, Copy)]
@@ -137,16 +134,13 @@ impl LegNumber {
         } else {
             Speed::Constant(speed_kmh)
         };
-        let scenario = Scenario::builder()
-            .course(course)
-            .speed(speed)
-            .driver(DriverParameters {
-                t_p,
-                remnant_sd_nm: road.remnant_sd_nm,
-                remnant_corner_hz: REMNANT_CORNER_HZ,
-                ..COMPETENT()
-            })
-            .gains(arm(speed_kmh / 3.6, reliance))
+        let driver = LaneKeeper {
+            t_p,
+            reliance,
+            remnant_sd_nm: road.remnant_sd_nm,
+        };
+        let scenario = driver
+            .drives(Scenario::builder().course(course).speed(speed), speed_kmh / 3.6)
             .world(world.parameters())
             .tolerances(world.tolerances(car))
             .sensor_errors(world.sensor_errors())
@@ -212,25 +206,4 @@ fn largest_error_m(run: &Run) -> f64 {
     samples
         .map(|sample| sample.lateral_error_m.abs())
         .fold(0.0, f64::max)
-}
-
-/// A driver who keeps the lane in a real car. The paper's hold the wheel so loosely (1 N.m/rad) that the friction of a
-/// column alone carries them metres aside at 120 km/h; hands that steer hold it several times stiffer and answer sooner.
-const COMPETENT: fn() -> DriverParameters = || DriverParameters {
-    a_1: 0.2,
-    k_nms: 5.0,
-    t_nms: 0.05,
-    ..DriverParameters::default()
-};
-
-/// The arm of a driver who has learnt what the wheel asks for at an angle: it grows with v^2/(1 + K*v^2), K the stability
-/// factor of table 9, and so does the driver's stiffness, which the paper gives for 60 km/h.
-fn arm(v_m_per_s: f64, reliance: f64) -> ArmGains {
-    const STABILITY_S2_PER_M2: f64 = 0.00175;
-    let heaviness = |v: f64| v * v / (1.0 + STABILITY_S2_PER_M2 * v * v);
-    let heavier = (heaviness(v_m_per_s) / heaviness(60.0 / 3.6) - 1.0).max(0.0);
-    ArmGains {
-        k_d: (5.0 - reliance) * (1.0 + 1.5 * heavier) - 1.0,
-        k_hg: 1.0 - reliance,
-    }
 }

@@ -152,6 +152,12 @@ impl ScenarioBuilder {
         self
     }
 
+    /// K_d of a driver who has noticed that guidance failed, N.m/rad; the paper's 4 without it.
+    pub fn manual_k_d(mut self, k_d: f64) -> Self {
+        self.values.manual_k_d = k_d;
+        self
+    }
+
     /// The vehicle.
     pub fn vehicle(mut self, vehicle: VehicleParameters) -> Self {
         self.values.vehicle = vehicle;
@@ -223,6 +229,7 @@ impl ScenarioBuilder {
         let speed = values.speed.profile()?;
         values.driver.check().map_err(within("driver"))?;
         check_gains(values.gains).map_err(within("driver"))?;
+        in_range("manual_K_d", values.manual_k_d, K_D, "N.m/rad").map_err(within("driver"))?;
         values.vehicle.check().map_err(within("vehicle"))?;
         in_range("t_n", values.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
         // The controller's range: its plausibility checks divide by it.
@@ -302,7 +309,9 @@ impl Scenario {
     }
 }
 
+const K_D: std::ops::RangeInclusive<f64> = 0.0..=50.0;
+
 fn check_gains(gains: ArmGains) -> Result<(), RangeError> {
-    in_range("K_d", gains.k_d, 0.0..=50.0, "N.m/rad")?;
+    in_range("K_d", gains.k_d, K_D, "N.m/rad")?;
     in_range("K_hg", gains.k_hg, 0.0..=10.0, "")
 }

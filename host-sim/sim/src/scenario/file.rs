@@ -73,6 +73,7 @@ pub(super) fn parse(
             remnant_corner_hz: file.driver.remnant_corner,
         })
         .gains(gains)
+        .manual_k_d(file.driver.manual_k_d)
         .vehicle(file.vehicle)
         .guidance(file.guidance.0)
         .sensors(file.sensors)
@@ -93,6 +94,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         manual: _,
         driver: d,
         gains,
+        manual_k_d,
         vehicle,
         guidance,
         sensors,
@@ -131,6 +133,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
             k_nms: d.k_nms,
             k_d: Some(gains.k_d),
             k_hg: Some(gains.k_hg),
+            manual_k_d: *manual_k_d,
             remnant_sd: d.remnant_sd_nm,
             remnant_corner: d.remnant_corner_hz,
         },
@@ -309,6 +312,8 @@ struct DriverFile {
     k_d: Option<f64>,
     #[serde(rename = "K_hg", alias = "k_hg")]
     k_hg: Option<f64>,
+    #[serde(rename = "manual_K_d", alias = "manual_k_d")]
+    manual_k_d: f64,
     remnant_sd: f64,
     remnant_corner: f64,
 }
@@ -338,6 +343,7 @@ impl Default for DriverFile {
             k_nms,
             k_d: None,
             k_hg: None,
+            manual_k_d: ArmGains::MANUAL.k_d,
             remnant_sd: remnant_sd_nm,
             remnant_corner: remnant_corner_hz,
         }

@@ -214,6 +214,7 @@ struct Values {
     manual: bool,
     driver: DriverParameters,
     gains: ArmGains,
+    manual_k_d: f64,
     vehicle: VehicleParameters,
     guidance: GuidanceParameters,
     sensors: Sensors,
@@ -233,6 +234,7 @@ impl Default for Values {
             manual: false,
             driver: DriverParameters::default(),
             gains: Condition::Mid.gains(),
+            manual_k_d: ArmGains::MANUAL.k_d,
             vehicle: VehicleParameters::default(),
             guidance: GuidanceParameters::default(),
             sensors: Sensors::default(),
@@ -370,6 +372,14 @@ impl Scenario {
     /// How the driver's arm weighs vision against guidance, until a failure is noticed.
     pub fn gains(&self) -> ArmGains {
         self.values.gains
+    }
+
+    /// The same once a failure is noticed, and the driver drives as manually.
+    pub fn manual_gains(&self) -> ArmGains {
+        ArmGains {
+            k_d: self.values.manual_k_d,
+            ..ArmGains::MANUAL
+        }
     }
 
     /// The vehicle on paper, which the controller knows.

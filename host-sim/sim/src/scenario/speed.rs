@@ -51,7 +51,7 @@ pub enum Speed {
 
 impl Speed {
     /// What it is at the start, km/h.
-    pub(super) fn start_kmh(&self) -> f64 {
+    pub fn start_kmh(&self) -> f64 {
         match self {
             Self::Constant(kmh) => *kmh,
             Self::ByTime { kmh, .. } | Self::ByPlace { kmh, .. } => kmh.first().copied().unwrap_or(f64::NAN),
