@@ -12,15 +12,22 @@ use crate::redundant::words;
 pub const HANDOVER: Micros = Micros::from_ms(2000);
 /// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
 const WITHOUT_COLUMN: u32 = 2;
+/// A column that contradicts itself may hide a hand that pushes, and has misled the override already: 0.5 s. From 5 N.m the
+/// reduction limit is slower.
+const IMPLAUSIBLE_COLUMN: u32 = 4;
 /// Where the driver pushes against it, it goes so many times as fast. From 5 N.m that is 7.5 N.m/s: the largest whole
 /// number that keeps the reduction limit.
 const OPPOSED: u32 = 3;
 /// From here on the driver pushes against it: the largest offset of an ordinary torque sensor.
 const OPPOSES: Torque = Torque::from_nm(0.1);
 
-/// How many times as fast a handover goes beside a driver torque, `None` without a good one.
+/// How many times as fast a handover goes beside a driver torque, `None` without one; `is_plausible` says whether it may be
+/// believed.
 #[must_use]
-pub fn pace(applied: Torque, driver: Option<Torque>) -> u32 {
+pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 {
+    if !is_plausible {
+        return IMPLAUSIBLE_COLUMN;
+    }
     let Some(driver) = driver else {
         return WITHOUT_COLUMN;
     };

@@ -157,7 +157,7 @@ fn a_handover_goes_three_times_as_fast_while_the_driver_pushes_against_it() {
         (0.0, -5.0, 1),
     ] {
         assert_eq!(
-            pace(nm(applied), Some(nm(driver))),
+            pace(nm(applied), Some(nm(driver)), true),
             expected,
             "{applied} {driver}"
         );
@@ -167,6 +167,15 @@ fn a_handover_goes_three_times_as_fast_while_the_driver_pushes_against_it() {
 #[test]
 fn a_handover_goes_twice_as_fast_without_a_driver_torque() {
     for applied in [-1.0, 0.0, 1.0] {
-        assert_eq!(pace(nm(applied), None), 2);
+        assert_eq!(pace(nm(applied), None, true), 2);
+    }
+}
+
+#[test]
+fn a_handover_goes_four_times_as_fast_beside_a_driver_torque_that_nobody_believes() {
+    for applied in [-1.0, 0.0, 1.0] {
+        for driver in [None, Some(nm(-2.0)), Some(nm(0.0)), Some(nm(2.0))] {
+            assert_eq!(pace(nm(applied), driver, false), 4);
+        }
     }
 }

@@ -377,9 +377,9 @@ impl<I: Injection> Step<'_, I> {
             // A driver who pushed the torque below its ramp does not get it back.
             Mode::Fade | Mode::Handover => {
                 let is_plausible = !faults.contains(Fault::ColumnImplausible);
-                let column = self.inputs.column.value().filter(|_| is_plausible);
                 let pace = if mode == Mode::Handover {
-                    pace(self.applied, column.map(|c| c.driver_torque))
+                    let driver = self.inputs.column.value().map(|c| c.driver_torque);
+                    pace(self.applied, driver, is_plausible)
                 } else {
                     1
                 };
