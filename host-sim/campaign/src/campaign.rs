@@ -126,9 +126,7 @@ pub fn run(
             outcome
         })
         .collect();
-    let again = world
-        .kind()
-        .map_or(String::new(), |kind| format!(" --world {}", kind.name));
+    let again = world.arguments();
     let per_row = (seeds.end - seeds.start).max(1) as usize;
     let rows: Vec<CaseResult> = rows
         .iter()

@@ -1,8 +1,34 @@
-//! Who drives in the campaign: the participants of tables 5 and 6 and the nine drivers of tables 7 and 8.
+//! Who drives in the campaign: the paper's drivers, or those who keep the lane in a real car.
 
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::participants::participants;
+use haptic_sim::population::LaneKeeper;
 use haptic_sim::scenario::Condition;
+use haptic_sim::seeds::{Stream, named};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+/// Remnant of those who keep the lane in a real car, N.m: that of `host-sim availability` on a motorway.
+const REMNANT_SD_NM: f64 = 0.4;
+
+/// Who drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drivers {
+    /// The participants of tables 5 and 6 and the nine drivers of tables 7 and 8, for the paper's car.
+    Paper,
+    /// Those of `host-sim availability`, for a real one.
+    Population,
+}
+
+impl Drivers {
+    /// Both, by the name that a person gives them.
+    pub const NAMES: [(&'static str, Self); 2] = [("paper", Self::Paper), ("population", Self::Population)];
+
+    /// By which a person asks for them.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[usize::from(self == Self::Population)].0
+    }
+}
 
 /// A driver, by origin.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +41,7 @@ pub struct Driver {
     pub gains: ArmGains,
 }
 
-/// Everyone: 28 participants, then t_p 0.1, 0.3, 0.5 with high, mid, low reliance.
+/// Everyone of the paper: 28 participants, then t_p 0.1, 0.3, 0.5 with high, mid, low reliance.
 pub fn everyone() -> Vec<Driver> {
     let all = participants();
     let manual = all.iter().map(|p| (5, p.number, p.manual));
@@ -36,4 +62,14 @@ pub fn everyone() -> Vec<Driver> {
         })
     });
     published.chain(drivers).collect()
+}
+
+/// A driver of the population, by a stream of its own: all else is drawn as for the paper's.
+pub fn lane_keeper(seed: u64) -> LaneKeeper {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(named(Stream::Faults.seed(seed), "driver"));
+    LaneKeeper {
+        t_p: rng.random_range(0.1..0.3),
+        reliance: rng.random(),
+        remnant_sd_nm: REMNANT_SD_NM,
+    }
 }

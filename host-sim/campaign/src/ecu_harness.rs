@@ -94,7 +94,11 @@ impl<'a> EcuHarness<'a> {
             bus: Bus::new(row.injections),
             ecu,
             setup: Setup::new(&params).expect("a checked scenario"),
-            checker: InvariantChecker::new(is_engaged(row.start), clock_base_us),
+            checker: InvariantChecker::new(
+                is_engaged(row.start),
+                scenario.sensor_errors().camera_latency > 0.0,
+                clock_base_us,
+            ),
             residual: Residual::new(scenario.vehicle(), scenario.speed_m_per_s()),
             side: if rng.random_bool(0.5) { 1.0 } else { -1.0 },
             rng,
@@ -278,7 +282,7 @@ impl<'a> EcuHarness<'a> {
         let since = self.residual.seen_since(self.row.seen, observation.step);
         // A motor that came back within the ECU's patience has not been astray.
         let returned =
-            self.row.seen == Seen::Motor && self.record.modes.last().is_some_and(|(_, m)| *m == ACTIVE);
+            self.row.seen.is_of_motor() && self.record.modes.last().is_some_and(|(_, m)| *m == ACTIVE);
         self.record.seen_at = if returned {
             since
         } else {

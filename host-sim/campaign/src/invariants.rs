@@ -46,12 +46,15 @@ const LATE_CAMERA_US: u32 = 350_000;
 const READY_US: u32 = 500_000;
 const FADE_NM_PER_S: f64 = 4.0;
 const HANDOVER_S: f64 = 2.0;
-/// How many times as fast a handover goes that the driver opposes, from what torque on, and without a column.
+/// How many times as fast a handover goes that the driver opposes, from what torque on, without a column, and with one that
+/// contradicts itself.
 const OPPOSED: f64 = 3.0;
 const OPPOSES_NM: f64 = 0.1;
 const BLIND: f64 = 2.0;
-/// Bits of a column that is lost or implausible, and of an implausible lane.
-const COLUMN_FAULTS: u64 = 1 << 3 | 1 << 4;
+const LIED_TO: f64 = 4.0;
+/// Bits of a lost and an implausible column, and of an implausible lane.
+const COLUMN_LOST: u64 = 1 << 3;
+const COLUMN_IMPLAUSIBLE: u64 = 1 << 4;
 const LANE_IMPLAUSIBLE: u64 = 1 << 2;
 /// Most time that one cycle may use of a rate.
 const MOST_S: f64 = 0.002;
@@ -117,13 +120,14 @@ pub(super) struct InvariantChecker {
 }
 
 impl InvariantChecker {
-    /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active.
-    pub(super) fn new(starts_active: bool, now_us: u32) -> Self {
+    /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active, with a sample of that instant: where the
+    /// camera is late, the next one takes its time.
+    pub(super) fn new(starts_active: bool, camera_is_late: bool, now_us: u32) -> Self {
         Self {
             last: None,
             starts_active,
             true_at_us: [None; 4],
-            camera_is_late: false,
+            camera_is_late,
             driver_nm: 0.0,
             request: None,
             rose: false,
@@ -142,7 +146,7 @@ impl InvariantChecker {
     /// The ECU was reset: what it knew is gone, and its torque with it.
     pub(super) fn reset(&mut self, now_us: u32) {
         let (cycles, violation) = (self.cycles, self.violation.take());
-        *self = Self::new(false, now_us);
+        *self = Self::new(false, self.camera_is_late, now_us);
         (self.cycles, self.violation) = (cycles, violation);
     }
 
@@ -361,7 +365,8 @@ impl InvariantChecker {
         // The ramp has moved for one cycle already when it is first seen.
         self.ramp.passed_s += elapsed_s
             * match status.mode {
-                HANDOVER if status.faults & COLUMN_FAULTS != 0 => BLIND,
+                HANDOVER if status.faults & COLUMN_IMPLAUSIBLE != 0 => LIED_TO,
+                HANDOVER if status.faults & COLUMN_LOST != 0 => BLIND,
                 HANDOVER if -self.driver_nm * old_nm.signum() > OPPOSES_NM && old_nm != 0.0 => OPPOSED,
                 _ => 1.0,
             };

@@ -78,19 +78,26 @@ pub enum Seen {
     AtOnce,
     /// The lane errors contradict the vehicle's movement, or the driver torque the wheel's.
     Contradiction,
-    /// The motor's torque is none that it was told lately.
-    Motor,
+    /// The motor's torque is further from zero, or further on its other side, than any that it was told lately.
+    MotorAstray,
+    /// The motor's torque is less than what it was told lately.
+    MotorWeak,
     /// A speed below the slowest guided.
     Speed,
 }
 
 impl Seen {
+    /// Whether it is the motor's torque that shows it.
+    pub(super) fn is_of_motor(self) -> bool {
+        matches!(self, Self::MotorAstray | Self::MotorWeak)
+    }
+
     /// Since when a reaction is due, in words.
     pub(super) fn since(self) -> &'static str {
         match self {
             Self::AtOnce => "of the fault",
             Self::Contradiction => "of the contradiction",
-            Self::Motor => "of the motor's deviation",
+            Self::MotorAstray | Self::MotorWeak => "of the motor's deviation",
             Self::Speed => "of the speed below 5 m/s",
         }
     }
@@ -125,7 +132,9 @@ pub(super) struct Residual {
     /// Least and largest torque that an honest motor may deliver.
     motor_band_nm: [f64; 2],
     motor_nm: f64,
-    /// Steps in a row in which the motor was surely away from what it was told.
+    /// Steps in a row in which the motor was surely away from what it was told, and in which it surely had a torque that should
+    /// not be there.
+    off: u32,
     astray: u32,
 }
 
@@ -166,6 +175,7 @@ impl Residual {
             commands_nm: [0.0; MOTOR_ECHO],
             motor_band_nm: [0.0; 2],
             motor_nm: 0.0,
+            off: 0,
             astray: 0,
         }
     }
@@ -283,17 +293,16 @@ impl Residual {
         *low = (*low + (commanded_nm.min(oldest) - *low) / MOTOR_LAG).min(commanded_nm.min(oldest));
         *high = (*high + (commanded_nm.max(oldest) - *high) / MOTOR_LAG).max(commanded_nm.max(oldest));
         self.motor_nm = delivered_nm;
-        self.astray = if self.used(Seen::Motor) >= SURELY_SEEN {
-            self.astray + 1
-        } else {
-            0
-        };
+        let count = |so_far: u32, used: f64| if used >= SURELY_SEEN { so_far + 1 } else { 0 };
+        self.off = count(self.off, self.used(Seen::MotorWeak));
+        self.astray = count(self.astray, self.used(Seen::MotorAstray));
     }
 
     /// Since which step the fault can be seen, if it can be in this one.
     pub(super) fn seen_since(&self, by: Seen, step: u32) -> Option<u32> {
         match by {
-            Seen::Motor => (self.astray > 0).then(|| step + 1 - self.astray),
+            Seen::MotorWeak => (self.off > 0).then(|| step + 1 - self.off),
+            Seen::MotorAstray => (self.astray > 0).then(|| step + 1 - self.astray),
             _ => (self.used(by) >= SURELY_SEEN).then_some(step),
         }
     }
@@ -318,18 +327,25 @@ impl Residual {
         self.momentum_nm_s.abs() / (COLUMN_MARGIN_NM_S + turning.max(0.0))
     }
 
+    /// Share of the motor's margin that its torque is beyond a band.
+    fn beyond(&self, [low, high]: [f64; 2]) -> f64 {
+        let margin = |end: f64| MOTOR_MARGIN_NM + MOTOR_ERROR * end.abs();
+        f64::max(
+            (self.motor_nm - high) / margin(high),
+            (low - self.motor_nm) / margin(low),
+        )
+    }
+
     /// Share of a margin that is used; at 1 a fault can be seen.
     pub(super) fn used(&self, by: Seen) -> f64 {
         match by {
             Seen::AtOnce => f64::INFINITY,
             Seen::Contradiction => self.lane_used().max(self.column_used()),
-            Seen::Motor => {
+            Seen::MotorWeak => self.beyond(self.motor_band_nm),
+            // Toward zero a torque is missing; what is there is astray beyond zero only.
+            Seen::MotorAstray => {
                 let [low, high] = self.motor_band_nm;
-                let margin = |end: f64| MOTOR_MARGIN_NM + MOTOR_ERROR * end.abs();
-                f64::max(
-                    (self.motor_nm - high) / margin(high),
-                    (low - self.motor_nm) / margin(low),
-                )
+                self.beyond([low.min(0.0), high.max(0.0)])
             }
             Seen::Speed => LEAST_SPEED_M_PER_S / self.speeds_m_per_s[0].min(self.speeds_m_per_s[1]).max(1e-9),
         }

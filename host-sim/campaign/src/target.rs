@@ -131,7 +131,7 @@ fn flip(target: &mut Stepped, trace: &EcuTrace, row: &FaultCase, seed: u64) -> R
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(row.name.bytes().fold(seed, mix));
     let bit = rng.random_range(0..target.bits());
     let at = rng.random_range(BEFORE..2 * BEFORE);
-    let mut checker = InvariantChecker::new(true, trace.start.at.us());
+    let mut checker = InvariantChecker::new(true, false, trace.start.at.us());
     let mut flipped = Flipped::default();
     for (k, tick) in trace.ticks.iter().take(at + WATCHED).enumerate() {
         if k == at {

@@ -20,7 +20,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use super::drivers::{Driver, everyone};
+use super::drivers::{Driver, Drivers, everyone, lane_keeper};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
 use super::invariants::Violation;
@@ -68,8 +68,8 @@ const LANE_EDGE_M: f64 = 0.95;
 const PLACES: [PlaceOnRoad; 3] = [PlaceOnRoad::In, PlaceOnRoad::Before, PlaceOnRoad::After];
 
 /// What a seed draws for a row: who drives, in which scenario, and the onset.
-struct Drawn<'a> {
-    driver: &'a Driver,
+struct Drawn {
+    driver: String,
     scenario: Scenario,
     onset_ms: u32,
     change: Option<SpeedChange>,
@@ -87,6 +87,7 @@ pub struct World {
     turning_road: [Course; 2],
     /// What is real; nothing if `None`.
     real: Option<&'static WorldKind>,
+    driven_by: Drivers,
 }
 
 /// What a run showed.
@@ -151,9 +152,33 @@ impl World {
         Self::of(None)
     }
 
-    /// The same where roads, cars and cameras are real.
+    /// The same where roads, cars and cameras are real, and drivers keep the lane in a real car.
     pub fn real(kind: &'static WorldKind) -> Self {
-        Self::of(Some(kind))
+        Self::of(Some(kind)).driven_by(Drivers::Population)
+    }
+
+    /// The same with other drivers.
+    pub fn driven_by(mut self, drivers: Drivers) -> Self {
+        self.driven_by = drivers;
+        self
+    }
+
+    /// Who drives in it.
+    pub fn drivers(&self) -> Drivers {
+        self.driven_by
+    }
+
+    /// What a command needs beside row and seed to run a trial of this world again.
+    pub(crate) fn arguments(&self) -> String {
+        let usual = self.real.map_or(Drivers::Paper, |_| Drivers::Population);
+        let world = self
+            .real
+            .map_or(String::new(), |kind| format!(" --world {}", kind.name));
+        if self.driven_by == usual {
+            world
+        } else {
+            format!("{world} --drivers {}", self.driven_by.name())
+        }
     }
 
     fn of(real: Option<&'static WorldKind>) -> Self {
@@ -175,6 +200,7 @@ impl World {
             roads: SPEEDS_KMH.map(at).into(),
             turning_road: roads::turning(AFTER_MS, surface),
             real,
+            driven_by: Drivers::Paper,
         }
     }
 
@@ -214,7 +240,7 @@ impl World {
     }
 
     /// What a seed draws for a row.
-    fn draw(&self, row: &FaultCase, seed: u64, rng: &mut Xoshiro256PlusPlus) -> Drawn<'_> {
+    fn draw(&self, row: &FaultCase, seed: u64, rng: &mut Xoshiro256PlusPlus) -> Drawn {
         let speed = rng.random_range(0..SPEEDS_KMH.len());
         let change = self.draw_change(row, seed, SPEEDS_KMH[speed]);
         let able = match &change {
@@ -240,12 +266,20 @@ impl World {
             None => self.road(row, [speed, place, side], drawn_ms),
             Some(change) => self.changing_road(row, change, [place, side], drawn_ms),
         };
-        let scenario = Scenario::builder()
-            .course(course)
-            .speed(speed)
-            .driver(driver.parameters)
-            .gains(driver.gains)
-            .seed(seed);
+        let scenario = Scenario::builder().course(course).speed(speed.clone()).seed(seed);
+        let (driver, scenario) = match self.driven_by {
+            Drivers::Paper => (
+                driver.name.clone(),
+                scenario.driver(driver.parameters).gains(driver.gains),
+            ),
+            Drivers::Population => {
+                let driver = lane_keeper(seed);
+                let name = format!("t_p {:.2} s, reliance {:.2}", driver.t_p, driver.reliance);
+                let fastest_kmh =
+                    change.map_or(speed.start_kmh(), |change| change.from_kmh.max(change.to_kmh));
+                (name, driver.drives(scenario, fastest_kmh / 3.6))
+            }
+        };
         Drawn {
             driver,
             scenario: self.in_this_world(scenario, row, seed),
@@ -344,7 +378,7 @@ impl World {
         };
         let outcome = TrialOutcome {
             seed,
-            driver: driver.name.clone(),
+            driver,
             speed_kmh: scenario.speed_kmh(),
             change,
             onset_ms,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_campaign::campaign::{self, Campaign};
+use haptic_campaign::drivers::Drivers;
 use haptic_campaign::table::{self as rows, FaultCase, Place};
 use haptic_campaign::{World, document, target};
 use haptic_report::studies::faults as files;
@@ -28,6 +29,10 @@ pub(super) struct Arguments {
     /// vehicle brakes or speeds up by up to 4 m/s2 around each fault
     #[arg(long, value_name = "NAME", conflicts_with = "target")]
     world: Option<String>,
+    /// Who drives; default: in the paper's world the paper's drivers, in any other those of `host-sim availability`, who keep the
+    /// lane in a real car. The paper's hold the wheel too loosely for a column with friction, and wander
+    #[arg(long, value_name = "WHO", conflicts_with = "target", value_parser = Drivers::NAMES.map(|(name, _)| name))]
+    drivers: Option<String>,
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
     target: bool,
@@ -66,6 +71,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
                 )));
             }
         },
+    };
+    let asked = Drivers::NAMES
+        .into_iter()
+        .find(|(name, _)| arguments.drivers.as_deref() == Some(name));
+    let world = match asked {
+        Some((_, drivers)) => world.driven_by(drivers),
+        None => world,
     };
     let campaign = if arguments.target {
         target::run(&world, &chosen, seeds, || bar.inc(1))?

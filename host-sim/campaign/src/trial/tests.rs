@@ -18,7 +18,7 @@ fn by_name(name: &str) -> &'static FaultCase {
     rows().find(|row| row.name == name).expect("a row of the table")
 }
 
-fn drawn<'a>(world: &'a World, row: &FaultCase, seed: u64) -> Drawn<'a> {
+fn drawn(world: &World, row: &FaultCase, seed: u64) -> Drawn {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(Stream::Faults.seed(seed));
     world.draw(row, seed, &mut rng)
 }
@@ -194,24 +194,73 @@ fn wrong_speeds_are_wrong_by_the_same_while_the_true_one_changes() {
 /// Whoever drives keeps a lane by hand and with guidance at every speed in between, also where nobody looked.
 #[test]
 fn whoever_drives_is_stable_at_every_speed_of_the_run() {
-    let world = braking();
-    for seed in SEEDS {
-        let Drawn { driver, change, .. } = drawn(&world, by_name("counter-wrap"), seed);
-        let change = change.expect("in this world");
-        for fifth in 0..=5 {
-            let share = f64::from(fifth) / 5.0;
-            let v = (change.from_kmh + share * (change.to_kmh - change.from_kmh)) / 3.6;
-            let vehicle = VehicleParameters::default();
-            let guided = Guided {
-                law: &Params::PAPER,
-                t_n: 0.3,
-            };
-            for (gains, guided) in [(driver.gains, Some(guided)), (ArmGains::MANUAL, None)] {
-                let growth = growth_per_s(v, &vehicle, &driver.parameters, gains, guided);
-                assert!(growth < 0.0, "{}: {growth} 1/s at {v} m/s", driver.name);
+    for drivers in [Drivers::Paper, Drivers::Population] {
+        let world = braking().driven_by(drivers);
+        for seed in SEEDS {
+            let Drawn {
+                driver,
+                change,
+                scenario,
+                ..
+            } = drawn(&world, by_name("counter-wrap"), seed);
+            let change = change.expect("in this world");
+            for fifth in 0..=5 {
+                let share = f64::from(fifth) / 5.0;
+                let v = (change.from_kmh + share * (change.to_kmh - change.from_kmh)) / 3.6;
+                let vehicle = VehicleParameters::default();
+                let guided = Guided {
+                    law: &Params::PAPER,
+                    t_n: 0.3,
+                };
+                let cases = [(scenario.gains(), Some(guided)), (scenario.manual_gains(), None)];
+                for (gains, guided) in cases {
+                    let growth = growth_per_s(v, &vehicle, scenario.driver(), gains, guided);
+                    assert!(growth < 0.0, "{driver}: {growth} 1/s at {v} m/s");
+                }
             }
         }
     }
+}
+
+/// Other drivers in the same runs: place, speed, onset and car are those of the seed.
+#[test]
+fn drivers_change_who_drives_and_nothing_else() {
+    let row = by_name("silent-lane");
+    let mut names = std::collections::BTreeSet::new();
+    for seed in SEEDS {
+        let [paper, population] =
+            [Drivers::Paper, Drivers::Population].map(|who| drawn(&braking().driven_by(who), row, seed));
+        assert_eq!(paper.onset_ms, population.onset_ms);
+        let same = paper
+            .scenario
+            .to_builder()
+            .driver(*population.scenario.driver())
+            .gains(population.scenario.gains())
+            .manual_k_d(population.scenario.manual_gains().k_d)
+            .build()
+            .unwrap();
+        assert_eq!(same, population.scenario);
+        assert_ne!(paper.driver, population.driver);
+        names.insert(population.driver);
+    }
+    // Sixty seeds, sixty drivers.
+    assert!(names.len() > 55, "{names:?}");
+}
+
+/// What runs a failure again says who drove where it is not who usually does.
+#[test]
+fn a_replay_names_world_and_drivers() {
+    let everything = || World::real(WORLDS.iter().find(|world| world.name == "everything").unwrap());
+    assert_eq!(World::new().arguments(), "");
+    assert_eq!(everything().arguments(), " --world everything");
+    assert_eq!(
+        everything().driven_by(Drivers::Paper).arguments(),
+        " --world everything --drivers paper"
+    );
+    assert_eq!(
+        World::new().driven_by(Drivers::Population).arguments(),
+        " --drivers population"
+    );
 }
 
 /// At 130 km/h the taps of this participant throw the vehicle 4 m aside, where the camera's signal ends: the ECU hands over,
