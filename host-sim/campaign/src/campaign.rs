@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::drivers::Drivers;
 use super::table::{Class, FaultCase, Place};
 use super::trial::{Deviation, MOST_EXCESS_M, TrialOutcome, World};
 
@@ -15,9 +16,10 @@ pub struct Campaign {
     pub cycles: u64,
     /// Row by row.
     pub rows: Vec<CaseResult>,
-    /// Name of the world, if it is not the paper's.
-    #[serde(skip)]
+    /// Name of the world; `None` is the paper's.
     pub world: Option<&'static str>,
+    /// Who drove.
+    pub drivers: Drivers,
 }
 
 impl Campaign {
@@ -27,6 +29,7 @@ impl Campaign {
             cycles: rows.iter().map(|row| row.cycles).sum(),
             rows,
             world: None,
+            drivers: Drivers::Paper,
         }
     }
 
@@ -135,6 +138,7 @@ pub fn run(
         .collect();
     Campaign {
         world: world.kind().map(|kind| kind.name),
+        drivers: world.drivers(),
         ..Campaign::of(rows)
     }
 }

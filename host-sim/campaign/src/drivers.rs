@@ -7,12 +7,14 @@ use haptic_sim::scenario::Condition;
 use haptic_sim::seeds::{Stream, named};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
+use serde::Serialize;
 
 /// Remnant of those who keep the lane in a real car, N.m: that of `host-sim availability` on a motorway.
 const REMNANT_SD_NM: f64 = 0.4;
 
 /// Who drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Drivers {
     /// The participants of tables 5 and 6 and the nine drivers of tables 7 and 8, for the paper's car.
     Paper,

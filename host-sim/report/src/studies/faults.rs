@@ -8,6 +8,7 @@ use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, 
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_campaign::campaign::{Campaign, CaseResult};
 use haptic_campaign::document;
+use haptic_campaign::drivers::Drivers;
 
 /// Writes the figure (SVG, PNG), the results (JSON), the table of faults (Markdown) and a report (HTML).
 ///
@@ -49,9 +50,19 @@ pub fn stamped(campaign: &Campaign) -> Stamped<'_, Campaign> {
 
 /// How much ran, and how much of it failed.
 pub fn summary(campaign: &Campaign) -> String {
-    let world = campaign.world.map_or(String::new(), |name| {
-        format!("; in the world {name}, where a row fails by a broken rule or by where the vehicle goes")
-    });
+    let drivers = match campaign.drivers {
+        Drivers::Paper => "with the paper's drivers",
+        Drivers::Population => "with drivers who keep the lane in a real car",
+    };
+    let world = match (campaign.world, campaign.drivers) {
+        (None, Drivers::Paper) => String::new(),
+        (None, Drivers::Population) => format!("; {drivers}"),
+        (Some(name), _) => {
+            format!(
+                "; in the world {name}, {drivers}: a row fails by a broken rule or by where the vehicle goes"
+            )
+        }
+    };
     format!(
         "{} rows, {} runs, {} cycles checked, {} failed{world}",
         campaign.rows.len(),
