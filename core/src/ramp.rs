@@ -10,7 +10,7 @@ use crate::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
-/// Without a good driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
+/// Without a driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
 const WITHOUT_COLUMN: u32 = 2;
 /// A column that contradicts itself may hide a hand that pushes, and has misled the override already: 0.5 s. From 5 N.m the
 /// reduction limit is slower.

@@ -5,8 +5,8 @@ use haptic_sim::participants::participants;
 use haptic_sim::population::LaneKeeper;
 use haptic_sim::scenario::Condition;
 use haptic_sim::seeds::{Stream, named};
+use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
-use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
 /// Remnant of those who keep the lane in a real car, N.m: that of `host-sim availability` on a motorway.
@@ -69,9 +69,5 @@ pub fn everyone() -> Vec<Driver> {
 /// A driver of the population, by a stream of its own: all else is drawn as for the paper's.
 pub fn lane_keeper(seed: u64) -> LaneKeeper {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(named(Stream::Faults.seed(seed), "driver"));
-    LaneKeeper {
-        t_p: rng.random_range(0.1..0.3),
-        reliance: rng.random(),
-        remnant_sd_nm: REMNANT_SD_NM,
-    }
+    LaneKeeper::draw(&mut rng, REMNANT_SD_NM)
 }

@@ -279,15 +279,14 @@ impl<'a> EcuHarness<'a> {
             let contradicted = self.residual.used(Seen::Contradiction);
             self.record.contradicted = self.record.contradicted.max(contradicted);
         }
-        let since = self.residual.seen_since(self.row.seen, observation.step);
+        let since = |by| self.residual.seen_since(by, observation.step);
+        let (since, weak_since) = (since(self.row.seen), since(Seen::MotorWeak));
         // A motor that came back within the ECU's patience has not been astray.
         let returned =
             self.row.seen.is_of_motor() && self.record.modes.last().is_some_and(|(_, m)| *m == ACTIVE);
-        self.record.seen_at = if returned {
-            since
-        } else {
-            self.record.seen_at.or(since)
-        };
+        let kept = |before: Option<u32>, since| if returned { since } else { before.or(since) };
+        self.record.seen_at = kept(self.record.seen_at, since);
+        self.record.weak_at = kept(self.record.weak_at, weak_since);
     }
 
     fn record_status(&mut self, step: u32, status: &Status) {

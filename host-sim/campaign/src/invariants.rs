@@ -16,7 +16,7 @@
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
 //! | engaging | into Active only from 500 ms of Standby and by a request that rose |
 //! | inputs | no input older than 30 ms in Active, no picture of a late camera older than 350 ms |
-//! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s; the line goes three times as fast while the driver opposes, twice without a column, and starts from zero after an implausible lane |
+//! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s; the line goes three times as fast while the driver opposes, twice without a column, four times beside one that contradicts itself, and starts from zero after an implausible lane |
 //! | fade | never grows, falls by 4 N.m/s |
 //! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked |
 
@@ -103,7 +103,9 @@ pub(super) struct InvariantChecker {
     starts_active: bool,
     /// When the latest sample in use was true, by the ECU's clock: lane, column, vehicle, demand.
     true_at_us: [Option<u32>; 4],
-    /// Whether a lane preview was ever old when it came.
+    /// Whether the camera is known to be late: its first picture then takes its time behind the sample that the ECU began with.
+    camera_lags: bool,
+    /// Whether that is so, or a lane preview was ever old when it came.
     camera_is_late: bool,
     driver_nm: f64,
     request: Option<bool>,
@@ -120,14 +122,14 @@ pub(super) struct InvariantChecker {
 }
 
 impl InvariantChecker {
-    /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active, with a sample of that instant: where the
-    /// camera is late, the next one takes its time.
-    pub(super) fn new(starts_active: bool, camera_is_late: bool, now_us: u32) -> Self {
+    /// For an ECU that starts at `now_us` of its clock, in Boot or, in studies, Active.
+    pub(super) fn new(starts_active: bool, camera_lags: bool, now_us: u32) -> Self {
         Self {
             last: None,
             starts_active,
             true_at_us: [None; 4],
-            camera_is_late,
+            camera_lags,
+            camera_is_late: camera_lags,
             driver_nm: 0.0,
             request: None,
             rose: false,
@@ -146,7 +148,7 @@ impl InvariantChecker {
     /// The ECU was reset: what it knew is gone, and its torque with it.
     pub(super) fn reset(&mut self, now_us: u32) {
         let (cycles, violation) = (self.cycles, self.violation.take());
-        *self = Self::new(false, self.camera_is_late, now_us);
+        *self = Self::new(false, self.camera_lags, now_us);
         (self.cycles, self.violation) = (cycles, violation);
     }
 

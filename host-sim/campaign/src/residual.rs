@@ -351,3 +351,33 @@ impl Residual {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Told 1 N.m for long, an honest motor may deliver 0.775 to 1.225 N.m: 0.1 N.m and an eighth of it off. Less is missing. Beyond
+    /// zero by 0.1 N.m, or beyond 1.225, a torque is there that should not be.
+    #[test]
+    fn a_missing_torque_is_told_from_one_that_should_not_be_there() {
+        for (delivered_nm, weak, astray) in [
+            (1.0, false, false),
+            (0.79, false, false),
+            (0.76, true, false),
+            (0.0, true, false),
+            (-0.09, true, false),
+            (-0.11, true, true),
+            (1.21, false, false),
+            (1.24, true, true),
+        ] {
+            for sign in [1.0, -1.0] {
+                let mut residual = Residual::new(&VehicleParameters::default(), 20.0);
+                for _ in 0..1000 {
+                    residual.motor(sign, sign * delivered_nm);
+                }
+                let seen = [Seen::MotorWeak, Seen::MotorAstray].map(|by| residual.used(by) > 1.0);
+                assert_eq!(seen, [weak, astray], "{delivered_nm} {sign}");
+            }
+        }
+    }
+}

@@ -214,7 +214,7 @@ const CONTRADICTION_MS: u32 = 200;
 /// periods of the column, and the cycle in which it is seen.
 const MOTOR_MS: u32 = 15;
 /// The same where torque is missing: 50 ms of patience, two periods of the column, and the cycle in which it is seen.
-const WEAK_MS: u32 = 55;
+pub(super) const WEAK_MS: u32 = 55;
 /// Torque in ordinary curves and through a jerk of the wheel. Measured peaks are below it; the point is that
 /// no fault may draw more.
 const ORDINARY_NM: f64 = 2.0;

@@ -14,6 +14,8 @@ pub(super) struct TrialRecord {
     pub(super) modes: Vec<(u32, u64)>,
     /// When the fault could first be seen.
     pub(super) seen_at: Option<u32>,
+    /// When a motor that was not seen astray was first seen to deliver too little, for good.
+    pub(super) weak_at: Option<u32>,
     /// Largest share of the margin used, up to the first change of mode after the onset.
     pub(super) used: f64,
     /// The same of the margins that a contradiction uses, whatever the row looks at.

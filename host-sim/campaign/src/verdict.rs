@@ -3,7 +3,7 @@
 use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER, STANDBY};
 use super::invariants::Violation;
 use super::residual::Seen;
-use super::table::{Expect, FaultCase};
+use super::table::{Expect, FaultCase, WEAK_MS};
 use super::trial_record::TrialRecord;
 
 /// Before a contradiction has used this share of its margin nobody may react to it.
@@ -117,14 +117,19 @@ fn in_time(
     mode: u64,
     reached: Option<(u32, u64)>,
 ) -> Result<Option<u32>, Violation> {
+    let (seen_at, deadline_ms, mode) = match (record.seen_at, record.weak_at) {
+        // A torque the other way that is within a motor's error passes for one that is missing.
+        (None, Some(weak_at)) if row.seen == Seen::MotorAstray => (Some(weak_at), WEAK_MS, HANDOVER),
+        (seen_at, _) => (seen_at, row.deadline_ms, mode),
+    };
     // What cannot be seen need not be reacted to; the run counts as not seen.
-    let Some(seen_at) = record.seen_at else {
+    let Some(seen_at) = seen_at else {
         return match reached {
             Some((step, found)) if found == mode => too_early(row, record, Some(step)).map(|()| Some(step)),
             _ => Ok(None),
         };
     };
-    let due = seen_at + row.deadline_ms;
+    let due = seen_at + deadline_ms;
     match reached {
         // Speeds that fall by themselves contradict the column.
         Some((step, HANDOVER)) if row.seen == Seen::Speed && record.contradicted >= TOO_EARLY => {
@@ -135,7 +140,7 @@ fn in_time(
             let late = step - seen_at;
             Err(failed(
                 step,
-                format!("reacted after {late} ms, not {}", row.deadline_ms),
+                format!("reacted after {late} ms, not {deadline_ms}"),
             ))
         }
         Some((step, _)) => too_early(row, record, Some(step)).map(|()| Some(step)),

@@ -4,6 +4,9 @@
 //! aside at 120 km/h. Hands that steer hold it several times stiffer and answer sooner. So do these: with a remnant of 0.4 N.m
 //! they keep the lane as people do (`host-sim availability` prints their SDLP).
 
+use rand::RngExt;
+use rand::rngs::Xoshiro256PlusPlus;
+
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::scenario::ScenarioBuilder;
 
@@ -15,13 +18,22 @@ const REMNANT_CORNER_HZ: f64 = 0.1;
 pub struct LaneKeeper {
     /// Processing delay, s: 0.1 to 0.3.
     pub t_p: f64,
-    /// Reliance on the guidance: 0 works against all of it (K_hg of 1), 1 against nothing.
+    /// Reliance on the guidance, 0 to 1: 0 works against all of it (K_hg of 1), 1 against nothing.
     pub reliance: f64,
-    /// Standard deviation of the remnant, N.m.
+    /// Standard deviation of the remnant, N.m: 0 to 5.
     pub remnant_sd_nm: f64,
 }
 
 impl LaneKeeper {
+    /// Any of them.
+    pub fn draw(rng: &mut Xoshiro256PlusPlus, remnant_sd_nm: f64) -> Self {
+        Self {
+            t_p: rng.random_range(0.1..0.3),
+            reliance: rng.random(),
+            remnant_sd_nm,
+        }
+    }
+
     /// Lets this driver drive a scenario at a speed; where the speed changes, the highest.
     pub fn drives(&self, scenario: ScenarioBuilder, v_m_per_s: f64) -> ScenarioBuilder {
         let driver = DriverParameters {

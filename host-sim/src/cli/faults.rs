@@ -29,15 +29,15 @@ pub(super) struct Arguments {
     /// vehicle brakes or speeds up by up to 4 m/s2 around each fault
     #[arg(long, value_name = "NAME", conflicts_with = "target")]
     world: Option<String>,
-    /// Who drives; default: in the paper's world the paper's drivers, in any other those of `host-sim availability`, who keep the
-    /// lane in a real car. The paper's hold the wheel too loosely for a column with friction, and wander
+    /// Who drives: `paper`, the drivers of the paper's tables, for its car without friction, or `population`, those of
+    /// `host-sim availability`, who keep the lane in a real one; default: `paper` without --world, `population` with it
     #[arg(long, value_name = "WHO", conflicts_with = "target", value_parser = Drivers::NAMES.map(|(name, _)| name))]
     drivers: Option<String>,
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
     target: bool,
     /// Print the table of faults, as docs/safety.md has it, and run nothing
-    #[arg(long, conflicts_with_all = ["rows", "seeds", "seed", "target", "json", "out"])]
+    #[arg(long, conflicts_with_all = ["rows", "world", "drivers", "seeds", "seed", "target", "json", "out"])]
     list: bool,
     /// Print the results as one JSON object instead of a table
     #[arg(long)]

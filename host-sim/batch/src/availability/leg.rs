@@ -122,8 +122,7 @@ impl LegNumber {
             .wrapping_add((*number).into());
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let speed_kmh: f64 = rng.random_range(road.speed_kmh[0]..road.speed_kmh[1]);
-        let t_p = rng.random_range(0.1..0.3);
-        let reliance: f64 = rng.random();
+        let driver = LaneKeeper::draw(&mut rng, road.remnant_sd_nm);
         // Noise of its own; 53 bits, so that any reader of JSON keeps it.
         let noise = rng.random::<u64>() >> 11;
         let lateral = world.lateral_m_per_s2().unwrap_or(road.lateral_m_per_s2);
@@ -133,11 +132,6 @@ impl LegNumber {
             falling_and_rising(speed_kmh, &mut rng)
         } else {
             Speed::Constant(speed_kmh)
-        };
-        let driver = LaneKeeper {
-            t_p,
-            reliance,
-            remnant_sd_nm: road.remnant_sd_nm,
         };
         let scenario = driver
             .drives(Scenario::builder().course(course).speed(speed), speed_kmh / 3.6)
