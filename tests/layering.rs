@@ -335,6 +335,7 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/batch/src/reliance/mod.rs", "one study: drives, sessions, errors"),
     ("host-sim/campaign/src/ecu_harness.rs", "what stands between the world and the ECU, with what it injects"),
     ("host-sim/campaign/src/invariants.rs", "every rule of a cycle beside the others"),
+    ("host-sim/campaign/src/residual.rs", "the checks a second time, beside each other"),
     ("host-sim/campaign/src/trial.rs", "one run: what is drawn, driven and judged"),
     ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/experiment.rs", "one report, section by section"),
@@ -344,6 +345,7 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
     ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),
+    ("host-sim/sim/src/scenario/file.rs", "one document: the form of a scenario's file"),
     ("host-sim/sim/src/scenario/mod.rs", "one document: the fields of a scenario and their meaning"),
     ("host-sim/sim/src/simulation.rs", "one loop with its tests, which look into it"),
 ];
