@@ -278,6 +278,26 @@ fn after_a_torque_failure_nothing_guides_and_the_driver_takes_a_second_to_notice
     );
 }
 
+/// This driver's K_hg is 0 already: one who keeps K_d = 2 does nothing at 71 s.
+#[test]
+fn a_driver_who_keeps_k_d_does_not_change_the_torque_on_noticing_a_failure() {
+    let nominal = scenario(Condition::High, 0.1, Sensors::Exact);
+    let failure = Failure {
+        kind: FailureKind::Torque,
+        ..nominal.failure()
+    };
+    let failed = nominal.to_builder().failure(failure).manual_k_d(2.0);
+    let failed = run(&failed.build().unwrap());
+    let at = |time_s: f64| failed.trace.samples[(time_s * 200.0).round() as usize].driver_torque_nm;
+    let slope = |t: f64| (at(t + 0.01) - at(t)) / 0.01;
+    assert!(
+        (slope(71.0) - slope(70.98)).abs() < 0.3,
+        "{} {}",
+        slope(70.98),
+        slope(71.0)
+    );
+}
+
 #[test]
 fn a_seed_fixes_a_noisy_run() {
     let noisy = |seed| {

@@ -23,12 +23,15 @@ pub enum Drivers {
 }
 
 impl Drivers {
-    /// Both, by the name that a person gives them.
-    pub const NAMES: [(&'static str, Self); 2] = [("paper", Self::Paper), ("population", Self::Population)];
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Population];
 
     /// By which a person asks for them.
     pub fn name(self) -> &'static str {
-        Self::NAMES[usize::from(self == Self::Population)].0
+        match self {
+            Self::Paper => "paper",
+            Self::Population => "population",
+        }
     }
 }
 

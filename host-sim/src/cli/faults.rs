@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     world: Option<String>,
     /// Who drives: `paper`, the drivers of the paper's tables, for its car without friction, or `population`, those of
     /// `host-sim availability`, who keep the lane in a real one; default: `paper` without --world, `population` with it
-    #[arg(long, value_name = "WHO", conflicts_with = "target", value_parser = Drivers::NAMES.map(|(name, _)| name))]
+    #[arg(long, value_name = "WHO", conflicts_with = "target", value_parser = Drivers::ALL.map(Drivers::name))]
     drivers: Option<String>,
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
@@ -72,11 +72,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             }
         },
     };
-    let asked = Drivers::NAMES
-        .into_iter()
-        .find(|(name, _)| arguments.drivers.as_deref() == Some(name));
-    let world = match asked {
-        Some((_, drivers)) => world.driven_by(drivers),
+    let asked = |drivers: &Drivers| arguments.drivers.as_deref() == Some(drivers.name());
+    let world = match Drivers::ALL.into_iter().find(asked) {
+        Some(drivers) => world.driven_by(drivers),
         None => world,
     };
     let campaign = if arguments.target {

@@ -171,6 +171,7 @@ fn random(count: usize, seed: u64, beside: Beside) -> Vec<Scenario> {
                     k_d: between(1.0, 5.0),
                     k_hg: between(0.0, 1.5),
                 })
+                .manual_k_d(between(1.0, 9.0))
                 .failure(failure)
         };
         if between(0.0, 1.0) < 0.5 {
