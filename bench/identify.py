@@ -93,7 +93,7 @@ def main():
         print(__doc__, file=sys.stderr)
         return 2
     path = sys.argv[1]
-    command = ["cargo", "run", "--release", "-q", "-p", "host-sim", "--example", "time_identification", "--", path]
+    command = ["cargo", "run", "--profile", "dist", "-q", "-p", "host-sim", "--example", "time_identification", "--", path]
     ours = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
     problem = Problem(path)

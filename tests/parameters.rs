@@ -5,11 +5,10 @@
 //! The status frames are taken apart by hand, from `core/haptic.dbc`. What `host-sim parameters` does over an adapter
 //! is done to the same image behind a serial port.
 
-mod machine;
-
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
+use crate::machine::{Machine, image};
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Identity, Message, Vehicle, WriteOutcome};
 use haptic_core::bus::slcan;
@@ -18,7 +17,6 @@ use haptic_core::params::Params;
 use haptic_core::quantity::Speed;
 use haptic_target::live::{Listener, View};
 use haptic_target::parameters::Product;
-use machine::{Machine, image};
 
 const BOARD: &str = "mps2-an386";
 const STANDBY: u64 = 1;

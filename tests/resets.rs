@@ -6,9 +6,7 @@
 //!
 //! The torque frames are taken apart by hand, from `core/haptic.dbc`.
 
-mod machine;
-
-use machine::Machine;
+use crate::machine::Machine;
 
 /// The reference board, and the same with another core.
 const M4F: &str = "mps2-an386";

@@ -3,12 +3,10 @@
 //!
 //! The frames are taken apart by hand, from `core/haptic.dbc`.
 
-mod machine;
-
 use std::path::PathBuf;
 use std::process::Command;
 
-use machine::{Machine, image};
+use crate::machine::{Machine, image};
 
 const BOARD: &str = "mps2-an386";
 /// Values of `Guidance_Mode`.

@@ -1,8 +1,7 @@
 //! Attacks from the bus with frames that pass every check of the bus, as docs/security.md has them: what is treated
 //! is refused, what is not is bounded, and both leave a trace. Frames are made by the codec: there is no secret to know.
 
-mod rig;
-
+use crate::rig::Rig;
 use haptic_core::bus::messages::{
     Column, Demand, Guidance, LanePreview, MESSAGES, Message, Sender, Vehicle, WriteOutcome,
 };
@@ -14,7 +13,6 @@ use haptic_core::modes::Mode;
 use haptic_core::params::Params;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 use haptic_core::rejections::Rejections;
-use rig::Rig;
 
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;

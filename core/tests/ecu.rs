@@ -3,8 +3,7 @@
 //! Above 500 lines because the classes of faults are one table of cases on one rig: split, a reader could not see
 //! whether a class lacks a case.
 
-mod rig;
-
+use crate::rig::Rig;
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::config::Setup;
@@ -15,7 +14,6 @@ use haptic_core::envelope::LimitReason;
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Micros, Radians, Torque};
-use rig::Rig;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;
@@ -162,7 +160,7 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() 
         let mut rig = Rig::active_in_curve(sign * 0.4);
         // The second source drifts to 1.9 m/s above the first.
         for k in 1..=19 {
-            rig.speeds = [rig::SPEED, rig::SPEED + 0.1 * f64::from(k)];
+            rig.speeds = [crate::rig::SPEED, crate::rig::SPEED + 0.1 * f64::from(k)];
             rig.run(10);
         }
         // At most 5 ms of history lie between two remembered outputs, and the torque rises by 2.4 mN.m per ms.
@@ -172,7 +170,7 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() 
             rig.tick();
             outputs.push(rig.applied);
         }
-        rig.speeds[1] = rig::SPEED + 2.1;
+        rig.speeds[1] = crate::rig::SPEED + 2.1;
         let (ms, step) = rig.run_until(31, |step| step.command.mode == Mode::Handover);
         assert!(step.command.faults.contains(Fault::SpeedImplausible));
         let declared = outputs.len() + ms as usize - 1;
@@ -364,7 +362,7 @@ fn a_jump_of_the_lane_or_the_speed_is_rejected_and_becomes_a_fault_when_it_stays
     );
     assert!(rig.rejects.len() >= 3 && rig.rejects.iter().all(|r| *r == Reject::Step));
     let mut rig = Rig::active_in_curve(1.0);
-    rig.speeds = [rig::SPEED + 1.5; 2];
+    rig.speeds = [crate::rig::SPEED + 1.5; 2];
     let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
     assert!(step.command.faults.contains(Fault::SpeedStep));
     assert!(
@@ -409,7 +407,7 @@ fn speeds_that_disagree_and_speeds_too_low() {
         let mut rig = Rig::active_in_curve(1.0);
         // No jump: the second source drifts away.
         for k in 1..=20 {
-            rig.speeds[1] = rig::SPEED + apart * f64::from(k) / 20.0;
+            rig.speeds[1] = crate::rig::SPEED + apart * f64::from(k) / 20.0;
             rig.run(10);
         }
         // Both round to the bus's 2^-8 m/s.
@@ -424,7 +422,7 @@ fn speeds_that_disagree_and_speeds_too_low() {
     }
     let mut rig = Rig::active_in_curve(0.0);
     for k in 0..=130 {
-        rig.speeds = [rig::SPEED - 0.1 * f64::from(k); 2];
+        rig.speeds = [crate::rig::SPEED - 0.1 * f64::from(k); 2];
         rig.run(10);
     }
     let step = rig.tick();
@@ -434,7 +432,7 @@ fn speeds_that_disagree_and_speeds_too_low() {
     for slow in [0, 1] {
         let mut rig = Rig::active_in_curve(0.0);
         for k in 0..=110 {
-            rig.speeds = [rig::SPEED - 0.1 * f64::from(k); 2];
+            rig.speeds = [crate::rig::SPEED - 0.1 * f64::from(k); 2];
             rig.run(10);
         }
         assert_eq!(rig.tick().command.mode, Mode::Active, "5.67 m/s");

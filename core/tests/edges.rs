@@ -2,8 +2,7 @@
 //! test names the defect that it is for; `cargo xtask mutants --by-hand` puts them in, one by one (`mutants.toml`), and
 //! fails if none of the tests does.
 
-mod rig;
-
+use crate::rig::Rig;
 use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
@@ -16,7 +15,6 @@ use haptic_core::estimator::{Reading, Sample};
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
-use rig::Rig;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;
@@ -43,7 +41,7 @@ fn a_handover_from_a_falling_torque_keeps_no_wave_of_the_probe() {
     // Its amplitude is whole, and its wave near the top, at the end of the fall.
     rig.run(600);
     for k in 1..=19 {
-        rig.speeds[1] = rig::SPEED + 0.1 * f64::from(k);
+        rig.speeds[1] = crate::rig::SPEED + 0.1 * f64::from(k);
         rig.run(10);
     }
     let wave = |step: &Step| step.command.probe.unwrap().nm();
@@ -56,7 +54,7 @@ fn a_handover_from_a_falling_torque_keeps_no_wave_of_the_probe() {
         rig.curve(torque);
         last = rig.tick();
     }
-    rig.speeds[1] = rig::SPEED + 2.1;
+    rig.speeds[1] = crate::rig::SPEED + 2.1;
     let mut guidance = 0.0;
     let handover = loop {
         let step = rig.tick();
@@ -169,7 +167,7 @@ fn a_silence_is_counted_in_time_and_not_in_steps() {
 fn a_speed_that_another_contradicts_is_not_used() {
     let mut rig = Rig::active_in_curve(1.5);
     for k in 1..=40 {
-        rig.speeds[0] = rig::SPEED + 0.9 * f64::from(k);
+        rig.speeds[0] = crate::rig::SPEED + 0.9 * f64::from(k);
         rig.run(10);
     }
     for _ in 0..3000 {

@@ -2,11 +2,11 @@
 //! default, more by `HAPTIC_CYCLES`; the whole of it, 10^8 cycles and 24 wraps:
 //!
 //! ```text
-//! HAPTIC_CYCLES=100000000 cargo test --release -p haptic-core --test endurance -- --nocapture
+//! HAPTIC_CYCLES=100000000 cargo test --release -p haptic-core endurance:: -- --nocapture
 //! ```
 
-mod rig;
-
+use crate::rig::Rig;
+use crate::rig::watch::Watch;
 use haptic_core::config::Setup;
 use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu};
@@ -16,8 +16,6 @@ use haptic_core::params::Params;
 use haptic_core::quantity::{Metres, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
-use rig::Rig;
-use rig::watch::Watch;
 
 /// What happens from outside; the rest of the time the bench is in a slowly changing curve.
 struct Events {
@@ -152,7 +150,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; Fault::C
         };
         if dead > 1000 {
             rig.ecu = InjectedEcu::new(Ecu::new(Some(&setup), Boot::default(), rig.now()));
-            (rig.motor, rig.heard) = (|t| t, rig::Heard::default());
+            (rig.motor, rig.heard) = (|t| t, crate::rig::Heard::default());
             (dead, rig.engage) = (0, false);
             watch.restart(&rig);
             (events.reasons, before) = (FaultSet::NONE, FaultSet::NONE);

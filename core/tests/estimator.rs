@@ -1,20 +1,18 @@
 //! The live estimate of K_hg: drives of arms that obey equation (8), against figures by hand and against the oracle.
 
-mod reliance;
-
 use std::f64::consts::TAU;
 
+use crate::reliance::drive::{Drive, LSB, rounded};
+use crate::reliance::{Estimate, Seen, block_us, expected, over, share};
 use haptic_core::config::Setup;
 use haptic_core::estimator::Sample;
 use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Radians, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
-use reliance::drive::{Drive, LSB, rounded};
-use reliance::{Estimate, Seen, block_us, expected, over, share};
 
 /// What the ECU's estimator says after each step: one with each sample, and `free` steps after it without.
-fn told(params: &Params, points: &[reliance::Point], free: usize) -> Vec<Estimate> {
+fn told(params: &Params, points: &[crate::reliance::Point], free: usize) -> Vec<Estimate> {
     let estimator = Setup::new(params).unwrap().estimator;
     let mut state = estimator.start();
     let mut told = Vec::new();

@@ -5,11 +5,11 @@
 //! by hand, with another seed:
 //!
 //! ```text
-//! HAPTIC_FUZZ_BYTES=1000000000 HAPTIC_FUZZ_SEED=7 cargo test --release -p haptic-core --test fuzz
+//! HAPTIC_FUZZ_BYTES=1000000000 HAPTIC_FUZZ_SEED=7 cargo test --release -p haptic-core fuzz::
 //! ```
 
-mod rig;
-
+use crate::rig::Rig;
+use crate::rig::watch::Watch;
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
@@ -20,8 +20,6 @@ use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::quantity::{Metres, Radians};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
-use rig::Rig;
-use rig::watch::Watch;
 
 fn variable(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| {
@@ -157,7 +155,7 @@ fn act(rig: &mut Rig, rng: &mut SmallRng) -> Option<u32> {
         972 => rig.driver = Some(20.0 * small(operand[1])),
         973 => rig.driver = None,
         974 => rig.speeds = [80.0 * small(operand[1]).abs(), 80.0 * small(operand[2]).abs()],
-        975 => rig.speeds = [rig::SPEED; 2],
+        975 => rig.speeds = [crate::rig::SPEED; 2],
         976 => rig.engage = operand[1] < 128,
         977 => rig.wheel = 12.0 * small(operand[1]),
         978 => rig.silent[sender] = !rig.silent[sender],

@@ -1,14 +1,12 @@
 //! Every bit of the redundant memory flipped, one at a time, in each mode with a torque and in Standby: Fault and no
 //! torque in the next step. And the guard itself, on a value of its own.
 
-mod rig;
-
+use crate::rig::Rig;
 use haptic_core::ecu::injection::Region;
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
 use haptic_core::quantity::Torque;
 use haptic_core::redundant::{Redundant, Words};
-use rig::Rig;
 
 fn rigs() -> Vec<Rig> {
     let standby = Rig::paper();

@@ -1,10 +1,9 @@
 //! The probe from the bus: when there is one, what it looks like, what a handover and the monitor make of it,
 //! and what the ECU reads from it of a driver who obeys equation (8) to the letter.
 
-mod rig;
-
 use std::f64::consts::TAU;
 
+use crate::rig::Rig;
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Demand, Guidance, Message, ResetCause, Telemetry};
 use haptic_core::config::Setup;
@@ -14,7 +13,6 @@ use haptic_core::modes::Mode;
 use haptic_core::monitor::{Evidence, Monitor, MonitorState};
 use haptic_core::params::Params;
 use haptic_core::quantity::{Ratio, Torque};
-use rig::Rig;
 
 /// Half an LSB of the torque on the bus, and the arithmetic of the core.
 const ROUNDING: f64 = 0.5 / 4096.0 + 1e-5;

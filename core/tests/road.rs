@@ -1,7 +1,6 @@
 //! What a real road, a real camera and a driver without hands do to the ECU on the bench.
 
-mod rig;
-
+use crate::rig::Rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
 use haptic_core::faults::Fault;
@@ -9,7 +8,6 @@ use haptic_core::law::{LaneSample, LawState, Since};
 use haptic_core::modes::Mode;
 use haptic_core::past::Past;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
-use rig::Rig;
 
 const LANE: usize = 0;
 

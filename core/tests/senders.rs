@@ -4,14 +4,12 @@
 //! each message; it is no less than 10 ms and no more than the slowest sender's. The expected times are worked out here in
 //! milliseconds and f64.
 
-mod rig;
-
+use crate::rig::Rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
 use haptic_core::ecu::Step;
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::quantity::Metres;
-use rig::Rig;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;
@@ -111,10 +109,10 @@ fn a_speed_that_is_silent_has_not_jumped() {
 fn a_speed_that_jumps_once_is_refused_and_no_fault() {
     let mut rig = Rig::active_in_curve(1.0);
     rig.run(5);
-    rig.speeds = [rig::SPEED + 1.5; 2];
+    rig.speeds = [crate::rig::SPEED + 1.5; 2];
     let jumped = rig.frame(VEHICLE);
     assert_eq!(rig.send(&jumped), Err(Reject::Step));
-    rig.speeds = [rig::SPEED; 2];
+    rig.speeds = [crate::rig::SPEED; 2];
     for _ in 0..60 {
         assert_eq!(rig.tick().command.faults, FaultSet::NONE);
     }

@@ -2,8 +2,6 @@
 //!
 //! QEMU counts instructions, so the machine's time is that of its program and no load of this computer moves it.
 
-#![allow(dead_code, reason = "each test that has this module uses its own part of it")]
-
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -80,10 +78,6 @@ impl Machine {
     }
 
     /// Sends bytes.
-    #[allow(
-        dead_code,
-        reason = "each test file compiles this module, and one only listens"
-    )]
     pub(crate) fn send(&self, bytes: &[u8]) {
         self.to.send(bytes.to_vec()).expect("QEMU is gone");
     }

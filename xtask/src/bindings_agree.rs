@@ -7,8 +7,8 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
-use crate::tool::{cargo, command, output, root, run};
-use crate::{c_library, fmu, web, wheel};
+use crate::tool::{Built, command, output, root, run};
+use crate::{c_library, fmu, python, web};
 
 const SCENARIO: &str = "examples/relying-driver.toml";
 /// The bus as the doors read it.
@@ -17,31 +17,19 @@ const BUS: &str = "target/bindings-agree/bus.txt";
 const INPUTS: [&str; 4] = ["100", "110", "120", "130"];
 
 /// Prints the table, and fails where a door sends another bit.
-pub(crate) fn check() -> Result<()> {
+pub(crate) fn check(built: Built) -> Result<()> {
     let out = root().join("target/bindings-agree");
-    run(cargo()
-        .args([
-            "run",
-            "-q",
-            "--release",
-            "-p",
-            "host-sim",
-            "--",
-            "run",
-            SCENARIO,
-            "--bus-log",
-            "--out",
-        ])
+    run(command(&built.host_sim()?.to_string_lossy())
+        .args(["run", SCENARIO, "--bus-log", "--out"])
         .arg(&out)
         .stdout(Stdio::null()))?;
     let bus = read(&out.join("bus.log"))?;
     let expected: Vec<&str> = bus.lines().filter(|line| !is_input(line)).collect();
-    let python = wheel::python()?;
-    let mut in_python = command(&python.to_string_lossy());
+    let mut in_python = python::with_package(built)?;
     in_python.arg("bindings/python/replay.py");
-    let mut simulated = command(&python.to_string_lossy());
+    let mut simulated = python::with_package(built)?;
     simulated.arg("bindings/python/simulated.py").arg(SCENARIO);
-    let in_c = command(&c_library::replay()?.to_string_lossy());
+    let in_c = command(&c_library::replay(built)?.to_string_lossy());
     println!("{SCENARIO}, frames that the controller sent\n");
     println!("{:<20} {:>9} {:>9}", "door", "frames", "differing");
     println!("{:<20} {:>9} {:>9}", "command line", expected.len(), "-");
@@ -65,9 +53,8 @@ pub(crate) fn check() -> Result<()> {
     let (frames, wrong) = compared(&web::replayed(&in_file)?, &expected);
     row("WebAssembly", frames, wrong);
     // The units take SI values and give SI values: torque, limit and mode of each guidance frame.
-    fmu::build()?;
-    run(command(&python.to_string_lossy()).args(["-m", "pip", "install", "-q", "fmpy"]))?;
-    let mut in_fmus = command(&python.to_string_lossy());
+    fmu::build(built)?;
+    let mut in_fmus = python::with_package(built)?;
     in_fmus
         .arg("bindings/fmu/agree.py")
         .arg(root().join("target/dist"));

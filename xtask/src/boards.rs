@@ -14,7 +14,7 @@ use crate::image::{self, Image, M4F};
 use crate::longest;
 use crate::seal;
 use crate::size;
-use crate::tool::{self, Usage, cargo, run};
+use crate::tool::{self, Built, Usage, cargo, run};
 
 /// Length of the guard below the stack (`firmware/src/stack.rs`): a larger frame could step over it.
 const GUARD: u64 = 4096;
@@ -101,19 +101,38 @@ pub(crate) struct Hil {
     no_flash: bool,
 }
 
-/// Every board without a warning, its torque path without panic and float, and its figures as the golden file has
-/// them.
-pub(crate) fn check(bless: bool) -> Result<()> {
+/// Whose images are built.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Those of QEMU's machines. The other boards' code is compiled as far as lints go.
+    Qemu,
+    All,
+}
+
+/// Every board without a warning; the torque path of the images without panic and float, and their figures as the golden file
+/// has them.
+pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
     tool::ensure(&[("qemu-system-arm", "qemu-system-arm")])?;
     let mut figures = Vec::new();
     for board in Board::value_variants() {
         let name = board.feature();
-        let package = ["clippy", "--release", "-p", "haptic-firmware", "--bins", "--lib"];
+        let package = [
+            "clippy",
+            "--profile",
+            "firmware",
+            "-p",
+            "haptic-firmware",
+            "--bins",
+            "--lib",
+        ];
         run(cargo()
             .args(package)
             .args(["--target", M4F, "--features", name])
             .args(["--", "-D", "warnings"]))
         .with_context(|| name.to_owned())?;
+        if scope == Scope::Qemu && board.chip().is_some() {
+            continue;
+        }
         for (image, roots) in [(Image::Lockstep, CONTROLLER), (Image::SteeringEcu, PRODUCT)] {
             let built =
                 of_image(&board.build(image)?, roots).with_context(|| format!("{name}, {}", image.bin()))?;
@@ -124,7 +143,7 @@ pub(crate) fn check(bless: bool) -> Result<()> {
             }
         }
         if board.chip().is_none() {
-            figures.extend(in_qemu(*board)?.into_iter().map(|figure| figure.of(name)));
+            figures.extend(in_qemu(*board, built)?.into_iter().map(|figure| figure.of(name)));
         }
     }
     for figure in figures.iter().filter(|figure| figure.name.ends_with(" step")) {
@@ -195,10 +214,10 @@ fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
 /// What a whole run over paper-course takes in QEMU, every frame of it compared: the stack that the lockstep image
 /// ever used, and instructions of a step, which is every `Ecu::receive` of a tick, `Ecu::step` and `Ecu::background_step`. The
 /// probe is on, so that the estimator works.
-fn in_qemu(board: Board) -> Result<Vec<Figure>> {
+fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     let text = tool::output(
-        tool::cargo()
-            .args(["run", "--release", "-p", "host-sim", "--", "pil"])
+        tool::command(&built.host_sim()?.to_string_lossy())
+            .arg("pil")
             .args(["--machine", board.feature(), "--count", "--json"])
             .arg("examples/live-estimate.toml"),
     )?;
@@ -247,7 +266,7 @@ pub(crate) fn bench(board: Board) -> Result<()> {
     if board.chip().is_some() {
         return run_on(board, Image::SteeringEcu);
     }
-    for figure in in_qemu(board)? {
+    for figure in in_qemu(board, Built::ToShip)? {
         println!("{:<30}{:>10} {}", figure.name, figure.value, figure.unit);
     }
     Ok(())
@@ -255,8 +274,8 @@ pub(crate) fn bench(board: Board) -> Result<()> {
 
 /// The comparison of `host-sim pil`, with the board in QEMU's place.
 pub(crate) fn hil(options: &Hil) -> Result<()> {
-    let mut pil = cargo();
-    pil.args(["run", "--release", "-q", "-p", "host-sim", "--", "pil"]);
+    let mut pil = tool::command(&Built::ToShip.host_sim()?.to_string_lossy());
+    pil.arg("pil");
     match (&options.can, options.board.chip()) {
         (None, None) => pil.args(["--machine", options.board.feature()]),
         (None, Some(_)) => {
@@ -279,7 +298,7 @@ pub(crate) fn hil(options: &Hil) -> Result<()> {
             pil.args(["--can", adapter])
         }
     };
-    let status = pil.status().context("cargo does not start")?;
+    let status = pil.status().context("host-sim does not start")?;
     match status.code() {
         Some(0) => Ok(()),
         // What was wrong is on the terminal.

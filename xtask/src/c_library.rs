@@ -6,7 +6,7 @@ use std::process::Stdio;
 use anyhow::{Context, Result, bail};
 
 use crate::image::M4F;
-use crate::tool::{cargo, command, ensure, output, root, run};
+use crate::tool::{Built, cargo, command, ensure, output, root, run};
 
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Werror", "-pedantic"];
 const CORTEX_M4F: [&str; 4] = [
@@ -19,7 +19,7 @@ const CORTEX_M4F: [&str; 4] = [
 const HOST_LIBRARIES: [&str; 4] = ["-lpthread", "-ldl", "-lm", "-lgcc_s"];
 
 /// Builds everything into `target/dist/c`, and compares the example's words on host and target.
-pub(crate) fn check() -> Result<()> {
+pub(crate) fn check(built: Built) -> Result<()> {
     ensure(&[
         ("gcc", "gcc"),
         ("g++", "g++"),
@@ -33,8 +33,8 @@ pub(crate) fn check() -> Result<()> {
         root().join("bindings/c/include/haptic_guidance.h"),
         dist.join("haptic_guidance.h"),
     )?;
-    let host = library(&dist, None)?;
-    let target = library(&dist, Some(M4F))?;
+    let host = host_library(&dist, built)?;
+    let target = target_library(&dist)?;
     header()?;
     let native = output(&mut command(&example(&dist, "main", &host)?.to_string_lossy()))?;
     print!("{native}");
@@ -59,20 +59,25 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// The static library of a target, put where users look.
-fn library(dist: &Path, target: Option<&str>) -> Result<PathBuf> {
-    let mut build = cargo();
-    build.args(["build", "--release", "-p", "haptic-c"]);
-    let mut built = root().join("target");
-    if let Some(target) = target {
-        build.args(["--target", target]);
-        built.push(target);
-    }
-    run(&mut build)?;
-    let folder = dist.join(target.unwrap_or("host"));
-    std::fs::create_dir_all(&folder)?;
-    let library = folder.join("libhaptic_guidance.a");
-    std::fs::copy(built.join("release/libhaptic_guidance.a"), &library)?;
+const LIBRARY: &str = "libhaptic_guidance.a";
+
+fn host_library(dist: &Path, built: Built) -> Result<PathBuf> {
+    put(&built.package("haptic-c")?.join(LIBRARY), &dist.join("host"))
+}
+
+fn target_library(dist: &Path) -> Result<PathBuf> {
+    run(cargo().args(["build", "--profile", "dist", "-p", "haptic-c", "--target", M4F]))?;
+    put(
+        &root().join("target").join(M4F).join("dist").join(LIBRARY),
+        &dist.join(M4F),
+    )
+}
+
+/// A library where users look for it.
+fn put(built: &Path, folder: &Path) -> Result<PathBuf> {
+    std::fs::create_dir_all(folder)?;
+    let library = folder.join(LIBRARY);
+    std::fs::copy(built, &library).with_context(|| built.display().to_string())?;
     Ok(library)
 }
 
@@ -103,10 +108,10 @@ pub(crate) fn example(dist: &Path, name: &str, library: &Path) -> Result<PathBuf
 }
 
 /// The host's library and the replaying example.
-pub(crate) fn replay() -> Result<PathBuf> {
+pub(crate) fn replay(built: Built) -> Result<PathBuf> {
     let dist = root().join("target/dist/c");
     std::fs::create_dir_all(&dist)?;
-    let library = library(&dist, None)?;
+    let library = host_library(&dist, built)?;
     example(&dist, "replay", &library)
 }
 

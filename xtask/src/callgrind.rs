@@ -38,7 +38,8 @@ pub(crate) fn build_closed_loop() -> Result<String> {
 pub(crate) fn build(example: &str) -> Result<String> {
     let elf = crate::image::elf_of(tool::cargo().args([
         "build",
-        "--release",
+        "--profile",
+        "dist",
         "-p",
         "haptic-guidance",
         "--example",

@@ -1,137 +1,458 @@
-//! Everything that CI checks. The tests come last, so that a log ends with their results; what failed before
-//! them is named before they start. The quick tier is for daily work: what needs no QEMU, no valgrind and no C compiler.
+//! Everything that CI checks, as stages: `cargo xtask ci --list` prints them.
+//!
+//! All tests are one shape of compilation, [`tool::SHAPE`], and what else needs a program of the workspace takes it from there.
+//! After it is built two stages run at a time, because most leave one of two cores idle. What a stage prints goes to
+//! `target/ci/STAGE.log`, and to the terminal where it fails.
 
-use std::time::Instant;
+use std::collections::VecDeque;
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::process::Command;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
 
 use crate::image::{BOARD, M4F};
-use crate::tool::{cargo, ensure, run};
+use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
-    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, trace, web, wheel,
+    bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, profiles, python, trace,
+    web, wheel,
 };
 
-/// Format, clippy, documentation, unit tests and doctests of the libraries: minutes, and no tool but cargo.
-pub(crate) fn run_quick() -> Result<()> {
-    let mut failed = check_all(&[
-        ("format", &format),
-        ("clippy", &clippy),
-        ("documentation", &documentation),
-    ]);
-    for (name, arguments) in [
-        ("tests of the libraries", "--workspace --exclude xtask --lib"),
-        (
-            "tests of the core and the log",
-            "-p haptic-core -p haptic-log --tests",
-        ),
-        ("doctests", "--workspace --exclude xtask --doc"),
-    ] {
-        let arguments = arguments.split(' ').chain(["--no-fail-fast"]);
-        let test = || run(cargo().arg("test").args(arguments.clone()));
-        failed.extend(check_all(&[(name, &test)]));
+/// Which stages run.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Also what a release needs, which takes hours
+    #[arg(long)]
+    full: bool,
+    /// Only this stage; may be given again
+    #[arg(long, value_name = "STAGE")]
+    only: Vec<String>,
+    /// Print the stages, and run none
+    #[arg(long)]
+    list: bool,
+    /// Run the stages one after the other, in this process, on the terminal
+    #[arg(long, hide = true)]
+    here: bool,
+}
+
+/// When a stage has its turn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum When {
+    /// First, one after the other: what others need.
+    Before,
+    /// Two at a time.
+    Beside,
+    /// For a release alone.
+    Full,
+}
+
+struct Stage {
+    name: &'static str,
+    what: &'static str,
+    when: When,
+    run: fn() -> Result<()>,
+}
+
+const fn stage(name: &'static str, when: When, what: &'static str, run: fn() -> Result<()>) -> Stage {
+    Stage {
+        name,
+        what,
+        when,
+        run,
     }
-    finish(&failed)
+}
+
+/// In this order. Long ones begin early, so that none is left alone at the end.
+const STAGES: &[Stage] = &[
+    stage("format", When::Before, "cargo fmt", format),
+    stage(
+        "build",
+        When::Before,
+        "every library, program and test, once",
+        build,
+    ),
+    stage(
+        "tests",
+        When::Beside,
+        "every test of the workspace and its documents",
+        tests,
+    ),
+    stage("clippy", When::Beside, "lints of the workspace", clippy),
+    stage(
+        "boards",
+        When::Beside,
+        "lints of every board's image; QEMU's boards compared frame by frame, with their figures",
+        || boards::check(boards::Scope::Qemu, Built::ForTests, false),
+    ),
+    stage("page", When::Beside, "the lab, in a headless Chromium", || {
+        web::check(Built::ForTests)
+    }),
+    stage(
+        "python",
+        When::Beside,
+        "the Python package, its README and its examples",
+        || python::check(Built::ForTests),
+    ),
+    stage(
+        "gate",
+        When::Beside,
+        "no panic, no wrap and no float in the torque path",
+        gate::run,
+    ),
+    stage(
+        "recordings",
+        When::Beside,
+        "files of other tools, read and written by these tools",
+        || logs::check(Built::ForTests),
+    ),
+    stage(
+        "documentation",
+        When::Beside,
+        "cargo doc without a warning",
+        documentation,
+    ),
+    stage("fmu", When::Beside, "the FMUs, judged by FMPy", || {
+        fmu::check(Built::ForTests)
+    }),
+    stage(
+        "c",
+        When::Beside,
+        "the C library and its header, on the host and in QEMU",
+        || c_library::check(Built::ForTests),
+    ),
+    stage(
+        "bindings-agree",
+        When::Beside,
+        "the same frames from every binding",
+        || bindings_agree::check(Built::ForTests),
+    ),
+    stage(
+        "requirements",
+        When::Beside,
+        "every requirement has its evidence",
+        || trace::run(false),
+    ),
+    stage("xtask", When::Beside, "tests of xtask itself", xtask_tests),
+    stage(
+        "all-boards",
+        When::Full,
+        "the images of all boards, with their figures",
+        || boards::check(boards::Scope::All, Built::ForTests, false),
+    ),
+    stage(
+        "wheel",
+        When::Full,
+        "the wheel as it is handed on, installed and tested",
+        || wheel::build(&wheel::Options::tested()),
+    ),
+    stage(
+        "fmu-shipped",
+        When::Full,
+        "the FMUs as they are handed on",
+        || fmu::check(Built::ToShip),
+    ),
+    stage(
+        "c-shipped",
+        When::Full,
+        "the C library as it is handed on",
+        || c_library::check(Built::ToShip),
+    ),
+    stage("page-shipped", When::Full, "the page as it is handed on", || {
+        web::check(Built::ToShip)
+    }),
+    stage(
+        "same-bits",
+        When::Full,
+        "an evaluation in every profile: the same bytes",
+        profiles::check,
+    ),
+    stage(
+        "instructions",
+        When::Full,
+        "instructions of a step on the host, against xtask/golden.json",
+        || bench::run(false),
+    ),
+    stage(
+        "coverage",
+        When::Full,
+        "every line and branch of core",
+        evidence::coverage,
+    ),
+    stage(
+        "defects-by-hand",
+        When::Full,
+        "defects made by hand in core: each is noticed",
+        by_hand::run,
+    ),
+    stage(
+        "mutants",
+        When::Full,
+        "a defect in every expression of core: each is noticed",
+        || evidence::mutants(&[], None),
+    ),
+    stage(
+        "fuzz",
+        When::Full,
+        "a million inputs for every reader, a thousand million bytes for the ECU",
+        fuzz,
+    ),
+    stage(
+        "campaign",
+        When::Full,
+        "every fault, 500 seeds, in every world",
+        campaign,
+    ),
+    stage(
+        "sanitised",
+        When::Full,
+        "core, log and C library with AddressSanitizer",
+        sanitised,
+    ),
+    stage(
+        "speed",
+        When::Full,
+        "the benchmarks, against C, NumPy and SciPy",
+        speed,
+    ),
+];
+
+/// Runs what is asked for; an error names the stages that failed.
+pub(crate) fn check(options: &Options) -> Result<()> {
+    if options.list {
+        for stage in STAGES {
+            let when = if stage.when == When::Full { "--full" } else { "" };
+            println!("{:<16} {when:<7} {}", stage.name, stage.what);
+        }
+        return Ok(());
+    }
+    for name in &options.only {
+        if STAGES.iter().all(|stage| stage.name != name) {
+            return Err(tool::Usage(format!(
+                "--only {name}: no such stage; cargo xtask ci --list names them"
+            ))
+            .into());
+        }
+    }
+    let is_wanted = |stage: &&Stage| match options.only.as_slice() {
+        [] => options.full || stage.when != When::Full,
+        only => only.iter().any(|name| name == stage.name),
+    };
+    let wanted: Vec<&Stage> = STAGES.iter().filter(is_wanted).collect();
+    if options.here || wanted.len() == 1 {
+        return wanted.iter().try_for_each(|stage| (stage.run)());
+    }
+    let begin = Instant::now();
+    let packages = std::thread::spawn(prepare);
+    let mut failed: Vec<&str> = Vec::new();
+    let (before, beside): (Vec<&Stage>, Vec<&Stage>) =
+        wanted.into_iter().partition(|stage| stage.when == When::Before);
+    for stage in before {
+        if !in_its_own_process(stage, begin) {
+            failed.push(stage.name);
+        }
+    }
+    if failed.contains(&"build") {
+        bail!("failed: build");
+    }
+    packages
+        .join()
+        .map_err(|_| anyhow::anyhow!("the installation panicked"))??;
+    let queue = Mutex::new(VecDeque::from(beside));
+    let late = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while let Some(stage) = { queue.lock().ok().and_then(|mut queue| queue.pop_front()) } {
+                    if !in_its_own_process(stage, begin) {
+                        late.lock()
+                            .map(|mut late| late.push(stage.name))
+                            .unwrap_or_default();
+                    }
+                }
+            });
+        }
+    });
+    failed.extend(late.into_inner().unwrap_or_default());
+    print_count();
+    println!("{} s in all", begin.elapsed().as_secs());
+    ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
+    Ok(())
+}
+
+/// Runs a stage with its output in its log; says how long it took, and where it failed what it printed.
+fn in_its_own_process(stage: &Stage, begin: Instant) -> bool {
+    let since = || clock(begin.elapsed());
+    println!("{} {}: {}", since(), stage.name, stage.what);
+    let start = Instant::now();
+    let log = log_of(stage.name);
+    let ended = run_logged(stage.name, &log);
+    let seconds = start.elapsed().as_secs();
+    match ended {
+        Ok(()) => println!("{} {}: passed in {seconds} s", since(), stage.name),
+        Err(error) => {
+            let text = fs::read_to_string(&log).unwrap_or_default();
+            let lines: Vec<&str> = text.lines().collect();
+            let tail = &lines[lines.len().saturating_sub(150)..];
+            println!(
+                "{} {}: FAILED after {seconds} s: {error:#}\n--- the end of {}\n{}\n--- {}",
+                since(),
+                stage.name,
+                log.display(),
+                tail.join("\n"),
+                stage.name
+            );
+            return false;
+        }
+    }
+    true
+}
+
+fn log_of(name: &str) -> std::path::PathBuf {
+    root().join("target/ci").join(format!("{name}.log"))
+}
+
+fn run_logged(name: &str, log: &std::path::Path) -> Result<()> {
+    fs::create_dir_all(root().join("target/ci"))?;
+    let file = File::create(log).with_context(|| log.display().to_string())?;
+    let this = std::env::current_exe().context("the path of xtask")?;
+    run(Command::new(this)
+        .current_dir(root())
+        .args(["ci", "--here", "--only", name])
+        .stderr(file.try_clone()?)
+        .stdout(file))
+}
+
+fn clock(elapsed: Duration) -> String {
+    format!("{:>3}:{:02}", elapsed.as_secs() / 60, elapsed.as_secs() % 60)
+}
+
+/// Tests of Rust and of Python that passed and failed, as one line.
+fn print_count() {
+    let (mut passed, mut failed) = (0, 0);
+    for name in ["tests", "xtask", "python"] {
+        let text = fs::read_to_string(log_of(name)).unwrap_or_default();
+        for line in text
+            .lines()
+            .filter(|line| line.starts_with("test result:") || line.contains(" passed"))
+        {
+            let words: Vec<&str> = line
+                .split([' ', ';', ',', '.'])
+                .filter(|word| !word.is_empty())
+                .collect();
+            for pair in words.windows(2) {
+                match (pair[0].parse::<u64>(), pair[1]) {
+                    (Ok(count), "passed") => passed += count,
+                    (Ok(count), "failed") => failed += count,
+                    _ => {}
+                }
+            }
+        }
+    }
+    let _ = writeln!(std::io::stdout(), "{passed} passed, {failed} failed");
+}
+
+/// Packages of Debian and of Python that stages need, while the workspace is built.
+fn prepare() -> Result<()> {
+    tool::ensure(&[
+        ("qemu-system-arm", "qemu-system-arm"),
+        ("gcc", "gcc"),
+        ("g++", "g++"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+        ("python3", "python3"),
+        ("python3", "python3-venv"),
+        ("chromium", "chromium"),
+        ("valgrind", "valgrind"),
+    ])?;
+    python::environment().map(drop)
 }
 
 fn format() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))
 }
 
+fn build() -> Result<()> {
+    run(cargo().arg("build").args(SHAPE))?;
+    run(cargo().arg("test").args(SHAPE).arg("--no-run"))
+}
+
+/// With the doctests of every library.
+fn tests() -> Result<()> {
+    run(cargo().arg("test").args(SHAPE).arg("--no-fail-fast"))
+}
+
+/// Apart, because the log decoder switches on features of serde_json that host-sim does not ship with.
+fn xtask_tests() -> Result<()> {
+    run(cargo().args(["test", "--release", "-p", "xtask"]))
+}
+
 fn clippy() -> Result<()> {
-    run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+    let lints = ["clippy", "--release", "--workspace", "--all-targets"];
+    run(cargo().args(lints).args(["--", "-D", "warnings"]))?;
+    // The reference board's images, those that break themselves too.
+    let features = format!("{BOARD},gate,broken,bench");
+    run(cargo()
+        .args([
+            "clippy",
+            "--profile",
+            "firmware",
+            "-p",
+            "haptic-firmware",
+            "--bins",
+            "--lib",
+        ])
+        .args(["--target", M4F, "--features", &features])
+        .args(["--", "-D", "warnings"]))
 }
 
 /// A link that leads nowhere is an error.
 fn documentation() -> Result<()> {
     run(cargo()
-        .args(["doc", "--workspace", "--no-deps"])
+        .args(["doc", "--release", "--workspace", "--no-deps"])
         .env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Runs checks one after the other; the names of those that failed.
-fn check_all<'a>(checks: &[(&'a str, &dyn Fn() -> Result<()>)]) -> Vec<&'a str> {
-    let mut failed = Vec::new();
-    for (name, check) in checks {
-        println!("== {name}");
-        let begin = Instant::now();
-        if let Err(error) = check() {
-            eprintln!("error: {name}: {error:#}");
-            failed.push(*name);
-        }
-        println!("== {name}: {} s", begin.elapsed().as_secs());
-    }
-    failed
+fn fuzz() -> Result<()> {
+    run(cargo()
+        .args(["test", "--release", "-p", "haptic-core", "fuzz::"])
+        .env("HAPTIC_FUZZ_BYTES", "1000000000"))
 }
 
-fn finish(failed: &[&str]) -> Result<()> {
-    if !failed.is_empty() {
-        bail!("failed: {}", failed.join(", "));
+fn campaign() -> Result<()> {
+    for world in ["calibrated", "everything", "braking"] {
+        run(command(&Built::ForTests.host_sim()?.to_string_lossy())
+            .args(["faults", "--seeds", "500", "--world", world]))?;
     }
     Ok(())
 }
 
-/// Everything.
-pub(crate) fn run_all() -> Result<()> {
-    ensure(&[
-        ("qemu-system-arm", "qemu-system-arm"),
-        ("valgrind", "valgrind"),
-        ("gcc", "gcc"),
-        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
-        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
-        ("g++", "g++"),
-        // For the examples of the documents.
-        ("python3", "python3"),
-        ("python3", "python3-venv"),
-    ])?;
-    let target_features = format!("{BOARD},gate,broken,bench");
-    let mut failed = check_all(&[
-        ("format", &format),
-        ("clippy", &clippy),
-        ("clippy of the images", &|| {
-            let package = ["clippy", "--release", "-p", "haptic-firmware", "--bins", "--lib"];
-            let target = [
-                "--target",
-                M4F,
-                "--features",
-                &target_features,
-                "--",
-                "-D",
-                "warnings",
-            ];
-            run(cargo().args(package).args(target))
-        }),
-        ("documentation", &documentation),
-        ("requirements", &|| trace::run(false)),
-        ("gate", &gate::run),
-        // Compares every frame of a whole run on each of QEMU's boards on the way.
-        ("boards", &|| boards::check(false)),
-        ("instructions on the host", &|| bench::run(false)),
-        ("Python wheel", &|| wheel::build(&wheel::Options::tested())),
-        ("C library", &c_library::check),
-        ("recordings", &logs::check),
-        ("FMUs", &fmu::check),
-        ("lab in the browser", &web::check),
-        ("bindings agree", &bindings_agree::check),
-        ("coverage of the core", &evidence::coverage),
-        ("defects made by hand", &by_hand::run),
-        ("defects in the last change", &evidence::mutants_of_last_commit),
-    ]);
-    if !failed.is_empty() {
-        eprintln!("== failed: {}; the tests follow", failed.join(", "));
+/// AddressSanitizer is an option that the compiler calls unstable; for a test alone that is no risk.
+fn sanitised() -> Result<()> {
+    let target = "x86_64-unknown-linux-gnu";
+    run(cargo()
+        .args([
+            "test",
+            "--release",
+            "-p",
+            "haptic-core",
+            "-p",
+            "haptic-log",
+            "--lib",
+            "--tests",
+        ])
+        .args(["--target", target])
+        .env("RUSTC_BOOTSTRAP", "1")
+        .env("RUSTFLAGS", "-Zsanitizer=address")
+        .env("CARGO_TARGET_DIR", root().join("target/sanitised")))
+}
+
+fn speed() -> Result<()> {
+    let this = std::env::current_exe().context("the path of xtask")?;
+    for what in ["speed", "identify"] {
+        run(Command::new(&this).current_dir(root()).args(["bench", what]))?;
     }
-    failed.extend(check_all(&[
-        // About ten seconds for each of its targets.
-        ("fuzz", &|| {
-            run(cargo()
-                .args(["test", "-p", "haptic-core", "--test", "fuzz"])
-                .env("HAPTIC_FUZZ_BYTES", "60000000"))
-        }),
-        // Apart, because the log decoder switches on features of serde_json that host-sim does not ship with.
-        ("tests of xtask", &|| run(cargo().args(["test", "-p", "xtask"]))),
-        // With the doctests of every library.
-        ("tests", &|| {
-            run(cargo().args(["test", "--workspace", "--exclude", "xtask", "--no-fail-fast"]))
-        }),
-    ]));
-    finish(&failed)
+    Ok(())
 }

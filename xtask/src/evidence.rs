@@ -1,5 +1,4 @@
-//! What the core's tests reach, and what they would notice: coverage and mutation. The whole mutation takes hours; CI tries
-//! a sample of what the last commit changed.
+//! What the core's tests reach, and what they would notice: coverage and mutation. The whole mutation takes hours.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -167,33 +166,6 @@ fn missed_branches(export: &Value) -> Result<Vec<String>> {
     Ok(one_way.map(|(place, _)| place).collect())
 }
 
-/// So many defects of a change does CI try: each is a build and a test.
-const SAMPLE: usize = 12;
-
-/// A sample of the defects in what the last commit changed in core, another sample for another commit. Nothing where the
-/// history is not there, as in a download of the sources.
-pub(crate) fn mutants_of_last_commit() -> Result<()> {
-    let git = |arguments: &[&str]| {
-        let output = tool::command("git").args(arguments).output();
-        let output = output.ok().filter(|output| output.status.success())?;
-        String::from_utf8(output.stdout).ok()
-    };
-    let Some(changed) = git(&["diff", "--name-only", "HEAD~1", "--", "core/src"]) else {
-        println!("no commit before this one: nothing to compare with");
-        return Ok(());
-    };
-    if changed.trim().is_empty() {
-        println!("the last commit changed nothing in core");
-        return Ok(());
-    }
-    if !tool::exists("cargo-mutants") {
-        run(cargo().args(["install", "--locked", "cargo-mutants", "--version", "27.1.0"]))?;
-    }
-    let commit = git(&["rev-parse", "--short=6", "HEAD"]).unwrap_or_default();
-    let seed = usize::from_str_radix(commit.trim(), 16).unwrap_or_default();
-    mutate(&|_| true, Some("HEAD~1"), Some(seed))
-}
-
 /// A defect in each expression of the core, or of some of its files, or only in lines that differ from `base`; an error
 /// names those that no test notices.
 pub(crate) fn mutants(files: &[String], base: Option<&str>) -> Result<()> {
@@ -209,15 +181,11 @@ pub(crate) fn mutants(files: &[String], base: Option<&str>) -> Result<()> {
         );
     }
     let wanted = |file: &str| files.is_empty() || files.iter().any(|wanted| wanted == file);
-    mutate(&wanted, base, None)
+    mutate(&wanted, base)
 }
 
-/// `cargo mutants` for a file, with the tests that must notice; None where it does not differ from `base`.
-fn command_for(
-    file: &str,
-    tests: &[&str],
-    base: Option<&str>,
-) -> Result<Option<(PathBuf, std::process::Command)>> {
+/// `cargo mutants` for a file; None where it does not differ from `base`.
+fn command_for(file: &str, base: Option<&str>) -> Result<Option<(PathBuf, std::process::Command)>> {
     let source = format!("core/src/{file}");
     let place = tool::root().join("target/mutants").join(file.replace('/', "-"));
     fs::create_dir_all(&place)?;
@@ -227,10 +195,9 @@ fn command_for(
         .args(["-f", &source])
         .arg("--output")
         .arg(&place)
-        .arg("--cargo-arg=--lib")
+        .args(["--cargo-arg=--lib", "--cargo-arg=--test=all"])
         // Each file is tried in a copy of the sources; what they depend on is built once.
-        .env("CARGO_TARGET_DIR", tool::root().join("target/mutants/build"))
-        .args(tests.iter().map(|test| format!("--cargo-arg=--test={test}")));
+        .env("CARGO_TARGET_DIR", tool::root().join("target/mutants/build"));
     if let Some(base) = base {
         let difference = tool::output(tool::command("git").args(["diff", base, "--", &source]))?;
         if difference.is_empty() {
@@ -243,29 +210,19 @@ fn command_for(
     Ok(Some((place, command)))
 }
 
-/// All of them, or [`SAMPLE`] that a number picks.
-fn mutate(wanted: &dyn Fn(&str) -> bool, base: Option<&str>, sample: Option<usize>) -> Result<()> {
+fn mutate(wanted: &dyn Fn(&str) -> bool, base: Option<&str>) -> Result<()> {
     let files = || MUTATED.iter().filter(|(file, _)| wanted(file));
-    let shard = match sample {
-        Some(seed) => {
-            let mut count = 0;
-            for (file, tests) in files() {
-                if let Some((_, mut command)) = command_for(file, tests, base)? {
-                    count += tool::output(command.arg("--list"))?.lines().count();
-                }
-            }
-            let shards = count.div_ceil(SAMPLE).max(1);
-            println!("{count} defects in what changed, of which every {shards}th is tried");
-            Some(format!("--shard={}/{shards}", seed % shards))
-        }
-        None => None,
-    };
     let mut survivors = Vec::new();
     for (file, tests) in files() {
-        let Some((place, mut command)) = command_for(file, tests, base)? else {
+        let Some((place, mut command)) = command_for(file, base)? else {
             continue;
         };
-        command.args(&shard);
+        // Only those that must notice it, and the file's own unit tests.
+        let stem = file.trim_end_matches(".rs").rsplit('/').next().unwrap_or(file);
+        let modules = tests.iter().copied().chain([stem]);
+        command
+            .args(["--", "--"])
+            .args(modules.map(|module| format!("{module}::")));
         println!("== {file}");
         // A difference that holds nothing to mutate leaves the lists of an earlier run alone.
         let _ = fs::remove_dir_all(place.join("mutants.out"));

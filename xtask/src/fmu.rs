@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::tool::{cargo, command, exists, output, root, run};
-use crate::wheel;
+use crate::python;
+use crate::tool::{Built, cargo, command, exists, output, root, run};
 
 /// A relying driver on the paper's course, as bindings/fmu/check.py couples it.
 const SCENARIO: &str = "speed = 60\ncondition = \"mid\"\n[driver]\nt_p = 0.3\n";
@@ -14,21 +14,18 @@ const LINKER: &str = "x86_64-w64-mingw32-gcc";
 
 /// Builds every model for FMI 2.0 (`NAME.fmu`) and 3.0 (`NAME.fmi3.fmu`) into `target/dist`, and has FMPy judge them: alone, and
 /// the three together against `host-sim run`.
-pub(crate) fn check() -> Result<()> {
-    let fmus = build()?;
+pub(crate) fn check(built: Built) -> Result<()> {
+    let fmus = build(built)?;
     let run_directory = root().join("target/fmu/run");
     let scenario = root().join("target/fmu/coupled.toml");
     std::fs::write(&scenario, SCENARIO)?;
-    run(cargo()
-        .args(["run", "-q", "--release", "-p", "host-sim", "--", "run"])
+    run(command(&built.host_sim()?.to_string_lossy())
+        .arg("run")
         .arg(&scenario)
         .arg("--out")
         .arg(&run_directory)
         .stdout(std::process::Stdio::null()))?;
-    let python = wheel::python()?;
-    let python = python.to_string_lossy();
-    run(command(&python).args(["-m", "pip", "install", "-q", "fmpy"]))?;
-    run(command(&python)
+    run(python::with_package(built)?
         .arg("bindings/fmu/check.py")
         .arg(root().join("target/dist"))
         .arg(run_directory.join("run.csv")))?;
@@ -39,27 +36,22 @@ pub(crate) fn check() -> Result<()> {
 }
 
 /// The binaries that can be built here, with where each standard wants them and the extension.
-fn binaries() -> Result<Vec<(PathBuf, [&'static str; 2], &'static str)>> {
-    run(cargo().args(["build", "--release", "-p", "haptic-fmu"]))?;
-    let target = root().join("target");
-    let linux = (
-        target.join("release/libhaptic_fmu.so"),
-        ["linux64", "x86_64-linux"],
-        "so",
-    );
+fn binaries(native: &Path) -> Result<Vec<(PathBuf, [&'static str; 2], &'static str)>> {
+    let linux = (native.join("libhaptic_fmu.so"), ["linux64", "x86_64-linux"], "so");
     let mut made = vec![linux];
     let targets = output(command("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     if targets.lines().any(|line| line == WINDOWS) && exists(LINKER) {
         run(cargo().args([
             "build",
-            "--release",
+            "--profile",
+            "dist",
             "-p",
             "haptic-fmu",
             "--lib",
             "--target",
             WINDOWS,
         ]))?;
-        let dll = target.join(WINDOWS).join("release/haptic_fmu.dll");
+        let dll = root().join("target").join(WINDOWS).join("dist/haptic_fmu.dll");
         made.push((dll, ["win64", "x86_64-windows"], "dll"));
     } else {
         println!(
@@ -69,9 +61,10 @@ fn binaries() -> Result<Vec<(PathBuf, [&'static str; 2], &'static str)>> {
     Ok(made)
 }
 
-pub(crate) fn build() -> Result<Vec<PathBuf>> {
-    let binaries = binaries()?;
-    let describe = root().join("target/release/model-description");
+pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
+    let native = built.package("haptic-fmu")?;
+    let binaries = binaries(&native)?;
+    let describe = native.join("model-description");
     let describe = describe.to_string_lossy();
     let models = output(&mut command(&describe))?;
     let dist = root().join("target/dist");

@@ -93,7 +93,7 @@ fn injection_leaves_nothing() -> Result<()> {
 
 fn gate(feature: &str, target: &str) -> std::process::Command {
     let mut command = build_command("gate", target, &format!("{BOARD},{feature}"));
-    command.args(["--config", "profile.release.overflow-checks=true"]);
+    command.args(["--config", "profile.firmware.overflow-checks=true"]);
     command
 }
 

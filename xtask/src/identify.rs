@@ -17,7 +17,16 @@ pub(crate) fn run() -> Result<()> {
     let python = speed::build_venv()?;
     tool::output(
         tool::cargo()
-            .args(["run", "--release", "-q", "-p", "host-sim", "--", "experiment"])
+            .args([
+                "run",
+                "--profile",
+                "dist",
+                "-q",
+                "-p",
+                "host-sim",
+                "--",
+                "experiment",
+            ])
             .args([
                 "--participants",
                 "5",

@@ -38,7 +38,7 @@ impl Image {
 /// nothing reaches.
 pub(crate) fn build_command(bin: &str, target: &str, features: &str) -> Command {
     let profile = if features.split(',').any(|feature| feature.ends_with("-sensors")) {
-        "release"
+        "firmware-thin"
     } else {
         "firmware"
     };

@@ -2,30 +2,20 @@
 
 use anyhow::Result;
 
-use crate::tool::{cargo, command, root, run};
-use crate::wheel::environment;
+use crate::python;
+use crate::tool::{Built, command, root, run};
 
 const SCENARIO: &str = "examples/relying-driver.toml";
 const DRIVE: &str = "tests/data/driver-logs/guided-passive.csv";
-const PACKAGES: [&str; 7] = [
-    "asammdf",
-    "cantools",
-    "mcap",
-    "pandas",
-    "pyarrow",
-    "python-can",
-    "scipy",
-];
 /// Of a whole run: enough for every message, and seconds instead of minutes in Python.
 const ROWS: usize = 4000;
 const FRAMES: usize = 40_000;
 
 /// Writes with one side and reads with the other, both ways.
-pub(crate) fn check() -> Result<()> {
+pub(crate) fn check(built: Built) -> Result<()> {
     let place = root().join("target/logs");
     std::fs::create_dir_all(&place)?;
-    run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
-    let host_sim = root().join("target/release/host-sim");
+    let host_sim = built.host_sim()?;
     let whole = place.join("run");
     run(command(&host_sim.to_string_lossy())
         .args(["run", SCENARIO, "--bus-log", "--out"])
@@ -42,12 +32,7 @@ pub(crate) fn check() -> Result<()> {
         Ok(short)
     };
     let (csv, bus) = (head("run.csv", ROWS)?, head("bus.log", FRAMES)?);
-    let python = environment(&root().join("target/python/peers"))?;
-    let python = python.to_string_lossy();
-    run(command(&python)
-        .args(["-m", "pip", "install", "-q"])
-        .args(PACKAGES))?;
-    run(command(&python)
+    run(command(&python::environment()?.to_string_lossy())
         .arg("host-sim/log/peers/check.py")
         .args([&host_sim, &place, &csv, &bus])
         .arg(DRIVE))

@@ -19,6 +19,8 @@ mod identify;
 mod image;
 mod logs;
 mod longest;
+mod profiles;
+mod python;
 mod qemu;
 mod seal;
 mod size;
@@ -34,6 +36,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::tool::Built;
+
 /// The one door for builds, tests, QEMU, sizes and benchmarks.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
@@ -44,12 +48,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Everything that CI checks, the tests last. Installs the tools it needs where it may.
-    Ci {
-        /// Format, clippy, documentation, tests of the libraries and doctests alone, for daily work: no QEMU, no valgrind.
-        #[arg(long)]
-        quick: bool,
-    },
+    /// Everything that CI checks, in stages, two at a time. Installs the tools it needs where it may.
+    Ci(ci::Options),
     /// Proves on the linked image that the controller has no panic path and no float.
     Gate,
     /// Instructions of a control step: on the host, against xtask/golden.json; in QEMU; or cycles, on a board.
@@ -140,21 +140,20 @@ enum Bench {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Ci { quick: true } => ci::run_quick(),
-        Command::Ci { quick: false } => ci::run_all(),
+        Command::Ci(options) => ci::check(&options),
         Command::Gate => gate::run(),
         Command::Coverage => evidence::coverage(),
         Command::Mutants { by_hand: true, .. } => by_hand::run(),
         Command::Mutants { files, in_diff, .. } => evidence::mutants(&files, in_diff.as_deref()),
-        Command::Boards { bless } => boards::check(bless),
+        Command::Boards { bless } => boards::check(boards::Scope::All, Built::ToShip, bless),
         Command::Flash(options) => boards::flash(options.board, options.image),
         Command::Run(options) => boards::run_on(options.board, options.image),
         Command::Hil(options) => boards::hil(&options),
-        Command::C => c_library::check(),
-        Command::Fmu => fmu::check(),
-        Command::Web => web::check(),
-        Command::Logs => logs::check(),
-        Command::BindingsAgree => bindings_agree::check(),
+        Command::C => c_library::check(Built::ToShip),
+        Command::Fmu => fmu::check(Built::ToShip),
+        Command::Web => web::check(Built::ToShip),
+        Command::Logs => logs::check(Built::ToShip),
+        Command::BindingsAgree => bindings_agree::check(Built::ToShip),
         Command::Wheel(options) => wheel::build(&options),
         Command::Bench {
             what: Some(Bench::Speed(options)),

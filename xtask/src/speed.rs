@@ -191,14 +191,9 @@ fn build_c(program: &str, more: &[&str]) -> Result<String> {
 
 /// C's world around the static library of the shipping ECU.
 fn build_c_with_the_shipping_ecu() -> Result<String> {
-    tool::run(tool::cargo().args(["build", "--release", "-p", "haptic-c"]))?;
+    tool::run(tool::cargo().args(["build", "--profile", "dist", "-p", "haptic-c"]))?;
     let include = ["-DSHIPPING_ECU", "-Ibindings/c/include"];
-    let libraries = [
-        "target/release/libhaptic_guidance.a",
-        "-lpthread",
-        "-ldl",
-        "-lgcc_s",
-    ];
+    let libraries = ["target/dist/libhaptic_guidance.a", "-lpthread", "-ldl", "-lgcc_s"];
     build_c(
         "target/closed_loop_c_shipping",
         &[include.as_slice(), libraries.as_slice()].concat(),

@@ -49,7 +49,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         cfg!(target_os = "linux"),
         "memory and processor time are read from Linux's /proc"
     );
-    tool::run(tool::cargo().args(["build", "--release", "-q", "-p", "host-sim"]))?;
+    tool::run(tool::cargo().args(["build", "--profile", "dist", "-q", "-p", "host-sim"]))?;
     println!(
         "{:>9}{:>10}{:>14}{:>12}{:>18}{:>12}{:>16}{:>12}",
         "drives",
@@ -121,7 +121,7 @@ fn sweep(drives: u32, threads: Option<u32>) -> Result<Cost> {
         &varied,
         spec.replace("samples = 1000\n", &format!("samples = {drives}\n")),
     )?;
-    let mut command = tool::command("target/release/host-sim");
+    let mut command = tool::command("target/dist/host-sim");
     command
         .arg("sweep")
         .args([varied.as_path(), Path::new("--out"), &out])
@@ -129,7 +129,7 @@ fn sweep(drives: u32, threads: Option<u32>) -> Result<Cost> {
         .stdout(Stdio::null())
         .stderr(Stdio::null());
     let start = Instant::now();
-    let mut child = command.spawn().context("target/release/host-sim")?;
+    let mut child = command.spawn().context("target/dist/host-sim")?;
     let mut cost = Cost {
         wall_s: 0.0,
         processor_s: 0.0,

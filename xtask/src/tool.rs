@@ -25,6 +25,47 @@ pub(crate) fn command(program: &str) -> Command {
     command
 }
 
+/// How everything that is tested is built: one profile and one set of features, so that nothing is compiled twice.
+pub(crate) const SHAPE: [&str; 4] = ["--release", "--workspace", "--exclude", "xtask"];
+
+/// Which build of a binding is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Built {
+    /// With everything else, as [`SHAPE`] has it: in CI it is there already.
+    ForTests,
+    /// By itself, in the profile `dist`: what is handed on.
+    ToShip,
+}
+
+impl Built {
+    /// Builds a package for this computer; the directory of its libraries and programs.
+    pub(crate) fn package(self, name: &str) -> Result<PathBuf> {
+        let mut build = cargo();
+        build.args(["build", "-q"]);
+        let place = match self {
+            Self::ForTests => {
+                build.args(SHAPE);
+                "release"
+            }
+            Self::ToShip => {
+                build.args(["--profile", "dist", "-p", name]);
+                "dist"
+            }
+        };
+        run(&mut build)?;
+        Ok(root().join("target").join(place))
+    }
+
+    /// The command line. Nothing of it is handed on, so that its own profile is for daily work.
+    pub(crate) fn host_sim(self) -> Result<PathBuf> {
+        if self == Self::ToShip {
+            run(cargo().args(["build", "-q", "--release", "-p", "host-sim"]))?;
+            return Ok(root().join("target/release/host-sim"));
+        }
+        Ok(self.package("host-sim")?.join("host-sim"))
+    }
+}
+
 /// Runs a program whose output the user sees.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| describe(command))?;

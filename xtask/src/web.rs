@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
-use crate::tool::{cargo, command, ensure, exists, output, root, run};
+use crate::tool::{Built, cargo, command, ensure, exists, output, root, run};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 const LARGEST_BYTES: u64 = 1_000_000;
@@ -15,7 +15,7 @@ const SCENARIO: &str = "speed = 60\ncondition = \"mid\"\n[driver]\nt_p = 0.3\n";
 const BUDGET_MS: u32 = 60_000;
 
 /// Builds `target/dist/haptic-lab.html`, and tries it.
-pub(crate) fn check() -> Result<()> {
+pub(crate) fn check(built: Built) -> Result<()> {
     let wasm = build()?;
     let page = root().join("target/dist/haptic-lab.html");
     std::fs::create_dir_all(root().join("target/dist"))?;
@@ -27,28 +27,31 @@ pub(crate) fn check() -> Result<()> {
     if bytes > LARGEST_BYTES {
         bail!("the page has {bytes} bytes, more than {LARGEST_BYTES}");
     }
-    try_it(&wasm)
+    try_it(&wasm, built)
 }
 
 fn build() -> Result<PathBuf> {
-    run(cargo()
-        .args(["build", "--release", "-p", "haptic-web", "--target", TARGET])
-        .env("CARGO_PROFILE_RELEASE_DEBUG", "0")
-        .env("CARGO_PROFILE_RELEASE_STRIP", "symbols")
-        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "s")
-        .env("CARGO_PROFILE_RELEASE_PANIC", "abort"))
+    run(cargo().args([
+        "build",
+        "--profile",
+        "page",
+        "-p",
+        "haptic-web",
+        "--target",
+        TARGET,
+    ]))
     .with_context(|| format!("rustup target add {TARGET} brings what is missing"))?;
-    Ok(root().join("target").join(TARGET).join("release/haptic_web.wasm"))
+    Ok(root().join("target").join(TARGET).join("page/haptic_web.wasm"))
 }
 
 /// The page with its test in it: what the test writes into the page, and a picture of it.
-fn try_it(wasm: &Path) -> Result<()> {
+fn try_it(wasm: &Path, built: Built) -> Result<()> {
     let place = root().join("target/web");
     std::fs::create_dir_all(&place)?;
     let scenario = place.join("scenario.toml");
     std::fs::write(&scenario, SCENARIO)?;
-    run(cargo()
-        .args(["run", "-q", "--release", "-p", "host-sim", "--", "run"])
+    run(command(&built.host_sim()?.to_string_lossy())
+        .arg("run")
         .arg(&scenario)
         .arg("--out")
         .arg(place.join("run"))

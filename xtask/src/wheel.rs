@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
+use crate::python;
 use crate::tool::{cargo, command, output, root, run};
 
 /// What `cargo xtask wheel` is asked for.
@@ -34,7 +35,7 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
     "haptic-target",
     "haptic-report",
     "host-sim",
-    "serialport",
+    "serial2",
     "plotters",
     "kuva",
     "resvg",
@@ -43,25 +44,16 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
 ];
 const LARGEST_MB: f64 = 5.0;
 const MATURIN: &str = "maturin>=1.9,<2";
-/// The tests, and the packages that the examples and the tests' peers need.
-const TEST_PACKAGES: [&str; 11] = [
-    "pytest",
-    "pandas",
-    "pyarrow",
-    "matplotlib",
-    "cantools",
-    "distributed",
-    "commonroad-vehicle-models",
-    "gymnasium>=1.1",
-    "tqdm",
-    "nbclient",
-    "ipykernel",
-];
 
 /// Builds the wheel, and tries it if asked to.
 pub(crate) fn build(options: &Options) -> Result<()> {
     let wheel = make()?;
-    look_at(&wheel)?;
+    let megabytes = std::fs::metadata(&wheel)?.len() as f64 / 1e6;
+    println!("{}: {megabytes:.2} MB", wheel.display());
+    if megabytes > LARGEST_MB {
+        bail!("the wheel is larger than {LARGEST_MB} MB");
+    }
+    look_at_crates()?;
     if options.test || options.bench {
         let python = install(&wheel)?;
         if options.test {
@@ -75,16 +67,13 @@ pub(crate) fn build(options: &Options) -> Result<()> {
 }
 
 /// The interpreter of an environment that has the wheel, built anew.
-pub(crate) fn python() -> Result<PathBuf> {
+pub(crate) fn installed() -> Result<PathBuf> {
     install(&make()?)
 }
 
 fn make() -> Result<PathBuf> {
     let tools = root().join("target/python/tools");
-    let python = environment(&tools)?;
-    if !tools.join("bin/maturin").exists() {
-        run(command(&python.to_string_lossy()).args(["-m", "pip", "install", "-q", MATURIN]))?;
-    }
+    python::environment_of(&tools, &[MATURIN])?;
     let dist = root().join("target/dist");
     let wheels = || {
         let files = std::fs::read_dir(&dist).into_iter().flatten().flatten();
@@ -98,14 +87,20 @@ fn make() -> Result<PathBuf> {
     }
     let maturin = tools.join("bin/maturin");
     run(command(&maturin.to_string_lossy())
-        .args(["build", "--release", "-m", "bindings/python/Cargo.toml", "--out"])
+        .args([
+            "build",
+            "--profile",
+            "dist",
+            "-m",
+            "bindings/python/Cargo.toml",
+            "--out",
+        ])
         .arg(&dist))?;
     wheels().next().context("maturin left no wheel")
 }
 
-/// Size, and what is linked.
-fn look_at(wheel: &Path) -> Result<()> {
-    let megabytes = std::fs::metadata(wheel)?.len() as f64 / 1e6;
+/// What is linked.
+pub(crate) fn look_at_crates() -> Result<()> {
     let tree = [
         "tree",
         "-p",
@@ -119,7 +114,7 @@ fn look_at(wheel: &Path) -> Result<()> {
     let linked = output(cargo().args(tree).arg("{p} {f}"))?;
     let names: std::collections::BTreeSet<&str> =
         linked.lines().filter_map(|line| line.split(' ').next()).collect();
-    println!("{}: {megabytes:.2} MB of {} crates", wheel.display(), names.len());
+    println!("{} crates are linked", names.len());
     let wrong: Vec<&str> = NOT_IN_A_WHEEL
         .into_iter()
         .filter(|name| names.contains(name))
@@ -130,32 +125,14 @@ fn look_at(wheel: &Path) -> Result<()> {
     if linked.contains("fault-injection") {
         bail!("the wheel links the fault injector");
     }
-    if megabytes > LARGEST_MB {
-        bail!("the wheel is larger than {LARGEST_MB} MB");
-    }
     println!("Not linked: {}, fault injection", NOT_IN_A_WHEEL.join(", "));
     Ok(())
 }
 
-/// A virtual environment with the wheel, nothing of an older one, and what its tests need.
+/// An environment with the wheel, nothing of an older one, and what its tests need.
 fn install(wheel: &Path) -> Result<PathBuf> {
-    let place = root().join("target/python/test");
-    let python = environment(&place)?;
-    let name = python.to_string_lossy();
-    run(command(&name)
-        .args(["-m", "pip", "install", "-q"])
-        .args(TEST_PACKAGES))?;
+    let python = python::environment_of(&root().join("target/python/wheel"), &python::PACKAGES)?;
     let fresh = ["-m", "pip", "install", "-q", "--force-reinstall", "--no-deps"];
-    run(command(&name).args(fresh).arg(wheel))?;
-    Ok(python)
-}
-
-/// The interpreter of a virtual environment, made if it is not there.
-pub(crate) fn environment(place: &Path) -> Result<PathBuf> {
-    let python = place.join("bin/python");
-    if !python.exists() {
-        run(command("python3").args(["-m", "venv"]).arg(place))
-            .context("Python 3 with venv is needed: apt-get install python3-venv")?;
-    }
+    run(command(&python.to_string_lossy()).args(fresh).arg(wheel))?;
     Ok(python)
 }

@@ -6,7 +6,7 @@
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("broken runs in QEMU: `cargo test --test resets`");
+    eprintln!("broken runs in QEMU: `cargo test -p haptic-guidance resets::`");
 }
 
 #[cfg(target_os = "none")]

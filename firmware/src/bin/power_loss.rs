@@ -7,7 +7,7 @@
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("power-loss runs in QEMU: `cargo test --test parameters`");
+    eprintln!("power-loss runs in QEMU: `cargo test -p haptic-guidance parameters::`");
 }
 
 #[cfg(target_os = "none")]

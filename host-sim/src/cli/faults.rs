@@ -119,7 +119,7 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, Ba
                 "--rows: there is no fault {name}; --list shows them all"
             ))),
             Some(row) if row.place == Place::Target => Err(BadInput(format!(
-                "--rows: {name} breaks the image and not the controller: cargo test --test resets"
+                "--rows: {name} breaks the image and not the controller: cargo test -p haptic-guidance resets::"
             ))),
             Some(row) if !runs(&row) => Err(BadInput(format!(
                 "--rows: {name} is not among those that run with --target"

@@ -45,8 +45,9 @@ fn tcp(address: &str) -> std::io::Result<Adapter> {
     })
 }
 
-fn serial(path: &str) -> serialport::Result<Adapter> {
-    let port = serialport::new(path, BAUD).timeout(READ_LIMIT).open()?;
+fn serial(path: &str) -> std::io::Result<Adapter> {
+    let mut port = serial2::SerialPort::open(path, BAUD)?;
+    port.set_read_timeout(READ_LIMIT)?;
     Ok(Adapter {
         channel: Channel::Slcan,
         output: Box::new(port.try_clone()?),

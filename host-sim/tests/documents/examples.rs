@@ -152,9 +152,9 @@ fn exists(line: &str, at: &str) {
                 .position(|w| *w == "-p")
                 .map_or("haptic-guidance", |k| rest[k + 1]);
             let folder = package_folder(package, &at);
-            for k in (0..rest.len()).filter(|k| rest[*k] == "--test") {
-                let test = folder.join("tests").join(rest[k + 1]);
-                let is_there = test.with_extension("rs").exists() || test.join("main.rs").exists();
+            for module in rest.iter().filter_map(|word| word.strip_suffix("::")) {
+                let test = folder.join("tests").join(module);
+                let is_there = test.with_extension("rs").exists() || test.join("mod.rs").exists();
                 assert!(is_there, "{at}: {} is not there", test.display());
             }
         }

@@ -1,0 +1,32 @@
+//! The core's tests, one program: a module a subject. `cargo test -p haptic-core law_oracle::` runs one of them.
+
+mod attacks;
+mod column;
+mod dbc;
+mod download;
+mod e2e;
+mod ecu;
+mod edges;
+mod endurance;
+mod envelope;
+mod estimator;
+mod faults;
+mod frame;
+mod fuzz;
+mod law_oracle;
+mod memory;
+mod modes;
+mod monitor;
+mod motor;
+mod params;
+mod plausibility;
+mod probe;
+mod quantity;
+mod ramp;
+mod reliance;
+mod rig;
+mod road;
+mod schedule;
+mod senders;
+mod slcan;
+mod stored;

@@ -1,0 +1,4 @@
+//! Recordings: channels, and the formats of other tools.
+
+mod channels;
+mod formats;

@@ -1,0 +1,8 @@
+//! The command line's tests, one program: a module a subject. `cargo test -p host-sim documents::` runs one of them.
+
+mod cli;
+mod course;
+mod documents;
+mod file_fields;
+mod study;
+mod sweep;

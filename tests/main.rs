@@ -1,0 +1,25 @@
+//! What a customer would check, across the crates; one program, a module a subject. `cargo test -p haptic-guidance pil::` runs
+//! one of them.
+
+mod availability;
+mod closed_loop;
+mod design;
+mod faults;
+mod faults_in_qemu;
+mod handover;
+mod identify_bus_trace;
+mod identify_degenerate;
+mod identify_foreign_logs;
+mod identify_participants;
+mod identify_spoiled;
+mod layering;
+mod machine;
+mod paper_claims;
+mod parameters;
+mod pil;
+mod product_image;
+mod reliance;
+mod resets;
+mod startup;
+mod track_changing_driver;
+mod unclipped;
