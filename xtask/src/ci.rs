@@ -356,19 +356,22 @@ fn print_count() {
 
 /// Packages of Debian and of Python that stages need, while the workspace is built.
 fn prepare() -> Result<()> {
-    tool::ensure(&[
-        ("qemu-system-arm", "qemu-system-arm"),
-        ("gcc", "gcc"),
-        ("g++", "g++"),
-        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
-        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
-        ("python3", "python3"),
-        ("python3", "python3-venv"),
-        ("chromium", "chromium"),
-        ("valgrind", "valgrind"),
-    ])?;
+    tool::ensure(&TOOLS)?;
     python::environment().map(drop)
 }
+
+/// Programs, and the packages of Debian that bring them.
+const TOOLS: [(&str, &str); 9] = [
+    ("qemu-system-arm", "qemu-system-arm"),
+    ("gcc", "gcc"),
+    ("g++", "g++"),
+    ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+    ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+    ("python3", "python3"),
+    ("python3", "python3-venv"),
+    ("chromium", "chromium"),
+    ("valgrind", "valgrind"),
+];
 
 fn format() -> Result<()> {
     run(cargo().args(["fmt", "--all", "--check"]))
@@ -381,6 +384,7 @@ fn build() -> Result<()> {
 
 /// With the doctests of every library.
 fn tests() -> Result<()> {
+    tool::ensure(&TOOLS)?;
     run(cargo().arg("test").args(SHAPE).arg("--no-fail-fast"))
 }
 
@@ -455,4 +459,25 @@ fn speed() -> Result<()> {
         run(Command::new(&this).current_dir(root()).args(["bench", what]))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{STAGES, When};
+
+    #[test]
+    fn the_hosted_ci_has_a_job_for_each_stage() {
+        let workflow = std::fs::read_to_string(crate::tool::root().join(".github/workflows/ci.yml")).unwrap();
+        let listed: Vec<&str> = workflow
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("- stage: "))
+            .collect();
+        // What is built first is built in each job.
+        let wanted: Vec<&str> = STAGES
+            .iter()
+            .filter(|stage| stage.when != When::Full && stage.name != "build")
+            .map(|stage| stage.name)
+            .collect();
+        assert_eq!(listed, wanted);
+    }
 }

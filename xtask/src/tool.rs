@@ -26,7 +26,14 @@ pub(crate) fn command(program: &str) -> Command {
 }
 
 /// How everything that is tested is built: one profile and one set of features, so that nothing is compiled twice.
-pub(crate) const SHAPE: [&str; 4] = ["--release", "--workspace", "--exclude", "xtask"];
+pub(crate) const SHAPE: [&str; 6] = [
+    "--release",
+    "--workspace",
+    "--exclude",
+    "xtask",
+    "--features",
+    "host-sim/mcap",
+];
 
 /// Which build of a binding is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -20,6 +20,7 @@ mod calendar;
 mod csv;
 pub mod dbc;
 mod mat;
+#[cfg(feature = "mcap")]
 mod mcap;
 mod mdf;
 #[cfg(feature = "parquet")]
@@ -224,7 +225,12 @@ pub fn write(path: &Path, recording: Recording) -> Result<(), RecordingError> {
         Format::Csv => csv::write(&recording.into_one_group().map_err(named)?),
         Format::Mat => mat::write(&recording.into_one_group().map_err(named)?),
         Format::Mdf4 => mdf::write(&recording),
+        #[cfg(feature = "mcap")]
         Format::Mcap => mcap::write(&recording),
+        #[cfg(not(feature = "mcap"))]
+        Format::Mcap => Err("this build writes no MCAP, which would make the first build longer: build host-sim with `--features mcap`, as in cargo run --release -p host-sim --features mcap -- convert IN OUT.mcap"
+            .to_owned()
+            .into()),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(&recording.into_one_group().map_err(named)?),
         #[cfg(not(feature = "parquet"))]
