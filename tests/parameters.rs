@@ -2,7 +2,7 @@
 //! the restart that it causes; one that is wrong changes nothing; and power lost at every step of a write, hundreds
 //! of times, never loses the last good set.
 //!
-//! The status frames are taken apart by hand, from `core/haptic.dbc`. What `host-sim parameters` does over an adapter
+//! The status frames are taken apart by hand, from `core/haptic.dbc`. What `host-sim ecu parameters` does over an adapter
 //! is done to the same image behind a serial port.
 
 use std::io::{BufRead, BufReader};

@@ -79,6 +79,7 @@ fn another_course_speed_and_window_are_measured_without_claims() {
     let course = "lane_width = 3\n[[segment]]\nlength = 150\n[[segment]]\nlength = 100\ncurvature = -0.002\n";
     std::fs::write(directory.path().join("c.toml"), course).unwrap();
     let arguments = [
+        "evaluate",
         "--course",
         "c.toml",
         "--speed",
@@ -216,29 +217,17 @@ fn a_result_is_repeated_from_itself() {
 #[test]
 fn studies_leave_their_pictures_when_asked() {
     let directory = tempfile::tempdir().unwrap();
-    let arguments = [
-        &["bus", "--json", "--out", "bus"][..],
-        &[
-            "faults",
-            "--rows",
-            "jerk,all-frozen",
-            "--seeds",
-            "1",
-            "--json",
-            "--out",
-            "faults",
-        ],
-    ];
-    for arguments in arguments {
-        let output = host_sim(directory.path(), arguments);
-        let out = directory.path().join(arguments[0]);
+    let faults = ["faults", "--rows", "jerk,all-frozen", "--seeds", "1"];
+    for (name, command) in [("bus", &["ecu", "bus"][..]), ("faults", &faults)] {
+        let output = host_sim(directory.path(), &[command, &["--json", "--out", name]].concat());
+        let out = directory.path().join(name);
         assert!(
             json(&output)["provenance"]["version"].is_string(),
             "{}",
             stderr(&output)
         );
         for ending in ["svg", "png"] {
-            assert!(out.join(format!("{}.{ending}", arguments[0])).exists());
+            assert!(out.join(format!("{name}.{ending}")).exists());
         }
         assert!(out.join("report.html").exists());
     }
@@ -300,7 +289,10 @@ fn live_says_of_a_recorded_bus_what_changed_and_when() {
     text.replace_range(at..=at, flipped);
     std::fs::write(&log, &text).unwrap();
 
-    let output = host_sim(directory.path(), &["live", "--log", "here/bus.log", "--json"]);
+    let output = host_sim(
+        directory.path(),
+        &["ecu", "live", "--log", "here/bus.log", "--json"],
+    );
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let lines: Vec<Value> = String::from_utf8(output.stdout)
         .unwrap()
@@ -335,7 +327,7 @@ fn live_says_of_a_recorded_bus_what_changed_and_when() {
 
     let table = host_sim(
         directory.path(),
-        &["live", "--log", "here/bus.log", "--every", "0.5"],
+        &["ecu", "live", "--log", "here/bus.log", "--every", "0.5"],
     );
     let table = String::from_utf8(table.stdout).unwrap();
     assert!(
@@ -343,11 +335,14 @@ fn live_says_of_a_recorded_bus_what_changed_and_when() {
         "{table}"
     );
     for (arguments, expected) in [
-        (&["live", "--log", "s.toml"][..], "s.toml: line 1"),
-        (&["live", "--can", "can99"], "can99"),
-        (&["live"], "--can"),
-        (&["live", "--can", "can99", "--record", "s.toml"], "s.toml"),
-        (&["live", "--log", "here/bus.log", "--every", "0"], "0.01 to 3600"),
+        (&["ecu", "live", "--log", "s.toml"][..], "s.toml: line 1"),
+        (&["ecu", "live", "--can", "can99"], "can99"),
+        (&["ecu", "live"], "--can"),
+        (&["ecu", "live", "--can", "can99", "--record", "s.toml"], "s.toml"),
+        (
+            &["ecu", "live", "--log", "here/bus.log", "--every", "0"],
+            "0.01 to 3600",
+        ),
     ] {
         let refused = host_sim(directory.path(), arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
@@ -381,7 +376,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
             "--speed = 5 km/h is outside 20 to 250 km/h",
         ),
         (
-            &["--speed", "-60"],
+            &["evaluate", "--speed", "-60"],
             "--speed = -60 km/h is outside 20 to 250 km/h",
         ),
         (
@@ -415,10 +410,13 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
             "empty.toml: a course needs",
         ),
         (&["run", "course.toml"], "course.toml: this is a course"),
-        (&["pil", "exact.toml"], "exact.toml: sensors = \"exact\""),
+        (&["ecu", "pil", "exact.toml"], "exact.toml: sensors = \"exact\""),
         (&["evaluate", "--sensors", "perfect"], "perfect"),
         (&["run", "unknown.toml"], "t_q"),
-        (&["pil", "manual.toml"], "manual.toml: condition = \"manual\""),
+        (
+            &["ecu", "pil", "manual.toml"],
+            "manual.toml: condition = \"manual\"",
+        ),
         (&["fly"], "fly"),
         (
             &["evaluate", "--out", "short.toml/out"],
@@ -446,6 +444,59 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     }
 }
 
+/// Who knows a name of an older version, mistypes one or forgets the command, is told what to write.
+#[test]
+fn another_name_is_answered_with_the_right_one() {
+    let directory = tempfile::tempdir().unwrap();
+    let cases: [(&[&str], &str); 17] = [
+        (&["pil"], "error: `pil` is `host-sim ecu pil`\n"),
+        (&["live", "--can", "can0"], "`live` is `host-sim ecu live`"),
+        (
+            &["parameters", "--can=can0"],
+            "`parameters` is `host-sim ecu parameters`",
+        ),
+        (&["help", "bus"], "`bus` is `host-sim ecu bus`"),
+        (
+            &["ecu", "--listen", "127.0.0.1:0"],
+            "`--listen` is `host-sim ecu run --listen`",
+        ),
+        (
+            &["identify", "a.csv", "--whole"],
+            "`--whole` is `--no-preprocessing`",
+        ),
+        (&["identify", "--bridge=0.2"], "`--bridge` is `--max-gap`"),
+        (
+            &["identify", "--exact-lane"],
+            "`--exact-lane` is `--no-lane-smoothing`",
+        ),
+        (&["sweep", "s.toml", "--plan"], "`--plan` is `--dry-run`"),
+        (&["study", "--plan", "s.toml"], "`--plan` is `--dry-run`"),
+        (
+            &["availability", "--most-per-hour", "1"],
+            "`--most-per-hour` is `--max-rate`",
+        ),
+        (
+            &["experiment", "--participants", "1,3..5"],
+            "`--participant 1,3..5` says which ones",
+        ),
+        (&["--speed", "70"], "`host-sim evaluate --speed 70`"),
+        (&["evalute"], "'evaluate'"),
+        (&["ecu", "parameter"], "'parameters'"),
+        (&["evaluate", "--sped", "70"], "'--speed'"),
+        (&["ecu", "live", "--recrod", "a.log"], "'--record'"),
+    ];
+    for (arguments, expected) in cases {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            stderr(&output).contains(expected),
+            "{arguments:?} gave {}",
+            stderr(&output)
+        );
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
 /// Before anything is sent.
 #[test]
 fn parameters_that_no_ecu_takes_and_a_bus_that_is_not_there_are_named() {
@@ -457,11 +508,11 @@ fn parameters_that_no_ecu_takes_and_a_bus_that_is_not_there_are_named() {
     .unwrap();
     let cases: [(&[&str], &[&str]); 3] = [
         (
-            &["parameters", "strong.toml", "--can", "can99"],
+            &["ecu", "parameters", "strong.toml", "--can", "can99"],
             &["strong.toml: ", "torque_limit_nm = 6", "0.1", "5"],
         ),
-        (&["parameters", "--can", "can99"], &["can99"]),
-        (&["parameters"], &["--can"]),
+        (&["ecu", "parameters", "--can", "can99"], &["can99"]),
+        (&["ecu", "parameters"], &["--can"]),
     ];
     for (arguments, expected) in cases {
         let output = host_sim(directory.path(), arguments);
@@ -495,7 +546,7 @@ fn what_a_processor_in_the_loop_lacks_is_named_and_exits_with_2() {
     );
     let pil = || {
         let output = Command::new(env!("CARGO_BIN_EXE_host-sim"))
-            .arg("pil")
+            .args(["ecu", "pil"])
             .env("PATH", directory.path())
             .env("CARGO", &cargo)
             .output()

@@ -217,22 +217,22 @@ fn of_image(elf: &Path, roots: [&str; 2]) -> Result<Vec<Figure>> {
 fn in_qemu(board: Board, built: Built) -> Result<Vec<Figure>> {
     let text = tool::output(
         tool::command(&built.host_sim()?.to_string_lossy())
-            .arg("pil")
+            .args(["ecu", "pil"])
             .args(["--machine", board.feature(), "--count", "--json"])
             .arg("examples/live-estimate.toml"),
     )?;
-    let report: Value = serde_json::from_str(&text).context("host-sim pil --json")?;
+    let report: Value = serde_json::from_str(&text).context("host-sim ecu pil --json")?;
     let steps = report["steps"].as_u64().unwrap_or(0);
     println!(
         "{}: {steps} steps in lock step, {} mismatches",
         board.feature(),
         report["mismatches"]
     );
-    ensure!(steps > 10_000, "host-sim pil stepped only {steps} times");
+    ensure!(steps > 10_000, "host-sim ecu pil stepped only {steps} times");
     let number = |value: &Value, what| {
         let value = value
             .as_f64()
-            .with_context(|| format!("host-sim pil measured no {what}"))?;
+            .with_context(|| format!("host-sim ecu pil measured no {what}"))?;
         Ok::<_, anyhow::Error>(value.round() as u64)
     };
     let stack = number(&report["stack_bytes"], "stack")?;
@@ -272,10 +272,10 @@ pub(crate) fn bench(board: Board) -> Result<()> {
     Ok(())
 }
 
-/// The comparison of `host-sim pil`, with the board in QEMU's place.
+/// The comparison of `host-sim ecu pil`, with the board in QEMU's place.
 pub(crate) fn hil(options: &Hil) -> Result<()> {
     let mut pil = tool::command(&Built::ToShip.host_sim()?.to_string_lossy());
-    pil.arg("pil");
+    pil.args(["ecu", "pil"]);
     match (&options.can, options.board.chip()) {
         (None, None) => pil.args(["--machine", options.board.feature()]),
         (None, Some(_)) => {

@@ -28,7 +28,7 @@ pub(crate) fn run() -> Result<()> {
                 "experiment",
             ])
             .args([
-                "--participants",
+                "--participant",
                 "5",
                 "--probe",
                 "0.2",

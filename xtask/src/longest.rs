@@ -5,7 +5,7 @@
 //! [`LOOPS`] allows, and a loop in a function that is not in that table is an error. So the bound may be far above what
 //! can happen, and never below.
 //!
-//! Not here: which functions may be on the path at all (`code`), and what a step really took (`host-sim pil --count`).
+//! Not here: which functions may be on the path at all (`code`), and what a step really took (`host-sim ecu pil --count`).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -118,7 +118,7 @@ enum Command {
     },
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
-    /// Decodes a log that `host-sim pil` left behind.
+    /// Decodes a log that `host-sim ecu pil` left behind.
     Log {
         /// The log, as the image wrote it.
         file: PathBuf,

@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     checkpoint: Option<PathBuf>,
     /// Fail (exit code 1) if with 95 % confidence the rate of a judged world, its roads together, may be above R an hour
     #[arg(long, value_name = "R")]
-    most_per_hour: Option<f64>,
+    max_rate: Option<f64>,
     /// Runs of each fault of the campaign in the world 'everything' (or the last one asked for); 0: none
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     fault_seeds: u64,
@@ -96,7 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         let mut bounds = results.judged().map(|cell| cell.declarations.upper_95);
         bounds.any(|upper| upper > most || upper.is_nan())
     };
-    Ok(if arguments.most_per_hour.is_some_and(too_many) {
+    Ok(if arguments.max_rate.is_some_and(too_many) {
         Outcome::Failed
     } else {
         Outcome::Good

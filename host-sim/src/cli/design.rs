@@ -12,6 +12,7 @@ use super::participants::Participants;
 use super::{BadInput, Outcome, print, print_json, progress, road};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("participant", |which| which.default_value("2,5,9")))]
 pub(super) struct Arguments {
     /// The parameter that is to be known: gain_1, gain_2, gain_3, k_hg or t_p
     #[arg(long, value_name = "NAME", default_value = "k_hg")]
@@ -19,8 +20,7 @@ pub(super) struct Arguments {
     /// To which standard error, in the parameter's unit
     #[arg(long, value_name = "VALUE", default_value_t = 0.05)]
     error: f64,
-    /// Participants of table 6 that stand for the drivers to come: numbers and ranges such as 1,3..5
-    #[arg(long, value_name = "LIST", default_value = "2,5,9")]
+    #[command(flatten)]
     participants: Participants,
     /// Frequencies of the probe to choose from, Hz (1 to 5)
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [1.0, 1.5, 2.0, 2.5, 3.5, 5.0])]
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .map(|path| road::open(path, &LaneChoice::default()))
         .collect::<Result<Vec<Course>, _>>()?;
     let question = Question {
-        participants: arguments.participants.0.clone(),
+        participants: arguments.participants.numbers(),
         courses,
         frequencies_hz: arguments.frequencies.clone(),
         amplitudes_nm: arguments.amplitudes.clone(),

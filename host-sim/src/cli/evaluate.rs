@@ -1,4 +1,4 @@
-//! `host-sim evaluate`, and `host-sim` alone.
+//! `host-sim evaluate`, which `host-sim` alone is too.
 
 use std::path::PathBuf;
 

@@ -15,8 +15,7 @@ use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Participants: numbers and ranges such as 1,3..5
-    #[arg(long, value_name = "LIST", default_value = "1..14")]
+    #[command(flatten)]
     participants: Participants,
     /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
     /// the driver's answer to it tells K_hg
@@ -63,7 +62,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let plan = Plan {
-        participants: arguments.participants.0.clone(),
+        participants: arguments.participants.numbers(),
         probe_nm: arguments.probe,
         seed: arguments.seed,
     };

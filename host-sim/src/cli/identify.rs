@@ -45,13 +45,13 @@ pub(super) struct Arguments {
     /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
     /// ones; 0 cuts at each
     #[arg(long, value_name = "S", default_value_t = 0.3, allow_negative_numbers = true)]
-    bridge: f64,
+    max_gap: f64,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
-    exact_lane: bool,
+    no_lane_smoothing: bool,
     /// Use every row: hands off, standstill and lane changes are not looked for
     #[arg(long)]
-    whole: bool,
+    no_preprocessing: bool,
     #[command(flatten)]
     course: CourseArguments,
     /// Speed on that course, km/h (20 to 250)
@@ -77,10 +77,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         options.estimate(what)?;
     }
     options.between(&arguments.from, &arguments.to)?;
-    options.lane_noise = !arguments.exact_lane;
-    options.leave_out = !arguments.whole;
-    in_range("--bridge", arguments.bridge, 0.0..=1.0, "s")?;
-    options.bridge_s = arguments.bridge;
+    options.lane_noise = !arguments.no_lane_smoothing;
+    options.leave_out = !arguments.no_preprocessing;
+    in_range("--max-gap", arguments.max_gap, 0.0..=1.0, "s")?;
+    options.bridge_s = arguments.max_gap;
     in_range("--speed", arguments.speed, SPEED_KMH, "km/h")?;
     let method = match arguments.method {
         MethodArgument::Paper => Method::Paper,

@@ -1,13 +1,12 @@
 //! The command line: options in, tables, files and exit codes out.
 //!
 //! Exit codes: 0 all is well; 1 a check or a comparison failed; 2 bad input or usage, or a program that is not
-//! installed. Results go to stdout, all
-//! else (progress, where the files are, what is wrong) to stderr; with `--json` stdout holds one JSON object.
+//! installed. Results go to stdout, all else (progress, where the files are, what is wrong) to stderr; with `--json`
+//! stdout holds one JSON object.
 //!
-//! One file per subcommand. Not here: anything that a study or a model decides.
+//! One file per command; their groups in `--help` and their older names are in `names`. Not here: anything that a study or a model decides.
 
 mod availability;
-mod bus;
 mod checkpoint;
 mod convert;
 mod course;
@@ -20,11 +19,9 @@ mod faults;
 mod handover;
 mod identify;
 mod lab;
-mod live;
+mod names;
 mod output;
-mod parameters;
 mod participants;
-mod pil;
 mod progress;
 mod recording;
 mod reliance;
@@ -35,73 +32,75 @@ mod stability;
 mod study;
 mod sweep;
 
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use serde::Serialize;
 
-/// Closed-loop workbench for the haptic-guidance steering controller.
-///
-/// Without a subcommand: the evaluation, as `evaluate` with the same options. New here? The tutorial is
-/// docs/tutorials/first-evaluation.md, and docs/glossary.md explains every word and symbol.
-///
-/// Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage, or a program that is not
-/// installed.
+/// Closed-loop workbench for the haptic-guidance steering controller
 #[derive(Debug, Parser)]
-#[command(version, args_conflicts_with_subcommands = true)]
+#[command(version, override_usage = "host-sim [COMMAND]", after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
-    command: Option<Command>,
-    #[command(flatten)]
-    evaluate: evaluate::Arguments,
+    command: Command,
 }
 
+const AFTER_HELP: &str = "\
+`host-sim` alone is `host-sim evaluate`. `host-sim COMMAND --help` explains a command and its options.
+
+New here? The tutorial is docs/tutorials/first-evaluation.md; docs/glossary.md explains words and symbols.
+
+Exit codes: 0 all is well, 1 a check or a comparison failed, 2 bad input or usage, or a program that is not \
+installed.";
+
+/// The first paragraph of each is its line in the program's `--help`, which `names` groups.
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// The paper's evaluation: 3 drivers, 4 conditions, with and without failure of the guidance
+    /// Three drivers, four conditions, with and without failure of the guidance
     Evaluate(evaluate::Arguments),
-    /// The paper's participants as drivers with a known truth: driven, identified, driven again
+    /// The 14 participants as drivers with a known truth: driven, identified, driven again
     Experiment(experiment::Arguments),
-    /// A driver's parameters from a recorded drive, with their uncertainty
-    Identify(identify::Arguments),
-    /// A recording in another format: CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF; or a list of its channels
-    Convert(convert::Arguments),
-    /// The lab in the browser: sliders for driver, guidance and failure, and a road to drive yourself
-    Lab(lab::Arguments),
-    /// Which experiment tells a driver's parameters: probe, course and length for a given error
-    Design(design::Arguments),
-    /// Several drivers beside each other: what differs between two, and what a group is like
-    Drivers(drivers::Arguments),
-    /// A road: the lane of an OpenDRIVE file or of a course file, its length, its picture, its centre every metre
-    Course(course::Arguments),
     /// One scenario from a TOML file
     Run(run::Arguments),
+    /// Many drives with varied fields, a row of a table each
+    ///
+    /// Fields vary by lists, ranges and distributions; threads and shards share the drives.
+    Sweep(sweep::Arguments),
+    /// A road from a file: its lane, length and picture, its centre every metre
+    Course(course::Arguments),
+    /// A map over speed and delay: where a driver keeps the lane, alone and guided
+    Stability(stability::Arguments),
+    /// The lab in the browser: sliders, and a road to drive yourself
+    Lab(lab::Arguments),
+    /// A driver's parameters from a recorded drive, with their uncertainty
+    Identify(identify::Arguments),
+    /// Several drivers beside each other: what differs between two, and what a group is like
+    Drivers(drivers::Arguments),
+    /// Which experiment tells a driver's parameters: probe, course and length for a given error
+    Design(design::Arguments),
+    /// Participants and conditions from one file, in a balanced order
+    ///
+    /// Each session leaves a recording that is never overwritten; the metrics come by condition.
+    Study(study::Arguments),
+    /// A recording in another format, or the list of its channels
+    ///
+    /// CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF.
+    Convert(convert::Arguments),
     /// Every fault by name into the closed loop, every rule checked in every cycle
     Faults(faults::Arguments),
-    /// How often guidance leaves for nothing on real roads: many cars, hours of driving, by cause
+    /// How often guidance leaves for nothing on real roads, by cause
+    ///
+    /// Many cars drive for hours.
     Availability(availability::Arguments),
-    /// A map over speed and delay: where a driver keeps the lane, alone and with guidance, and how well
-    Stability(stability::Arguments),
-    /// What a lost input costs if the ECU hands over within 2 s, and if the torque is lost at once: 40 to 120 km/h
+    /// What a lost input costs with a handover within 2 s, and without: 40 to 120 km/h
     Handover(handover::Arguments),
-    /// One scenario with the ECU's image in QEMU, every frame compared with the host's controller
-    Pil(pil::Arguments),
-    /// The ECU in QEMU on a bus that keeps the time of the wall, for any SLCAN client
-    Ecu(ecu::Arguments),
-    /// What parameters an ECU on a real bus uses; new ones for it to store
-    Parameters(parameters::Arguments),
-    /// What goes over the bus of a real ECU as it comes: mode, torques, faults, K_hg; and a recording of it
-    Live(live::Arguments),
-    /// The worst-case load of the CAN bus, message by message
-    Bus(bus::Arguments),
-    /// Many drives with varied fields (lists, ranges, distributions), a row of a table each, on threads and shards
-    Sweep(sweep::Arguments),
-    /// Participants and conditions from one file: the order of each participant, a recording of each session that is never
-    /// overwritten, metrics by condition
-    Study(study::Arguments),
-    /// How well the ECU estimates while it drives how much a driver relies on it (K_hg), against the truth
+    /// How well the ECU estimates while it drives how much a driver relies on it (K_hg)
     Reliance(reliance::Arguments),
+    /// The ECU itself, in QEMU or on a board, and its bus: run, pil, live, parameters, bus
+    #[command(subcommand)]
+    Ecu(ecu::Command),
 }
 
 /// How a command ended that could do its work.
@@ -128,30 +127,19 @@ impl<E: Display> From<E> for BadInput {
 }
 
 pub(crate) fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let result = match cli.command {
-        None => evaluate::run(&cli.evaluate),
-        Some(Command::Evaluate(arguments)) => evaluate::run(&arguments),
-        Some(Command::Experiment(arguments)) => experiment::run(&arguments),
-        Some(Command::Identify(arguments)) => identify::run(&arguments),
-        Some(Command::Convert(arguments)) => convert::run(&arguments),
-        Some(Command::Lab(arguments)) => lab::run(&arguments),
-        Some(Command::Design(arguments)) => design::run(&arguments),
-        Some(Command::Drivers(arguments)) => drivers::run(&arguments),
-        Some(Command::Course(arguments)) => course::run(&arguments),
-        Some(Command::Run(arguments)) => run::run(&arguments),
-        Some(Command::Faults(arguments)) => faults::run(&arguments),
-        Some(Command::Availability(arguments)) => availability::run(&arguments),
-        Some(Command::Stability(arguments)) => stability::run(&arguments),
-        Some(Command::Handover(arguments)) => handover::run(&arguments),
-        Some(Command::Pil(arguments)) => pil::run(&arguments),
-        Some(Command::Ecu(arguments)) => ecu::run(&arguments),
-        Some(Command::Parameters(arguments)) => parameters::run(&arguments),
-        Some(Command::Live(arguments)) => live::run(&arguments),
-        Some(Command::Bus(arguments)) => bus::run(&arguments),
-        Some(Command::Sweep(arguments)) => sweep::run(&arguments),
-        Some(Command::Study(arguments)) => study::run(&arguments),
-        Some(Command::Reliance(arguments)) => reliance::run(&arguments),
+    let mut arguments: Vec<OsString> = std::env::args_os().collect();
+    if arguments.len() == 1 {
+        arguments.push("evaluate".into());
+    }
+    let parsed = names::grouped(Cli::command())
+        .try_get_matches_from(&arguments)
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    let result = match parsed {
+        Ok(cli) => run(&cli.command),
+        Err(error) => match names::explain(&error, &arguments) {
+            Some(sentence) => Err(BadInput(sentence)),
+            None => error.exit(),
+        },
     };
     match result {
         Ok(Outcome::Good) => ExitCode::SUCCESS,
@@ -161,6 +149,28 @@ pub(crate) fn main() -> ExitCode {
             eprintln!("error: {message}");
             ExitCode::from(2)
         }
+    }
+}
+
+fn run(command: &Command) -> Result<Outcome, BadInput> {
+    match command {
+        Command::Evaluate(arguments) => evaluate::run(arguments),
+        Command::Experiment(arguments) => experiment::run(arguments),
+        Command::Run(arguments) => run::run(arguments),
+        Command::Sweep(arguments) => sweep::run(arguments),
+        Command::Course(arguments) => course::run(arguments),
+        Command::Stability(arguments) => stability::run(arguments),
+        Command::Lab(arguments) => lab::run(arguments),
+        Command::Identify(arguments) => identify::run(arguments),
+        Command::Drivers(arguments) => drivers::run(arguments),
+        Command::Design(arguments) => design::run(arguments),
+        Command::Study(arguments) => study::run(arguments),
+        Command::Convert(arguments) => convert::run(arguments),
+        Command::Faults(arguments) => faults::run(arguments),
+        Command::Availability(arguments) => availability::run(arguments),
+        Command::Handover(arguments) => handover::run(arguments),
+        Command::Reliance(arguments) => reliance::run(arguments),
+        Command::Ecu(command) => ecu::run(command),
     }
 }
 

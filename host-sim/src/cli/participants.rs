@@ -1,10 +1,43 @@
-//! A list of participants on the command line: numbers and ranges such as `1,3..5`.
+//! The paper's participants on the command line: how many, or which ones.
 
-/// Their numbers, in the order given.
+use clap::Args;
+use haptic_sim::participants::participants;
+
+#[derive(Debug, Args)]
+pub(super) struct Participants {
+    /// How many of the paper's participants drive, from the first on (1 to 14)
+    #[arg(long, value_name = "N", value_parser = how_many, conflicts_with = "participant")]
+    participants: Option<u32>,
+    /// Which of them drive: numbers and ranges such as 3 or 1,3..5
+    #[arg(long, value_name = "LIST", default_value = "1..14")]
+    participant: List,
+}
+
+impl Participants {
+    /// Their numbers, in the order given.
+    pub(super) fn numbers(&self) -> Vec<u32> {
+        match self.participants {
+            Some(count) => (1..=count).collect(),
+            None => self.participant.0.clone(),
+        }
+    }
+}
+
+fn how_many(text: &str) -> Result<u32, String> {
+    let all = participants().len() as u32;
+    match text.parse() {
+        Ok(count) if (1..=all).contains(&count) => Ok(count),
+        Ok(_) => Err(format!("1 to {all} drive")),
+        Err(_) => Err(format!(
+            "a count is wanted, 1 to {all}; `--participant {text}` says which ones"
+        )),
+    }
+}
+
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Participants(pub(super) Vec<u32>);
+struct List(Vec<u32>);
 
-impl std::str::FromStr for Participants {
+impl std::str::FromStr for List {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -42,10 +75,23 @@ mod tests {
             ("1,3..5", &[1, 3, 4, 5]),
             ("2..=3", &[2, 3]),
         ] {
-            assert_eq!(text.parse(), Ok(Participants(numbers.to_vec())), "{text}");
+            assert_eq!(text.parse(), Ok(List(numbers.to_vec())), "{text}");
         }
         for bad in ["", "a", "2..x", "5..3", "1..99999999"] {
-            assert!(bad.parse::<Participants>().is_err(), "{bad}");
+            assert!(bad.parse::<List>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn so_many_are_the_first_ones() {
+        let some = |participants| Participants {
+            participants,
+            participant: List(vec![3]),
+        };
+        assert_eq!(some(Some(3)).numbers(), [1, 2, 3]);
+        assert_eq!(some(None).numbers(), [3]);
+        for bad in ["0", "15", "1,3", "-1"] {
+            assert!(how_many(bad).is_err(), "{bad}");
         }
     }
 }

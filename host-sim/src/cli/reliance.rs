@@ -13,8 +13,7 @@ use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Participants of table 6: numbers and ranges such as 1,3..5
-    #[arg(long, value_name = "LIST", default_value = "1..14")]
+    #[command(flatten)]
     participants: Participants,
     /// Drives of each participant, each with its own remnant
     #[arg(long, value_name = "N", default_value_t = 20)]
@@ -39,7 +38,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     in_range("--t-nms", arguments.t_nms, 0.02..=0.5, "s")?;
     let plan = Plan {
-        participants: arguments.participants.0.clone(),
+        participants: arguments.participants.numbers(),
         seeds: arguments.seeds,
         amplitude_nm: arguments.amplitude,
         frequency_hz: arguments.frequency,

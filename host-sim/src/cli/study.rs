@@ -23,7 +23,7 @@ pub(super) struct Arguments {
     import: Vec<Import>,
     /// Only check the file, and print who drives what in which order
     #[arg(long, conflicts_with_all = ["import", "json"])]
-    plan: bool,
+    dry_run: bool,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
     json: bool,
@@ -52,7 +52,7 @@ impl std::str::FromStr for Import {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let study = Study::load(&arguments.file)?;
-    if arguments.plan {
+    if arguments.dry_run {
         print(&files::plan(&study.sessions).to_text())?;
         print_notes(&study.notes);
         return Ok(Outcome::Good);

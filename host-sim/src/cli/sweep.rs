@@ -32,22 +32,22 @@ pub(super) struct Arguments {
     threads: Option<u32>,
     /// Instead: drive one row of the table again, and compare it with the table if there is one (exit code 1 if it
     /// differs); its scenario is in the printed text
-    #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "plan"])]
+    #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "dry_run"])]
     replay: Option<u64>,
     /// With --replay: also the scenario, the time series, figures and report of that drive into this directory
     #[arg(long, value_name = "DIR", requires = "replay")]
     replay_out: Option<PathBuf>,
     /// Only check the file, and print how many drives it plans, with its first rows
     #[arg(long)]
-    plan: bool,
+    dry_run: bool,
     /// Print the summary as one JSON object instead of tables
-    #[arg(long, conflicts_with_all = ["replay", "plan"])]
+    #[arg(long, conflicts_with_all = ["replay", "dry_run"])]
     json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let sweep = Sweep::load(&arguments.file)?;
-    if arguments.plan {
+    if arguments.dry_run {
         print(&files::plan(&sweep))?;
         return Ok(Outcome::Good);
     }

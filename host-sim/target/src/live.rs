@@ -176,7 +176,7 @@ impl View {
                 }
             }
             Rejection::ID => self.rejection(&decoded(frame)?, changes),
-            // Parameters are `host-sim parameters`'s.
+            // Parameters are `host-sim ecu parameters`'s.
             _ => {}
         }
         Some(())

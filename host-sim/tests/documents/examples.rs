@@ -23,8 +23,8 @@ use super::{documents, place, root, run};
 const SHORTER: [(&str, &str); 4] = [
     ("--seeds 20", "--seeds 1"),
     ("--repetitions 200", "--repetitions 1"),
-    ("-- experiment --probe", "-- experiment --participants 3 --probe"),
-    ("-- reliance", "-- reliance --participants 3 --seeds 1"),
+    ("-- experiment --probe", "-- experiment --participant 3 --probe"),
+    ("-- reliance", "-- reliance --participant 3 --seeds 1"),
 ];
 
 /// A fenced block: its first line without the backticks, and its text.
@@ -124,7 +124,8 @@ fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
 
 /// Whether a command's help has the options that the line names.
 fn knows(arguments: &[&str], program: &mut Command, place: &Path, at: &str) -> bool {
-    let command = arguments.first().filter(|w| !w.starts_with('-'));
+    let levels = if arguments.first() == Some(&"ecu") { 2 } else { 1 };
+    let command = arguments.iter().take(levels).filter(|w| !w.starts_with('-'));
     let (code, help, err) = run(program.args(command).arg("--help"), place, at);
     assert_eq!(code, Some(0), "{at}\n{err}");
     let mut options = arguments.iter().filter(|w| w.starts_with("--"));

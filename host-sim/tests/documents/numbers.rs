@@ -6,34 +6,45 @@ use std::process::Command;
 
 use super::{documents, place, root, run};
 
-/// Every command of the program has its row in the reference.
+/// What `--help` of a command lists: the commands below each heading that is indented by nothing.
+fn listed(arguments: &[&str]) -> Vec<(String, Vec<String>)> {
+    let place = place();
+    let mut program = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    let (_, help, _) = run(program.args(arguments).arg("--help"), place.path(), "--help");
+    let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+    for line in help.lines() {
+        if let Some(title) = line.strip_suffix(':').filter(|title| !title.starts_with(' ')) {
+            groups.push((title.into(), Vec::new()));
+        } else if line.starts_with("  ") && !line.starts_with("   ") {
+            let name = line.split_whitespace().next().filter(|name| *name != "help");
+            groups.last_mut().unwrap().1.extend(name.map(String::from));
+        }
+    }
+    groups.retain(|(title, _)| title != "Options");
+    groups
+}
+
+/// Every command of the program has its row in the reference, below the heading that `--help` has.
 #[test]
 fn the_reference_names_every_command() {
-    let place = place();
-    let (_, help, _) = run(
-        Command::new(env!("CARGO_BIN_EXE_host-sim")).arg("--help"),
-        place.path(),
-        "--help",
-    );
-    let commands = help
-        .split("Commands:\n")
-        .nth(1)
-        .unwrap()
-        .split("\n\n")
-        .next()
-        .unwrap();
-    let names: Vec<_> = commands
-        .lines()
-        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| *name != "help")
-        .collect();
-    assert!(names.len() > 9, "{names:?}");
     let reference = std::fs::read_to_string(root().join("docs/reference/commands.md")).unwrap();
-    for name in names {
-        let [row, row_with_arguments] = [format!("\n| `{name}`"), format!("\n| `{name} ")];
-        let named = reference.contains(&row) || reference.contains(&row_with_arguments);
-        assert!(named, "docs/reference/commands.md: no row for {name}");
+    let groups = listed(&[]);
+    assert!(groups.len() > 3, "{groups:?}");
+    for (title, names) in groups {
+        let part = reference.split(&format!("\n### {title}\n")).nth(1);
+        let part = part.unwrap_or_else(|| panic!("docs/reference/commands.md: no heading {title}"));
+        let part = part.split("\n#").next().unwrap();
+        let below = match names.iter().any(|name| name == "ecu") {
+            true => listed(&["ecu"]).remove(0).1,
+            false => Vec::new(),
+        };
+        let below = below.iter().map(|name| format!("ecu {name}"));
+        let own = names.iter().filter(|name| *name != "ecu").cloned();
+        for name in own.chain(below) {
+            let [row, row_with_arguments] = [format!("\n| `{name}`"), format!("\n| `{name} ")];
+            let named = part.contains(&row) || part.contains(&row_with_arguments);
+            assert!(named, "docs/reference/commands.md: {title}: no row for {name}");
+        }
     }
 }
 
@@ -101,7 +112,11 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
 fn the_load_of_the_bus_in_the_design_is_what_the_command_prints() {
     let place = place();
     let mut bus = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    let (_, out, err) = run(bus.args(["bus", "--json"]), place.path(), "host-sim bus");
+    let (_, out, err) = run(
+        bus.args(["ecu", "bus", "--json"]),
+        place.path(),
+        "host-sim ecu bus",
+    );
     let load: serde_json::Value = serde_json::from_str(&out).expect(&err);
     let percent = |name: &str| format!("{:.0} %", 100.0 * load[name].as_f64().unwrap());
     let sentence = format!(": {}, of {} allowed.", percent("load"), percent("max_load"));

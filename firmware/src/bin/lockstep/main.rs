@@ -16,7 +16,7 @@ mod fifo;
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("lockstep runs on a target: `cargo run --release -- pil`");
+    eprintln!("lockstep runs on a target: `cargo run --release -- ecu pil`");
 }
 
 #[cfg(target_os = "none")]

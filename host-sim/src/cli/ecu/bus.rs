@@ -1,4 +1,4 @@
-//! `bus`: the worst-case load of the CAN bus.
+//! `host-sim ecu bus`: the worst-case load of the CAN bus.
 
 use std::path::PathBuf;
 
@@ -6,11 +6,11 @@ use clap::Args;
 use haptic_batch::bus_load::table;
 use haptic_report::studies::bus::Load;
 
-use super::output::Output;
-use super::{BadInput, Outcome, print, print_json};
+use super::super::output::Output;
+use super::super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(in crate::cli) struct Arguments {
     /// Directory for a figure, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

@@ -1,4 +1,4 @@
-//! `host-sim parameters [SCENARIO.toml] --can IFACE`.
+//! `host-sim ecu parameters [SCENARIO.toml] --can IFACE`.
 
 use std::path::PathBuf;
 
@@ -11,10 +11,10 @@ use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
 
-use super::{BadInput, Outcome, print, print_json};
+use super::super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(in crate::cli) struct Arguments {
     /// Scenario file (TOML, see docs/files.md) whose guidance and vehicle the ECU is to store; without one it only
     /// says what it has
     #[arg(value_name = "SCENARIO.toml")]

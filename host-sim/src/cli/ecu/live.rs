@@ -1,4 +1,4 @@
-//! `host-sim live`: a bus as it comes, or as it was recorded.
+//! `host-sim ecu live`: a bus as it comes, or as it was recorded.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -14,11 +14,11 @@ use haptic_target::PilError;
 use haptic_target::live::{Counts, Listener, Status, View};
 use serde_json::json;
 
-use super::{BadInput, Outcome, print};
+use super::super::{BadInput, Outcome, print};
 
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("source").required(true))]
-pub(super) struct Arguments {
+pub(in crate::cli) struct Arguments {
     /// The way to the bus: a CAN interface (can0), the serial port of an SLCAN adapter (/dev/ttyUSB0), or
     /// tcp:HOST:PORT. Nothing is sent
     #[arg(long, value_name = "IFACE", group = "source", value_parser = NonEmptyStringValueParser::new())]

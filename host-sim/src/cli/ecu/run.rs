@@ -1,4 +1,4 @@
-//! `host-sim ecu`: the ECU in QEMU, for clients on the clock of the wall.
+//! `host-sim ecu run`: the ECU in QEMU, for clients on the clock of the wall.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use haptic_target::bench::Bench;
 
-use super::{BadInput, Outcome, print};
+use super::super::{BadInput, Outcome, print};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(in crate::cli) struct Arguments {
     /// Where clients join the bus, by SLCAN: HOST:PORT; port 0 for any that is free
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:3333")]
     listen: String,

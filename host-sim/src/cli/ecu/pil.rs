@@ -1,4 +1,4 @@
-//! `host-sim pil [SCENARIO.toml]`.
+//! `host-sim ecu pil [SCENARIO.toml]`.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,10 @@ use haptic_sim::scenario::Scenario;
 use haptic_target::{Channel, Machine, PilError, Target};
 use host_sim::processor::{self, ProcessorError};
 
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
-pub(super) struct Arguments {
+pub(in crate::cli) struct Arguments {
     /// Scenario file (TOML, see docs/files.md); default: medium reliance on paper-course
     #[arg(value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,

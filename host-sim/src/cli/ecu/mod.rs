@@ -1,0 +1,35 @@
+//! `host-sim ecu COMMAND`: the ECU itself, in QEMU or on a board, and its bus.
+
+mod bus;
+mod live;
+mod parameters;
+mod pil;
+mod run;
+
+use clap::Subcommand;
+
+use super::{BadInput, Outcome};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// The ECU in QEMU on a bus that keeps the time of the wall, for any SLCAN client
+    Run(run::Arguments),
+    /// One scenario with the ECU's image in QEMU or on a board, every frame compared with the desktop's
+    Pil(pil::Arguments),
+    /// What goes over the bus of a real ECU as it comes: mode, torques, faults, K_hg; and a recording of it
+    Live(live::Arguments),
+    /// What parameters an ECU on a real bus uses; new ones for it to store
+    Parameters(parameters::Arguments),
+    /// The worst-case load of the CAN bus, message by message
+    Bus(bus::Arguments),
+}
+
+pub(super) fn run(command: &Command) -> Result<Outcome, BadInput> {
+    match command {
+        Command::Run(arguments) => run::run(arguments),
+        Command::Pil(arguments) => pil::run(arguments),
+        Command::Live(arguments) => live::run(arguments),
+        Command::Parameters(arguments) => parameters::run(arguments),
+        Command::Bus(arguments) => bus::run(arguments),
+    }
+}
