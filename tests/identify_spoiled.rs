@@ -1,30 +1,30 @@
 //! Logs as cars and simulators really record them, with a known truth: nothing that is wrong may be called identified, what
 //! is wrong with the sensors has to be named, and what is only noisy must not be given up.
 //!
-//! Three participants and one seed here; `host-sim experiment --probe 0.2 --spoiled 20` drives all of them.
+//! Three participants and one seed here; `host-sim validate --corruptions 20` drives all of them.
 
 use std::sync::LazyLock;
 
-use haptic_batch::experiment::{Plan, Spoiled, SpoiledLine, spoiled};
+use haptic_batch::experiment::{CorruptionLine, Corruptions, Plan, corruptions};
 
-static FOUND: LazyLock<Spoiled> = LazyLock::new(|| {
+static FOUND: LazyLock<Corruptions> = LazyLock::new(|| {
     let plan = Plan {
         participants: vec![2, 5, 9],
         probe_nm: 0.2,
         seed: 1,
     };
-    spoiled(&plan, 1, "", || {}).unwrap()
+    corruptions(&plan, 1, "", || {}).unwrap()
 });
 
-fn line(name: &str) -> &'static SpoiledLine {
-    FOUND.lines.iter().find(|l| l.spoiled_by == name).unwrap()
+fn line(name: &str) -> &'static CorruptionLine {
+    FOUND.lines.iter().find(|l| l.corrupted_by == name).unwrap()
 }
 
 #[test]
 fn nothing_wrong_is_called_identified() {
     let mut identified = 0;
     for l in &FOUND.lines {
-        assert_eq!(l.lies, 0, "{l:?}");
+        assert_eq!(l.false_identifications, 0, "{l:?}");
         identified += l.identified;
     }
     // Not by giving up: clean logs, noise and single faults leave most of it.

@@ -3,10 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::experiment::{
-    Drive, Experiment, POPULATION, Plan, Repetitions, experiment, methods, repeat, spoiled,
-};
-
+use haptic_batch::experiment::{Drive, Experiment, Plan, experiment};
 use haptic_report::studies::experiment as files;
 
 use super::output::Output;
@@ -29,31 +26,11 @@ pub(super) struct Arguments {
     /// Seed of the remnants
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Instead: repeat each guided drive N times with seeds from --seed on, and hold the 95 % intervals of the
-    /// default method against the truth
-    #[arg(long, value_name = "N", conflicts_with = "out", value_parser = clap::value_parser!(u32).range(1..))]
-    repetitions: Option<u32>,
-    /// Instead: spoil N guided drives of each participant as real logs are (noise, outliers, gaps, hands off, wrong
-    /// scales, delays and signs), and count the values that are called identified and are wrong; needs a --probe.
-    /// Exit code 1 if more than 1 of 1,000 is, or if lane noise costs too much
-    #[arg(long, value_name = "N", conflicts_with_all = ["out", "repetitions"], value_parser = clap::value_parser!(u32).range(1..))]
-    spoiled: Option<u32>,
-    /// Instead: repeat each guided drive N times and check that the 95 % intervals of each parameter hold the truth in 93
-    /// to 97 % of the drives; needs a --probe. Exit code 1 if they do not
-    #[arg(long, value_name = "N", conflicts_with_all = ["out", "repetitions", "spoiled"], value_parser = clap::value_parser!(u32).range(1..))]
-    coverage: Option<u32>,
-    /// Instead: put more and more camera noise on N guided drives of each participant, and compare the ways to treat it
-    /// (none, a plain smoother, the default, the published method) with the information bound; needs a --probe
-    #[arg(long, value_name = "N", conflicts_with_all = ["out", "repetitions", "spoiled", "coverage"], value_parser = clap::value_parser!(u32).range(1..))]
-    methods: Option<u32>,
-    /// Of --spoiled: only the ways whose name holds this
-    #[arg(long, value_name = "TEXT", default_value = "", requires = "spoiled")]
-    only: String,
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/experiment")]
     out: PathBuf,
     /// Write the recorded drives too, a CSV file each, into the directory's logs/
-    #[arg(long, conflicts_with = "repetitions")]
+    #[arg(long)]
     logs: bool,
     /// Print the results as one JSON object instead of tables
     #[arg(long)]
@@ -66,43 +43,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         probe_nm: arguments.probe,
         seed: arguments.seed,
     };
-    if let Some(seeds) = arguments.methods {
-        let bar = progress::bar(plan.participants.len() as u64 * u64::from(seeds), "drives");
-        let lines = methods(&plan, seeds, || bar.inc(1))?;
-        bar.finish_and_clear();
-        if arguments.json {
-            print_json(&lines)?;
-        } else {
-            print(&files::methods_table(&lines).to_text())?;
-        }
-        return Ok(Outcome::Good);
-    }
-    if let Some(repetitions) = arguments.repetitions.or(arguments.coverage) {
-        let drives = plan.participants.len() as u64 * u64::from(repetitions);
-        let bar = progress::bar(drives, "drives");
-        let result = repeat(&plan, repetitions, || bar.inc(1))?;
-        bar.finish_and_clear();
-        if arguments.json {
-            print_json(&result)?;
-        } else {
-            print(&repeated(&result))?;
-        }
-        if arguments.coverage.is_none() {
-            return Ok(Outcome::Good);
-        }
-        let off = files::off_coverage(&result);
-        for line in &off {
-            eprintln!("NOT KEPT: {line}");
-        }
-        return Ok(if off.is_empty() {
-            Outcome::Good
-        } else {
-            Outcome::Failed
-        });
-    }
-    if let Some(seeds) = arguments.spoiled {
-        return run_spoiled(arguments, &plan, seeds);
-    }
     let output = Output::begin(&arguments.out)?;
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
@@ -120,46 +60,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(Outcome::Good)
-}
-
-fn run_spoiled(arguments: &Arguments, plan: &Plan, seeds: u32) -> Result<Outcome, BadInput> {
-    let chosen = POPULATION
-        .iter()
-        .filter(|(name, _)| name.contains(&arguments.only));
-    let ways = chosen.count() as u64;
-    if ways == 0 {
-        let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
-        return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
-    }
-    let drives = ways * plan.participants.len() as u64 * u64::from(seeds);
-    let bar = progress::bar(drives, "drives");
-    let result = spoiled(plan, seeds, &arguments.only, || bar.inc(1))?;
-    bar.finish_and_clear();
-    if arguments.json {
-        print_json(&result)?;
-    } else {
-        let mut text = format!(
-            "{} drives of each participant, probe {} N.m, seeds from {}\n\n{}\n{}\nInformation bound of gain_1, gain_2, gain_3, \
-             t_p, K_hg on clean logs: {}\n{} wrong of {} identified",
-            result.seeds,
-            plan.probe_nm,
-            plan.seed,
-            files::spoiled_table(&result).to_text(),
-            files::held_table(&result).to_text(),
-            result.bound.map(|b| format!("{b:.4}")).join(", "),
-            result.lies,
-            result.identified
-        );
-        for broken in &result.broken {
-            text.push_str(&format!("\nNOT KEPT: {broken}"));
-        }
-        print(&text)?;
-    }
-    Ok(if result.broken.is_empty() {
-        Outcome::Good
-    } else {
-        Outcome::Failed
-    })
 }
 
 fn readable(result: &Experiment) -> String {
@@ -190,15 +90,5 @@ fn readable(result: &Experiment) -> String {
         mean(true, |d| Some(d.paper.identification.fit_percent)),
         mean(true, |d| d.noise_model.trajectory_error_m),
         mean(true, |d| d.paper.trajectory_error_m),
-    )
-}
-
-fn repeated(result: &Repetitions) -> String {
-    format!(
-        "{} repetitions of each guided drive, probe {} N.m, seeds from {}; errors where identified\n\n{}",
-        result.repetitions,
-        result.probe_nm,
-        result.seed,
-        files::repetitions_table(result).to_text()
     )
 }

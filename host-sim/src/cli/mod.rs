@@ -31,6 +31,7 @@ mod series;
 mod stability;
 mod study;
 mod sweep;
+mod validate;
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -84,6 +85,8 @@ enum Command {
     ///
     /// Each session leaves a recording that is never overwritten; the metrics come by condition.
     Study(study::Arguments),
+    /// How right the estimates of `identify` are, on drivers with a known truth
+    Validate(validate::Arguments),
     /// A recording in another format, or the list of its channels
     ///
     /// CSV, Parquet, MAT, MDF4, MCAP, candump, ASC, BLF.
@@ -165,6 +168,7 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Drivers(arguments) => drivers::run(arguments),
         Command::Design(arguments) => design::run(arguments),
         Command::Study(arguments) => study::run(arguments),
+        Command::Validate(arguments) => validate::run(arguments),
         Command::Convert(arguments) => convert::run(arguments),
         Command::Faults(arguments) => faults::run(arguments),
         Command::Availability(arguments) => availability::run(arguments),

@@ -11,7 +11,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Drive", &["run", "sweep", "course", "stability", "lab"]),
     (
         "People",
-        &["identify", "drivers", "design", "study", "convert"],
+        &["identify", "drivers", "design", "study", "validate", "convert"],
     ),
     (
         "The ECU in simulation",
@@ -21,7 +21,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
 ];
 
 /// Command (none: the program itself), name of an older version, what replaces it.
-const RENAMED: [(&str, &str, &str); 12] = [
+const RENAMED: [(&str, &str, &str); 17] = [
     ("", "pil", "host-sim ecu pil"),
     ("", "live", "host-sim ecu live"),
     ("", "parameters", "host-sim ecu parameters"),
@@ -33,6 +33,11 @@ const RENAMED: [(&str, &str, &str); 12] = [
     ("identify", "--exact-lane", "--no-lane-smoothing"),
     ("sweep", "--plan", "--dry-run"),
     ("study", "--plan", "--dry-run"),
+    ("experiment", "--coverage", "host-sim validate --coverage"),
+    ("experiment", "--repetitions", "host-sim validate --coverage"),
+    ("experiment", "--spoiled", "host-sim validate --corruptions"),
+    ("experiment", "--methods", "host-sim validate --methods"),
+    ("experiment", "--only", "host-sim validate --only"),
     ("availability", "--most-per-hour", "--max-rate"),
 ];
 

@@ -8,9 +8,9 @@ use haptic_analysis::identify::{Identification, Options, identify_as_published, 
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::drives::driven;
 use super::repetitions::{COMPARED, bound_of, compared};
-use super::spoiled::{POPULATION, Spoiling, spoiled_log};
 use super::{Plan, chosen};
 
 /// The ways.
@@ -33,19 +33,34 @@ pub struct MethodLine {
     pub coverage: Option<f64>,
 }
 
+/// All ways on all levels of noise.
+#[derive(Debug, Clone, Serialize)]
+pub struct Methods {
+    /// Numbers of the participants.
+    pub participants: Vec<u32>,
+    /// Amplitude of the probe, N.m.
+    pub probe_nm: f64,
+    /// Seed of the first drive of each participant; the others count on from it.
+    pub seed: u64,
+    /// Drives of each participant.
+    pub seeds: u32,
+    /// By noise and way.
+    pub lines: Vec<MethodLine>,
+}
+
 /// Identifies `seeds` guided drives of each participant of `plan` in all ways; `done` is called after each drive.
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Vec<MethodLine>, String> {
+pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, String> {
     let drivers = chosen(&plan.participants)?;
     let jobs: Vec<_> = drivers
         .iter()
         .flat_map(|p| (0..u64::from(seeds)).map(move |s| (p.number, p.guided, s)))
         .collect();
-    let noises: Vec<(&'static str, &[Spoiling])> = POPULATION
+    let noises: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()
-        .filter(|(_, ways)| matches!(ways, [] | [Spoiling::LaneNoise(..)]))
+        .filter(|(_, ways)| matches!(ways, [] | [Corruption::LaneNoise(..)]))
         .copied()
         .collect();
     let found = jobs
@@ -60,7 +75,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Vec<Me
             let values: Vec<_> = noises
                 .iter()
                 .flat_map(|(_, ways)| {
-                    let log = spoiled_log(&log, ways, &plan, number);
+                    let log = corrupted_log(&log, ways, &plan, number);
                     let none = Options {
                         lane_noise: false,
                         ..Options::default()
@@ -111,5 +126,11 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Vec<Me
             });
         }
     }
-    Ok(lines)
+    Ok(Methods {
+        participants: plan.participants.clone(),
+        probe_nm: plan.probe_nm,
+        seed: plan.seed,
+        seeds,
+        lines,
+    })
 }

@@ -12,19 +12,21 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
+mod corruption;
+mod corruptions;
 mod drives;
 mod methods;
 mod recorder;
 mod repetitions;
-mod spoiled;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-pub use methods::{METHODS, MethodLine, methods};
+pub use corruption::{Corruption, POPULATION};
+pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
+pub use methods::{METHODS, MethodLine, Methods, methods};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};
-pub use spoiled::{Held, POPULATION, Spoiled, SpoiledLine, Spoiling, spoiled};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, TABLE_4, Truth, identify_as_published,

@@ -18,6 +18,7 @@ pub mod run;
 pub mod stability;
 pub mod study;
 pub mod sweep;
+pub mod validation;
 
 use crate::document::WriteError;
 use crate::plot::PlotError;

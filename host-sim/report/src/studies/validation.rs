@@ -1,0 +1,393 @@
+//! What is shown of the estimator's validation: tables for terminal and report, a figure, and the files with them.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::OutputError;
+use super::files::{write_figure, write_report};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::plot::{Axis, Figure, Panel, Series};
+use haptic_batch::experiment::{
+    CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
+};
+
+/// One of the three questions that the validation asks, answered.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Validation {
+    /// Do the intervals hold the truth as often as they say?
+    Coverage(Repetitions),
+    /// Is anything wrong called identified on corrupted logs?
+    Corruptions(Box<Corruptions>),
+    /// What is each way to treat camera noise worth?
+    Methods(Methods),
+}
+
+impl Validation {
+    /// With its provenance. Every drive follows from the published drivers, the probe and the seeds.
+    pub fn stamped(&self) -> Stamped<'_, Self> {
+        Provenance::of(None).stamp(self)
+    }
+
+    /// What was promised and is not kept.
+    pub fn broken(&self) -> Vec<String> {
+        match self {
+            Self::Coverage(result) => off_coverage(result),
+            Self::Corruptions(result) => result.broken.clone(),
+            Self::Methods(_) => Vec::new(),
+        }
+    }
+
+    /// What it rests on, and what came out, in a sentence or two.
+    pub fn summary(&self) -> String {
+        let rests_on = |drives: u32, participants: &[u32], probe_nm: f64, seed: u64| {
+            let numbers: Vec<String> = participants.iter().map(u32::to_string).collect();
+            format!(
+                "Guided drives of each participant: {drives}, of participants {}; probe {probe_nm} N.m, seeds from {seed}",
+                numbers.join(", ")
+            )
+        };
+        match self {
+            Self::Coverage(r) => {
+                let mut who: Vec<u32> = r.participants.iter().filter_map(|p| p.participant).collect();
+                who.dedup();
+                format!("{}.", rests_on(r.repetitions, &who, r.probe_nm, r.seed))
+            }
+            Self::Corruptions(r) => format!(
+                "{}. {} of {} identified values are false. Information bound of gain_1, gain_2, gain_3, t_p, K_hg on clean \
+                 logs: {}.",
+                rests_on(r.seeds, &r.participants, r.probe_nm, r.seed),
+                r.false_identifications,
+                r.identified,
+                r.bound.map(|b| format!("{b:.4}")).join(", ")
+            ),
+            Self::Methods(r) => format!("{}.", rests_on(r.seeds, &r.participants, r.probe_nm, r.seed)),
+        }
+    }
+
+    /// Its tables.
+    pub fn tables(&self) -> Vec<Table> {
+        match self {
+            Self::Coverage(result) => vec![repetitions_table(result)],
+            Self::Corruptions(result) => vec![corruptions_table(result), held_table(result)],
+            Self::Methods(result) => vec![methods_table(&result.lines)],
+        }
+    }
+
+    /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
+    ///
+    /// # Errors
+    /// What could not be written or drawn.
+    pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
+        let (name, title, caption) = match self {
+            Self::Coverage(_) => (
+                "coverage",
+                "Do the 95 % intervals hold the truth?",
+                "Share of the drives whose 95 % interval holds the truth, for t_nms as it is in them. Between the lines is \
+                 what is wanted of all participants together.",
+            ),
+            Self::Corruptions(_) => (
+                "corruptions",
+                "What is identified from corrupted logs?",
+                "By corruption: how many of the values are called identified, and how many of their 95 % intervals hold the \
+                 truth.",
+            ),
+            Self::Methods(_) => (
+                "methods",
+                "What is each way to treat camera noise worth?",
+                "RMS errors by noise on the lane signals, as multiples of the information bound: the least of an unbiased estimator \
+                 from exact ones. Beyond 6 bounds only the table shows them.",
+            ),
+        };
+        let figure = self.figure();
+        write_figure(directory, name, &figure)?;
+        write_json(&directory.join("results.json"), &self.stamped())?;
+        let caption = caption.into();
+        let broken = self.broken().into_iter().map(|line| format!("Not kept: {line}."));
+        let mut blocks: Vec<Block> = broken.map(Block::Text).collect();
+        blocks.push(Block::Figure { figure, caption });
+        blocks.extend(self.tables().into_iter().map(Block::Table));
+        write_report(
+            directory,
+            &Report {
+                title: title.into(),
+                summary: self.summary(),
+                sections: vec![Section {
+                    heading: "Truth and estimate".into(),
+                    blocks,
+                }],
+                provenance: Some(Provenance::of(None)),
+            },
+        )
+    }
+
+    fn figure(&self) -> Figure {
+        match self {
+            Self::Coverage(result) => coverage_figure(result),
+            Self::Corruptions(result) => corruptions_figure(result),
+            Self::Methods(result) => methods_figure(&result.lines),
+        }
+    }
+}
+
+/// Place of a row in a figure of rows.
+fn place(row: usize) -> f64 {
+    row as f64 + 1.0
+}
+
+/// So that dots of one row do not hide one another.
+const ASIDE: f64 = 0.2;
+
+fn coverage_figure(result: &Repetitions) -> Figure {
+    let rows: Vec<&str> = result.pooled.iter().map(|p| p.parameter).collect();
+    let dots = |label: &str, style, aside: f64, lines: &[Repeated]| {
+        let point = |p: &Repeated| {
+            let row = rows.iter().position(|name| *name == p.parameter)?;
+            Some((place(row) + aside, 100.0 * p.coverage_at_t_nms))
+        };
+        Series::dots(label, style, lines.iter().filter_map(point).collect())
+    };
+    let wanted = [KEPT.start(), KEPT.end()].map(|share| {
+        let ends = [0.5, rows.len() as f64 + 0.5];
+        Series::line("wanted of all", 0, ends.map(|x| (x, 100.0 * share)).to_vec())
+    });
+    let mut series = wanted.to_vec();
+    series.push(dots("each participant", 2, ASIDE, &result.participants));
+    series.push(dots("all participants", 1, -ASIDE, &result.pooled));
+    Figure {
+        panels: vec![Panel {
+            title: String::new(),
+            y: Axis::of("95 % intervals that hold the truth (%)"),
+            series,
+        }],
+        rows: rows.into_iter().map(String::from).collect(),
+        ..Figure::default()
+    }
+}
+
+fn corruptions_figure(result: &Corruptions) -> Figure {
+    let panel = |label: &str, share: fn(&CorruptionLine) -> Option<f64>| {
+        let lines = result.lines.iter().enumerate();
+        let points = lines.filter_map(|(row, line)| Some((place(row), 100.0 * share(line)?)));
+        Panel {
+            title: String::new(),
+            y: Axis {
+                label: label.into(),
+                limits: Some((-2.0, 102.0)),
+                ..Axis::default()
+            },
+            series: vec![Series::dots("", 1, points.collect())],
+        }
+    };
+    Figure {
+        rows: result.lines.iter().map(|l| l.corrupted_by.into()).collect(),
+        panels: vec![
+            panel("Values identified (%)", |l| {
+                Some(l.identified as f64 / (l.intervals.len() * l.drives).max(1) as f64)
+            }),
+            panel("Their 95 % intervals that hold (%)", |l| l.coverage),
+        ],
+        ..Figure::default()
+    }
+}
+
+/// Most that the figure shows of an error, in information bounds.
+const SHOWN: f64 = 6.0;
+
+fn methods_figure(lines: &[MethodLine]) -> Figure {
+    let mut noises: Vec<&str> = lines.iter().map(|l| l.noise).collect();
+    noises.dedup();
+    let series = |line: &MethodLine| {
+        let style = METHODS.iter().position(|m| *m == line.method).unwrap_or(0);
+        let aside = ASIDE * (style as f64 - 1.5) / 1.5;
+        let errors = line.rms.iter().zip(&line.bound).enumerate();
+        let points = errors.map(|(row, (rms, bound))| (place(row) + aside, rms / bound));
+        Series::dots(line.method, style + 1, points.collect())
+    };
+    let panel = |noise: &&str| Panel {
+        title: noise.trim_start_matches("lane noise ").into(),
+        y: Axis {
+            label: "RMS error / bound".into(),
+            limits: Some((0.0, SHOWN)),
+            ..Axis::default()
+        },
+        series: lines.iter().filter(|l| l.noise == *noise).map(series).collect(),
+    };
+    Figure {
+        rows: ["gain_1", "gain_2", "gain_3", "t_p", "K_hg"]
+            .map(String::from)
+            .to_vec(),
+        panels: noises.iter().map(panel).collect(),
+        ..Figure::default()
+    }
+}
+
+/// What was made of each corruption.
+fn corruptions_table(result: &Corruptions) -> Table {
+    let row = |l: &CorruptionLine| {
+        let count = |n: usize| Cell::number(n as f64, 0);
+        let mut cells = vec![
+            Cell::Text(l.corrupted_by.into()),
+            count(l.drives),
+            count(l.refuted),
+            count(l.identified),
+            count(l.false_identifications),
+            Cell::Number {
+                value: l.coverage,
+                decimals: 3,
+            },
+        ];
+        cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
+        cells.push(count(l.k_hg_read));
+        let cause = l.cause.as_ref().map(|(cause, n)| format!("{n}: {cause}"));
+        cells.push(Cell::Text(cause.unwrap_or_default()));
+        cells
+    };
+    Table {
+        caption: "False: called identified, and more than 4 standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. RMS \
+                  errors are those of all drives, refuted or not."
+            .into(),
+        columns: [
+            "Corrupted by",
+            "Drives",
+            "Refuted",
+            "Identified",
+            "False",
+            "Coverage of 95 %",
+            "RMS gain_1",
+            "gain_2",
+            "gain_3",
+            "t_p",
+            "K_hg",
+            "K_hg read",
+            "Cause named most",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: result.lines.iter().map(row).collect(),
+    }
+}
+
+/// How many of the 95 % intervals of identified values hold the truth, by corruption and parameter.
+fn held_table(result: &Corruptions) -> Table {
+    let row = |name: &str, held: &[Held; 5]| {
+        let all = held.iter().fold(Held::default(), |sum, &h| sum + h);
+        let cell = |h: Held| {
+            let text = h.share().map(|x| format!("{x:.3} of {}", h.identified));
+            Cell::Text(text.unwrap_or_else(|| "-".into()))
+        };
+        let cells = held.iter().copied().chain([all]).map(cell);
+        std::iter::once(Cell::Text(name.into())).chain(cells).collect()
+    };
+    let lines = result.lines.iter().filter(|l| l.identified > 0);
+    let mut rows: Vec<Vec<Cell>> = lines.map(|l| row(l.corrupted_by, &l.intervals)).collect();
+    rows.push(row("all, t_nms as assumed", &result.intervals_at_t_nms));
+    rows.push(row("all", &result.intervals));
+    Table {
+        caption: "Share of the 95 % intervals of identified values that hold the truth. Corruptions with which nothing is identified are \
+                  left out."
+            .into(),
+        columns: ["Corrupted by", "gain_1", "gain_2", "gain_3", "t_p", "K_hg", "All"]
+            .map(String::from)
+            .to_vec(),
+        rows,
+    }
+}
+
+/// Shares of the truth that 95 % intervals have to hold.
+const KEPT: std::ops::RangeInclusive<f64> = 0.93..=0.97;
+
+/// The parameters whose intervals, for t_nms as it is in these drives, hold the truth too seldom or too often, in words.
+fn off_coverage(result: &Repetitions) -> Vec<String> {
+    let off = result
+        .pooled
+        .iter()
+        .filter(|p| !KEPT.contains(&p.coverage_at_t_nms));
+    off.map(|p| {
+        format!(
+            "{}: the 95 % intervals hold the truth in {:.1} % of the drives, 93 to 97 are wanted",
+            p.parameter,
+            100.0 * p.coverage_at_t_nms
+        )
+    })
+    .collect()
+}
+
+/// What each way to treat camera noise is worth.
+fn methods_table(lines: &[MethodLine]) -> Table {
+    let row = |l: &MethodLine| {
+        let mut cells = vec![
+            Cell::Text(l.noise.into()),
+            Cell::Text(l.method.into()),
+            Cell::number(l.drives as f64, 0),
+        ];
+        cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
+        cells.push(Cell::Number {
+            value: l.coverage,
+            decimals: 3,
+        });
+        cells
+    };
+    let bound = lines.first().map(|l| {
+        let mut cells = vec![
+            Cell::Text("none".into()),
+            Cell::Text("information bound".into()),
+            Cell::Text("-".into()),
+        ];
+        cells.extend(l.bound.iter().map(|&x| Cell::number(x, 4)));
+        cells.push(Cell::Text("-".into()));
+        cells
+    });
+    Table {
+        caption: "RMS errors by noise on the lane signals and way to treat it, and the share of 95 % intervals that hold.".into(),
+        columns: ["Noise", "Method", "Drives", "RMS gain_1", "gain_2", "gain_3", "t_p", "K_hg", "Coverage"]
+            .map(String::from)
+            .to_vec(),
+        rows: lines.iter().map(row).chain(bound).collect(),
+    }
+}
+
+/// Estimates of repeated drives against the truth.
+fn repetitions_table(result: &Repetitions) -> Table {
+    let row = |line: &Repeated| {
+        let number = |value, decimals| Cell::Number { value, decimals };
+        vec![
+            Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
+            Cell::Text(line.parameter.into()),
+            Cell::number(line.drives as f64, 0),
+            number(Some(line.identified), 3),
+            number(Some(line.coverage), 3),
+            number(Some(line.coverage_at_t_nms), 3),
+            number(line.bias, 4),
+            number(line.rms, 4),
+            number(line.largest, 4),
+            number(line.standard_error, 4),
+            number(Some(line.bound), 4),
+        ]
+    };
+    Table {
+        caption: String::new(),
+        columns: [
+            "Participant",
+            "Parameter",
+            "Drives",
+            "Identified",
+            "Coverage of 95 %",
+            "same, t_nms known",
+            "Bias",
+            "RMS error",
+            "Largest error",
+            "Mean standard error",
+            "Information bound",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: result
+            .participants
+            .iter()
+            .chain(&result.pooled)
+            .map(row)
+            .collect(),
+    }
+}

@@ -1,0 +1,106 @@
+//! `host-sim validate`: the estimates of `identify` against drivers whose truth is known.
+
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args};
+use haptic_batch::experiment::{POPULATION, Plan, corruptions, methods, repeat};
+use haptic_report::studies::validation::Validation;
+
+use super::output::Output;
+use super::participants::Participants;
+use super::{BadInput, Outcome, print, print_json, progress};
+
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("question").required(true))]
+pub(super) struct Arguments {
+    /// Drive N times with each participant, and ask whether the 95 % intervals of each parameter hold the truth in 93 to
+    /// 97 % of the drives (200 drives tell). Exit code 1 if they do not
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
+    coverage: Option<u32>,
+    /// Corrupt N drives of each participant as real logs are (noise, outliers, gaps, hands off, wrong scales, delays and
+    /// signs), and count the values that are called identified and are false. Exit code 1 if more than 1 of 1,000 is, or
+    /// if lane noise costs too much
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
+    corruptions: Option<u32>,
+    /// Put more and more camera noise on N drives of each participant, and compare the ways to treat it (none, a plain
+    /// smoother, the default, the published method) with the information bound
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
+    methods: Option<u32>,
+    /// Of --corruptions: only those whose name holds this
+    #[arg(long, value_name = "TEXT", default_value = "", requires = "corruptions")]
+    only: String,
+    #[command(flatten)]
+    participants: Participants,
+    /// Amplitude of the probe, N.m (0: none): a small torque added to the guidance, whose answer tells K_hg
+    #[arg(
+        long,
+        value_name = "AMPLITUDE",
+        default_value_t = 0.2,
+        allow_negative_numbers = true
+    )]
+    probe: f64,
+    /// Seed of the remnants of the first drive of each participant; the others count on from it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Directory for a figure, the results and a report; default: no files
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the results as one JSON object instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let plan = Plan {
+        participants: arguments.participants.numbers(),
+        probe_nm: arguments.probe,
+        seed: arguments.seed,
+    };
+    let ways = POPULATION
+        .iter()
+        .filter(|(name, _)| name.contains(&arguments.only));
+    let ways = ways.count() as u64;
+    if ways == 0 {
+        let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
+        return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
+    }
+    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let seeds = arguments
+        .coverage
+        .or(arguments.corruptions)
+        .or(arguments.methods)
+        .unwrap_or(1);
+    let fits = if arguments.corruptions.is_some() { ways } else { 1 };
+    let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
+    let bar = progress::bar(drives, "drives");
+    let done = || bar.inc(1);
+    let result = if arguments.coverage.is_some() {
+        Validation::Coverage(repeat(&plan, seeds, done)?)
+    } else if arguments.corruptions.is_some() {
+        Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, done)?))
+    } else {
+        Validation::Methods(methods(&plan, seeds, done)?)
+    };
+    bar.finish_and_clear();
+    if let Some(output) = output {
+        output.finish(|place| result.write(place))?;
+    }
+    if arguments.json {
+        print_json(&result.stamped())?;
+    } else {
+        let tables: Vec<String> = result.tables().iter().map(|table| table.to_text()).collect();
+        print(&format!("{}\n\n{}", result.summary(), tables.join("\n")))?;
+    }
+    let broken = result.broken();
+    for line in &broken {
+        eprintln!("NOT KEPT: {line}");
+    }
+    if let Some(directory) = &arguments.out {
+        eprintln!("Report: {}", directory.join("report.html").display());
+    }
+    Ok(if broken.is_empty() {
+        Outcome::Good
+    } else {
+        Outcome::Failed
+    })
+}

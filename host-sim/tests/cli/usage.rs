@@ -1,0 +1,190 @@
+//! Bad input and bad usage: exit code 2, and a sentence that says what is wrong or what to write.
+
+use super::{host_sim, stderr};
+
+#[test]
+#[expect(clippy::too_many_lines, reason = "a table of bad inputs")]
+fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("short.toml", "[[segment]]\nlength = 10\n");
+    write("tight.toml", "[[segment]]\nlength = 100\ncurvature = 3\n");
+    write("unknown.toml", "[driver]\nt_q = 1\n");
+    write("manual.toml", "condition = 'manual'\n");
+    write("exact.toml", "sensors = 'exact'\n");
+    write("late.toml", "[failure]\nkind = 'torque'\ntime = 5000\n");
+    write("empty.toml", "");
+    write("course.toml", "[[segment]]\nlength = 500\n");
+    let cases: [(&[&str], &str); 23] = [
+        (&["evaluate", "--course", "none.toml"], "none.toml"),
+        (
+            &["evaluate", "--course", "paper-course", "--window", "0", "3351"],
+            "--window to = 3351 m is outside 0 to 3350 m",
+        ),
+        (&["evaluate", "--course", "short.toml"], "look-ahead"),
+        (&["evaluate", "--course", "tight.toml"], "curvature = 3"),
+        (
+            &["evaluate", "--speed", "5"],
+            "--speed = 5 km/h is outside 20 to 250 km/h",
+        ),
+        (
+            &["evaluate", "--speed", "-60"],
+            "--speed = -60 km/h is outside 20 to 250 km/h",
+        ),
+        (
+            &["evaluate", "--window", "-5", "100"],
+            "--window from = -5 m is outside 0 to 3332.3 m: runs end at 3333.3 m",
+        ),
+        (
+            &["evaluate", "--window", "3340", "3350"],
+            "--window from = 3340 m",
+        ),
+        (&["evaluate", "--speed", "nan"], "speed = NaN"),
+        (&["evaluate", "--window", "500", "100"], "window"),
+        (
+            &["evaluate", "--window", "100", "9000"],
+            "--window to = 9000 m is outside 0 to 3350 m",
+        ),
+        (
+            &["evaluate", "--failure-time", "-1"],
+            "--failure-time = -1 s is outside 0 to 200 s",
+        ),
+        (
+            &["evaluate", "--failure-time", "5000"],
+            "--failure-time = 5000 s is outside 0 to 200 s: the run ends there",
+        ),
+        (
+            &["run", "late.toml"],
+            "late.toml: failure.time = 5000 s is outside 0 to 200 s",
+        ),
+        (
+            &["evaluate", "--course", "empty.toml"],
+            "empty.toml: a course needs",
+        ),
+        (&["run", "course.toml"], "course.toml: this is a course"),
+        (&["ecu", "pil", "exact.toml"], "exact.toml: sensors = \"exact\""),
+        (&["evaluate", "--sensors", "perfect"], "perfect"),
+        (&["run", "unknown.toml"], "t_q"),
+        (
+            &["ecu", "pil", "manual.toml"],
+            "manual.toml: condition = \"manual\"",
+        ),
+        (&["fly"], "fly"),
+        (
+            &["evaluate", "--out", "short.toml/out"],
+            "cannot write short.toml/out: ",
+        ),
+        (
+            &["run", "empty.toml", "--out", "short.toml"],
+            "cannot write short.toml: ",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(expected),
+            "{arguments:?} gave {}",
+            stderr(&output)
+        );
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
+/// Who knows a name of an older version, mistypes one or forgets the command, is told what to write.
+#[test]
+fn another_name_is_answered_with_the_right_one() {
+    let directory = tempfile::tempdir().unwrap();
+    let cases: [(&[&str], &str); 20] = [
+        (&["pil"], "error: `pil` is `host-sim ecu pil`\n"),
+        (&["live", "--can", "can0"], "`live` is `host-sim ecu live`"),
+        (
+            &["parameters", "--can=can0"],
+            "`parameters` is `host-sim ecu parameters`",
+        ),
+        (&["help", "bus"], "`bus` is `host-sim ecu bus`"),
+        (
+            &["ecu", "--listen", "127.0.0.1:0"],
+            "`--listen` is `host-sim ecu run --listen`",
+        ),
+        (
+            &["identify", "a.csv", "--whole"],
+            "`--whole` is `--no-preprocessing`",
+        ),
+        (&["identify", "--bridge=0.2"], "`--bridge` is `--max-gap`"),
+        (
+            &["identify", "--exact-lane"],
+            "`--exact-lane` is `--no-lane-smoothing`",
+        ),
+        (&["sweep", "s.toml", "--plan"], "`--plan` is `--dry-run`"),
+        (&["study", "--plan", "s.toml"], "`--plan` is `--dry-run`"),
+        (
+            &["availability", "--most-per-hour", "1"],
+            "`--most-per-hour` is `--max-rate`",
+        ),
+        (
+            &["experiment", "--spoiled", "2"],
+            "`--spoiled` is `host-sim validate --corruptions`",
+        ),
+        (
+            &["experiment", "--probe", "0.2", "--coverage=9"],
+            "`host-sim validate --coverage`",
+        ),
+        (
+            &["experiment", "--participants", "1,3..5"],
+            "`--participant 1,3..5` says which ones",
+        ),
+        (&["validate"], "--coverage <N>|--corruptions <N>|--methods <N>"),
+        (&["--speed", "70"], "`host-sim evaluate --speed 70`"),
+        (&["evalute"], "'evaluate'"),
+        (&["ecu", "parameter"], "'parameters'"),
+        (&["evaluate", "--sped", "70"], "'--speed'"),
+        (&["ecu", "live", "--recrod", "a.log"], "'--record'"),
+    ];
+    for (arguments, expected) in cases {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            stderr(&output).contains(expected),
+            "{arguments:?} gave {}",
+            stderr(&output)
+        );
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}
+
+/// Before anything is sent.
+#[test]
+fn parameters_that_no_ecu_takes_and_a_bus_that_is_not_there_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(
+        directory.path().join("strong.toml"),
+        "[guidance]\ntorque_limit_nm = 6\n",
+    )
+    .unwrap();
+    let cases: [(&[&str], &[&str]); 3] = [
+        (
+            &["ecu", "parameters", "strong.toml", "--can", "can99"],
+            &["strong.toml: ", "torque_limit_nm = 6", "0.1", "5"],
+        ),
+        (&["ecu", "parameters", "--can", "can99"], &["can99"]),
+        (&["ecu", "parameters"], &["--can"]),
+    ];
+    for (arguments, expected) in cases {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        for word in expected {
+            assert!(
+                stderr(&output).contains(word),
+                "{arguments:?} gave {}",
+                stderr(&output)
+            );
+        }
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}
