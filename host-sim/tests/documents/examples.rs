@@ -20,9 +20,8 @@ use std::process::Command;
 use super::{documents, place, root, run};
 
 /// What a reader waits for and a test does not.
-const SHORTER: [(&str, &str); 4] = [
+const SHORTER: [(&str, &str); 3] = [
     ("--seeds 20", "--seeds 1"),
-    ("--repetitions 200", "--repetitions 1"),
     ("-- experiment --probe", "-- experiment --participant 3 --probe"),
     ("-- reliance", "-- reliance --participant 3 --seeds 1"),
 ];

@@ -123,3 +123,29 @@ fn the_load_of_the_bus_in_the_design_is_what_the_command_prints() {
     let design = &documents()[Path::new("docs/design.md")];
     assert!(design.contains(&sentence), "docs/design.md should say{sentence}");
 }
+
+/// Peak lateral errors of the slowest driver, in the order of the sentence.
+#[test]
+fn the_result_in_the_readme_is_what_the_evaluation_prints() {
+    let place = place();
+    let mut evaluate = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    let (_, out, err) = run(evaluate.args(["evaluate", "--json"]), place.path(), "evaluate");
+    let results: serde_json::Value = serde_json::from_str(&out).expect(&err);
+    let runs = results["runs"].as_array().unwrap();
+    let peak = |condition: &str, failure: &str| {
+        let own = |run: &&serde_json::Value| {
+            run["t_p"] == 0.5 && run["condition"] == condition && run["failure"] == failure
+        };
+        let peak = &runs.iter().find(own).unwrap()["peak_lateral_error_m"];
+        format!("{:.2} m", peak.as_f64().unwrap())
+    };
+    let sentence = format!(
+        "of a slow driver from {} to {}; a sudden loss of its torque costs that driver {}, and {} if the ECU hands over",
+        peak("manual", "none"),
+        peak("high", "none"),
+        peak("high", "torque"),
+        peak("high", "input"),
+    );
+    let readme = documents()[Path::new("README.md")].replace('\n', " ");
+    assert!(readme.contains(&sentence), "README.md should say: {sentence}");
+}
