@@ -425,8 +425,9 @@ fn an_interrupted_evaluation_leaves_the_old_files() {
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("report.html"), "old").unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(["evaluate", "--force"])
         .current_dir(directory.path())
-        .stderr(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
         .stdout(std::process::Stdio::null())
         .spawn()
         .unwrap();
@@ -438,11 +439,76 @@ fn an_interrupted_evaluation_leaves_the_old_files() {
         .args(["-INT", &child.id().to_string()])
         .status();
     assert!(interrupt.unwrap().success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130));
+    assert!(
+        stderr(&ended)
+            .contains("Interrupted: nothing of this run is kept, and out holds what it held before."),
+        "{}",
+        stderr(&ended)
+    );
     let left: Vec<_> = std::fs::read_dir(&out)
         .unwrap()
         .map(|e| e.unwrap().file_name())
         .collect();
     assert_eq!(left, ["report.html"]);
     assert_eq!(std::fs::read_to_string(out.join("report.html")).unwrap(), "old");
+}
+
+#[test]
+fn nothing_is_written_over_what_a_command_did_not_write() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("drives");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(directory.path().join("one.toml"), "").unwrap();
+    std::fs::write(out.join("run.csv"), "recorded").unwrap();
+    let run = ["run", "one.toml", "--out", "drives"];
+    let said = |arguments: &[&str], code: i32| {
+        let output = host_sim(directory.path(), arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        stderr(&output)
+    };
+    let refused = said(&run, 2);
+    assert!(
+        refused.contains("it holds run.csv, which `host-sim run` did not write"),
+        "{refused}"
+    );
+    assert_eq!(std::fs::read_to_string(out.join("run.csv")).unwrap(), "recorded");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1, "nothing was added");
+
+    said(&[&run[..], &["--force"]].concat(), 0);
+    assert!(std::fs::metadata(out.join("run.csv")).unwrap().len() > 1_000_000);
+    // Its own results may be written again, another command's may not.
+    said(&run, 0);
+    let refused = said(&["evaluate", "--out", "drives"], 2);
+    assert!(
+        refused.contains("it holds results of `host-sim run`"),
+        "{refused}"
+    );
+
+    let csv = out.join("run.csv").display().to_string();
+    std::fs::write(directory.path().join("kept.csv"), "mine").unwrap();
+    let refused = said(&["convert", &csv, "kept.csv"], 2);
+    assert!(
+        refused.contains("kept.csv: the file is there already"),
+        "{refused}"
+    );
+    assert_eq!(
+        std::fs::read_to_string(directory.path().join("kept.csv")).unwrap(),
+        "mine"
+    );
+}
+
+#[test]
+fn a_command_that_fails_leaves_no_directory() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("log.csv"), "time_s\n0\n").unwrap();
+    let output = host_sim(directory.path(), &["identify", "log.csv", "--out", "new/deep"]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(!directory.path().join("new").exists());
 }

@@ -5,11 +5,11 @@
 //! - [`studies`]: what each study of `haptic-batch` leaves behind.
 //!
 //! ```
-//! use haptic_report::document::FileSet;
+//! use haptic_report::document::{FileSet, Owner};
 //!
 //! let directory = std::env::temp_dir().join(format!("haptic-report-{}", std::process::id()));
 //! // Files of one study belong together, so they are moved into place when the last is written.
-//! let files = FileSet::begin(&directory)?;
+//! let files = FileSet::begin(&directory, Owner { command: "example", keeps: &[], force: false })?;
 //! std::fs::write(files.staging().join("results.json"), "{}").unwrap();
 //! assert!(!directory.join("results.json").exists());
 //! files.finish()?;

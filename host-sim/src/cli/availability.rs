@@ -57,7 +57,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         return Ok(Outcome::Good);
     }
     let plan = plan(arguments)?;
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "availability"))
+        .transpose()?;
     let (checkpoint, on_record) = match &arguments.checkpoint {
         None => (None, Vec::new()),
         Some(path) => {

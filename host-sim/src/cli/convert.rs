@@ -9,7 +9,7 @@ use haptic_log::recording::{Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::{BadInput, Outcome, print, print_json};
+use super::{BadInput, Outcome, output, print, print_json};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -47,6 +47,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let time = arguments.time.as_deref().map(time_column).transpose()?;
     if let Some(rate_hz) = arguments.rate.filter(|rate| !(0.1..=1e5).contains(rate)) {
         return Err(format!("--rate {rate_hz}: 0.1 to 100000 Hz is wanted").into());
+    }
+    if let Some(output) = arguments
+        .output
+        .as_ref()
+        .filter(|file| file.exists() && !output::is_forced())
+    {
+        return Err(format!(
+            "{}: the file is there already; --force writes over it",
+            output.display()
+        )
+        .into());
     }
     let target = arguments.output.as_deref().map(Format::of).transpose()?;
     let contents = formats::read(&arguments.input, time.as_ref())?;

@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let course = open_course(&arguments.file, &arguments.lane.choice())?;
     let survey = survey(&course);
     if let Some(directory) = &arguments.out {
-        Output::begin(directory)?.finish(|place| files::write(&survey, &course, place))?;
+        Output::begin(directory, "course")?.finish(|place| files::write(&survey, &course, place))?;
         eprintln!("Report: {}", directory.join("report.html").display());
     }
     if let Some(path) = &arguments.save {

@@ -68,7 +68,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         confirmations: arguments.confirm,
         seed: arguments.seed,
     };
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "design"))
+        .transpose()?;
     let bar = progress::bar(drives(&question), "drives");
     let answer = design(&question, || bar.inc(1))?;
     bar.finish_and_clear();

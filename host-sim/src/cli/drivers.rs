@@ -44,7 +44,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         let (log, _) = open_recording(path, None, arguments.manual)?;
         logs.push((path.display().to_string(), log));
     }
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "drivers"))
+        .transpose()?;
     let bar = progress::bar(logs.len() as u64, "drives");
     let found: Drivers = compare_drivers(logs, &options, || bar.inc(1));
     bar.finish_and_clear();

@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(window) = window {
         check_window(window, &base).map_err(|e| format!("--{e}"))?;
     }
-    let output = Output::begin(&arguments.out)?;
+    let output = Output::begin(&arguments.out, "evaluate")?;
     let bar = progress::bar(RUNS as u64, "runs");
     let evaluation = evaluate(&base, window, || bar.inc(1))?;
     bar.finish_and_clear();

@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         probe_nm: arguments.probe,
         seed: arguments.seed,
     };
-    let output = Output::begin(&arguments.out)?;
+    let output = Output::begin(&arguments.out, "experiment")?;
     let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
     let result = experiment(&plan, || bar.inc(1))?;
     bar.finish_and_clear();

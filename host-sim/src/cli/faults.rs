@@ -57,7 +57,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(seed) => seed..seed + 1,
         None => 1..arguments.seeds + 1,
     };
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "faults"))
+        .transpose()?;
     let bar = progress::bar(chosen.len() as u64 * (seeds.end - seeds.start), "runs");
     let world = match &arguments.world {
         None => World::new(),

@@ -20,7 +20,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "handover"))
+        .transpose()?;
     let bar = progress::bar(ROWS as u64, "rows");
     let results = study(|| bar.inc(1))?;
     bar.finish_and_clear();

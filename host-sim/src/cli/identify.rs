@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
     let course = arguments.course.open()?;
-    let output = Output::begin(&arguments.out)?;
+    let output = Output::begin(&arguments.out, "identify")?;
     let (log, converted) = arguments.recording.open(arguments.manual)?;
     let name = arguments.recording.log.display().to_string();
     let mut drive = if arguments.also.is_empty() {

@@ -46,6 +46,9 @@ use serde::Serialize;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Write also where files are that the command did not write
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 const AFTER_HELP: &str = "\
@@ -138,7 +141,12 @@ pub(crate) fn main() -> ExitCode {
         .try_get_matches_from(&arguments)
         .and_then(|matches| Cli::from_arg_matches(&matches));
     let result = match parsed {
-        Ok(cli) => run(&cli.command),
+        Ok(cli) => {
+            if cli.force {
+                output::force();
+            }
+            run(&cli.command)
+        }
         Err(error) => match names::explain(&error, &arguments) {
             Some(sentence) => Err(BadInput(sentence)),
             None => error.exit(),

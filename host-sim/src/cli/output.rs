@@ -4,36 +4,85 @@
 
 use std::path::{Path, PathBuf};
 use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use haptic_report::document::FileSet;
+use haptic_report::document::{FileSet, Owner};
 use haptic_report::studies::OutputError;
 
 use super::{BadInput, INTERRUPTED};
 
+/// Whether `--force` was given.
+static FORCE: AtomicBool = AtomicBool::new(false);
+
 /// What an interrupt has to remove. Locked while a set begins and while its files are moved into place, so that
 /// an interrupt waits.
-static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Whether a command may write there, before it has worked for long.
+pub(super) fn check(directory: &Path, command: &str, keeps: &[&str]) -> Result<(), BadInput> {
+    Ok(FileSet::check(directory, owner(command, keeps))?)
+}
+
+fn owner<'a>(command: &'a str, keeps: &'a [&'a str]) -> Owner<'a> {
+    Owner {
+        command,
+        keeps,
+        force: is_forced(),
+    }
+}
+
+/// From now on sets take the place of whatever is in their directory.
+pub(super) fn force() {
+    FORCE.store(true, Ordering::Relaxed);
+}
+
+/// Whether they do.
+pub(super) fn is_forced() -> bool {
+    FORCE.load(Ordering::Relaxed)
+}
 
 pub(super) struct Output {
     files: FileSet,
 }
 
 impl Output {
+    /// For the files of a command, as it is typed.
+    ///
     /// # Errors
-    /// Nothing can be written there.
-    pub(super) fn begin(directory: &Path) -> Result<Self, BadInput> {
+    /// Nothing can be written there, or it holds what the command did not write.
+    pub(super) fn begin(directory: &Path, command: &str) -> Result<Self, BadInput> {
+        Self::beside(directory, command, &[])
+    }
+
+    /// The same, where the command keeps files by other means too.
+    pub(super) fn beside(directory: &Path, command: &str, keeps: &[&str]) -> Result<Self, BadInput> {
         ctrlc::set_handler(|| {
-            let unfinished = lock_unfinished();
-            if let Some(staging) = unfinished.as_ref() {
-                // What stays is cleared by the next run.
-                let _ = std::fs::remove_dir_all(staging);
+            let traces = lock_unfinished();
+            // What stays is cleared by the next run.
+            for (k, place) in traces.iter().enumerate() {
+                let _ = if k == 0 {
+                    std::fs::remove_dir_all(place)
+                } else {
+                    std::fs::remove_dir(place)
+                };
+            }
+            if let Some(directory) = traces.first().and_then(|staging| staging.parent()) {
+                let kept = if directory.exists() {
+                    "holds what it held before"
+                } else {
+                    "was not made"
+                };
+                eprintln!(
+                    "Interrupted: nothing of this run is kept, and {} {kept}.",
+                    directory.display()
+                );
             }
             process::exit(INTERRUPTED.into());
         })?;
         let mut unfinished = lock_unfinished();
-        let files = FileSet::begin(directory)?;
-        *unfinished = Some(files.staging().to_path_buf());
+        let files = FileSet::begin(directory, owner(command, keeps))?;
+        *unfinished = files.traces();
         Ok(Self { files })
     }
 
@@ -42,11 +91,11 @@ impl Output {
         write(self.files.staging())?;
         let mut unfinished = lock_unfinished();
         self.files.finish()?;
-        *unfinished = None;
+        unfinished.clear();
         Ok(())
     }
 }
 
-fn lock_unfinished() -> MutexGuard<'static, Option<PathBuf>> {
+fn lock_unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }

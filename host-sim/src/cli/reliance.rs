@@ -44,7 +44,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         frequency_hz: arguments.frequency,
         t_nms_s: arguments.t_nms,
     };
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "reliance"))
+        .transpose()?;
     let drives = plan.participants.len() as u64 * u64::from(plan.seeds);
     let bar = progress::bar(drives, "drives");
     let results = study(&plan, || bar.inc(1))?;

@@ -40,7 +40,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(course) => scenario = scenario.to_builder().course(course).build()?,
         None => print_notes(scenario.course().notes()),
     }
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "run"))
+        .transpose()?;
     let single = simulate(scenario, arguments.bus_log)
         .map_err(|e| InputError::new(arguments.scenario.display(), e))?;
     if let (Some(output), Some(directory)) = (output, &arguments.out) {

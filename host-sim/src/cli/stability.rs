@@ -33,7 +33,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             haptic_batch::files::load_scenario(path)?,
         ),
     };
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "stability"))
+        .transpose()?;
     let bar = progress::bar(PLACES as u64, "places");
     let map = Map {
         places: map(&base, || bar.inc(1)).map_err(|e| InputError::new(&name, e))?,

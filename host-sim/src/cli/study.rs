@@ -6,7 +6,7 @@ use clap::Args;
 use haptic_batch::study::{Study, StudyResults, Who};
 use haptic_report::studies::study as files;
 
-use super::output::Output;
+use super::output::{self, Output};
 use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
@@ -58,6 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         return Ok(Outcome::Good);
     }
     let out = &arguments.out;
+    output::check(out, "study", &[])?;
     let missing = study.missing(out)?.len();
     for import in &arguments.import {
         study
@@ -68,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     study.run(out, || bar.inc(1))?;
     bar.finish_and_clear();
     let results = study.results(out)?;
-    Output::begin(out)?.finish(|place| files::write(&results, place))?;
+    Output::begin(out, "study")?.finish(|place| files::write(&results, place))?;
     if arguments.json {
         print_json(&files::stamped(&results))?;
     } else {

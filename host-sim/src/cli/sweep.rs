@@ -11,7 +11,7 @@ use haptic_report::studies::run as run_files;
 use haptic_report::studies::sweep as files;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::output::Output;
+use super::output::{self, Output};
 use super::{BadInput, Outcome, print, print_json};
 
 #[derive(Debug, Args)]
@@ -54,6 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(drive) = arguments.replay {
         return replay(arguments, &sweep, drive);
     }
+    output::check(&arguments.out, "sweep", kept(&arguments.out))?;
     let store = Store::open(&sweep, VERSION, &arguments.out)?;
     let threads = arguments.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
@@ -73,7 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Err(error) => return Err(error.into()),
     };
     let file = arguments.file.display().to_string();
-    match Output::begin(&arguments.out) {
+    match Output::beside(&arguments.out, "sweep", kept(&arguments.out)) {
         Ok(output) => output.finish(|place| files::write(&sweep, &summary, &file, place))?,
         // Every shard that finds all chunks makes the same files.
         Err(_) if arguments.shard != Shard::WHOLE => {}
@@ -87,6 +88,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     eprintln!("Table: {}", arguments.out.join("drives.csv").display());
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(Outcome::Good)
+}
+
+/// What a sweep keeps in its directory beside its report. Of a directory without a sweep nothing is its own.
+fn kept(directory: &Path) -> &'static [&'static str] {
+    if directory.join("sweep.toml").exists() {
+        &["sweep.toml", "drives.csv", "drives.parquet"]
+    } else {
+        &[]
+    }
 }
 
 fn readable(sweep: &Sweep, summary: &Summary, file: &str) -> String {
@@ -138,7 +148,7 @@ fn replay(arguments: &Arguments, sweep: &Sweep, drive: u64) -> Result<Outcome, B
 }
 
 fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), BadInput> {
-    let output = Output::begin(directory)?;
+    let output = Output::begin(directory, "sweep --replay")?;
     let single = haptic_batch::run::run(scenario.clone(), false)?;
     output.finish(|place| {
         write_file(&place.join("scenario.toml"), |f| {

@@ -64,7 +64,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
         return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
     }
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "validate"))
+        .transpose()?;
     let seeds = arguments
         .coverage
         .or(arguments.corruptions)

@@ -91,11 +91,22 @@ fn run_line(line: &str, block: &Block, place: &Path, at: &str) -> String {
     };
     let at = format!("{at}: {line}");
     let (code, out, err) = match all {
-        ["cargo", "run", "--release", "-p", package, "--example", example] => {
-            let mut cargo = Command::new(env!("CARGO"));
-            cargo.args(["run", "--quiet", "--package", package, "--example", example]);
-            cargo.arg("--manifest-path").arg(root().join("Cargo.toml"));
-            run(&mut cargo, place, &at)
+        [
+            "cargo",
+            "run",
+            "--release",
+            "-p",
+            "host-sim",
+            "--example",
+            example,
+        ] => {
+            // Cargo builds examples with tests, beside the programs.
+            let programs = Path::new(env!("CARGO_BIN_EXE_host-sim")).parent().unwrap();
+            run(
+                &mut Command::new(programs.join("examples").join(example)),
+                place,
+                &at,
+            )
         }
         ["cargo", "run", "--release", rest @ ..] => {
             let arguments = rest.strip_prefix(&["--"]).unwrap_or(rest);

@@ -16,7 +16,7 @@ mod provenance;
 mod text;
 mod trace_csv;
 
-pub use file_set::FileSet;
+pub use file_set::{FileSet, Owner};
 pub use files::{WriteError, write_file, write_json};
 pub use metric_tables::{definitions_table, metrics_table};
 pub use provenance::{Provenance, Stamped};

@@ -20,7 +20,11 @@ pub(in crate::cli) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let output = arguments.out.as_deref().map(Output::begin).transpose()?;
+    let output = arguments
+        .out
+        .as_deref()
+        .map(|place| Output::begin(place, "ecu bus"))
+        .transpose()?;
     let load = Load::of(table());
     if let (Some(output), Some(directory)) = (output, &arguments.out) {
         output.finish(|place| load.write(place))?;
