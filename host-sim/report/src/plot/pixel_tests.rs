@@ -93,8 +93,12 @@ fn ink_stays_within(points: &[(f64, f64)]) {
     let blue = picture.blue();
     assert!(blue.len() > 1000, "{} pixels of the line", blue.len());
     for &(x, y) in &blue {
-        let near = points.iter().filter(|p| (p.0 - x).abs() <= reach_x).map(|p| p.1);
-        let near = near.chain([x - reach_x, x, x + reach_x].map(value_at));
+        let first_beyond = |edge: f64| points.partition_point(|p| p.0 <= edge);
+        let near = &points[first_beyond(x - reach_x)..first_beyond(x + reach_x)];
+        let near = near
+            .iter()
+            .map(|p| p.1)
+            .chain([x - reach_x, x, x + reach_x].map(value_at));
         let (low, high) = extent(near).unwrap();
         assert!(
             y > low - reach_y && y < high + reach_y,
