@@ -6,3 +6,4 @@ mod documents;
 mod file_fields;
 mod study;
 mod sweep;
+mod unguided;

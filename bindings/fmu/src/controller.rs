@@ -6,21 +6,23 @@ use haptic_core::ecu::{Boot, Ecu};
 use haptic_core::modes::Mode;
 use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_sim::guidance::Status;
 use haptic_sim::models::sensors::camera_looks;
+use haptic_sim::unguided::{Cause, Circumstances, Watch};
 
 use crate::variable::{About, Kind, Model, Role, Variable, variable};
 
 /// The model.
 pub static ABOUT: About = About {
     name: "HapticController",
-    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a01}",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a02}",
     meaning: "The shipping haptic-guidance ECU: SI values in, torque out",
     variables: &VARIABLES,
     make: || Box::new(Controller::default()),
 };
 
 /// Variables that are no parameters of the controller.
-const OWN: usize = 17;
+const OWN: usize = 19;
 use Kind::{Boolean, Integer, Real};
 use Role::{Input, Output, Parameter, Tunable};
 
@@ -104,6 +106,20 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
         ),
         variable("faults", Integer, Output, "", "Fault word, as in core/haptic.dbc"),
         variable("warning", Boolean, Output, "", "The driver has to take over"),
+        variable(
+            "unguided_cause",
+            Integer,
+            Output,
+            "",
+            "Why the guidance left: 0 while it is there, or was never; as in a time series (docs/files.md)",
+        ),
+        variable(
+            "unguided_s",
+            Real,
+            Output,
+            "s",
+            "How long the guidance was away since it was there first",
+        ),
     ];
     let mut all = [own[0]; OWN + PARAMETERS.len()];
     let mut i = 0;
@@ -131,6 +147,13 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
 const AUTHORITY: usize = 8;
 const ENGAGED: usize = 11;
 const TORQUE: usize = 12;
+const LEAST_SPEED: usize = {
+    let mut i = 0;
+    while !matches!(VARIABLES[i].name.as_bytes(), b"least_speed_m_per_s") {
+        i += 1;
+    }
+    i
+};
 
 /// The unit under way.
 #[derive(Debug, Clone)]
@@ -141,6 +164,9 @@ struct Controller {
     /// Frames that the camera has sent; column and host send on a grid of whole steps.
     pictures: u64,
     mode: Mode,
+    watch: Watch,
+    /// Steps in which the guidance was away.
+    unguided: u64,
 }
 
 impl Default for Controller {
@@ -150,6 +176,8 @@ impl Default for Controller {
             steps: 0,
             pictures: 0,
             mode: Mode::Boot,
+            watch: Watch::default(),
+            unguided: 0,
         }
     }
 }
@@ -170,6 +198,7 @@ impl Model for Controller {
             Ecu::new(Some(&setup), Boot::default(), start)
         };
         (self.steps, self.pictures) = (0, 0);
+        (self.watch, self.unguided) = (Watch::default(), 0);
         self.mode = if values[ENGAGED] != 0.0 {
             Mode::Active
         } else {
@@ -253,12 +282,29 @@ impl Model for Controller {
         let command = self.ecu.step(now).command;
         let _ = self.ecu.background_step();
         self.mode = command.mode;
-        values[TORQUE..TORQUE + 5].copy_from_slice(&[
+        let status = Status {
+            mode: command.mode,
+            faults: command.faults,
+            warning: command.warning,
+            k_hg: None,
+        };
+        let around = Circumstances {
+            request_ended: engage == 0.0,
+            speed_m_per_s: speed,
+            least_speed_m_per_s: values[LEAST_SPEED],
+            ..Circumstances::default()
+        };
+        self.watch.step(&status, around);
+        let cause = self.watch.cause();
+        self.unguided += u64::from(cause.is_some());
+        values[TORQUE..OWN].copy_from_slice(&[
             command.torque.nm(),
             f64::from(command.mode as u8),
             f64::from(command.limit as u8),
             f64::from(command.faults.bits()),
             f64::from(u8::from(command.warning)),
+            cause.map_or(0.0, Cause::code),
+            self.unguided as f64 * 1e-3,
         ]);
         self.steps += 1;
         Ok(())

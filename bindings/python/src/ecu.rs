@@ -3,7 +3,7 @@
 use haptic_core::config::Setup;
 use haptic_core::controller::Command;
 use haptic_core::ecu::Boot;
-use haptic_core::faults::Fault;
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::Instant;
 use pyo3::prelude::*;
@@ -158,6 +158,12 @@ impl Ecu {
     }
 }
 
+/// The names of faults.
+pub(crate) fn fault_names(py: Python<'_>, faults: FaultSet) -> PyResult<Bound<'_, PyTuple>> {
+    let present = Fault::ALL.into_iter().filter(|fault| faults.contains(*fault));
+    PyTuple::new(py, present.map(|fault| format!("{fault:?}")).collect::<Vec<_>>())
+}
+
 /// What one step of the ECU puts on the bus, and the command behind it.
 #[pyclass(frozen, module = "haptic_guidance")]
 pub(crate) struct Step {
@@ -190,10 +196,7 @@ impl Step {
     /// Names of the faults present.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        let present = Fault::ALL
-            .into_iter()
-            .filter(|fault| self.command.faults.contains(*fault));
-        PyTuple::new(py, present.map(|fault| format!("{fault:?}")).collect::<Vec<_>>())
+        fault_names(py, self.command.faults)
     }
 
     /// Whether the driver is asked to take over.

@@ -1,6 +1,7 @@
 //! Whole runs and the paper's evaluation.
 
 use haptic_analysis::metrics::{DEFINITIONS, Window};
+use haptic_batch::reliance::Readings;
 use haptic_core::bus::Frame;
 use haptic_log::trace::CHANNELS;
 use haptic_sim::simulation::Run;
@@ -9,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::Serialize;
 
+use crate::ecu::fault_names;
 use crate::errors;
 use crate::interrupt::interruptible;
 use crate::scenario::Scenario;
@@ -44,6 +46,24 @@ fn bus<'py>(py: Python<'py>, frames: &[(u32, Frame)]) -> PyResult<Bound<'py, PyD
     Ok(made)
 }
 
+/// What telemetry says of K_hg, 50 times a second; NaN where it says nothing.
+fn k_hg<'py>(py: Python<'py>, readings: &Readings) -> PyResult<Bound<'py, PyDict>> {
+    let made = PyDict::new(py);
+    let all = || readings.readings.iter();
+    let part = |i: usize| {
+        all()
+            .map(|r| r.estimate.map_or(f64::NAN, |parts| parts[i]))
+            .collect()
+    };
+    made.set_item(
+        "time_s",
+        PyArray1::from_vec(py, all().map(|r| r.time_s).collect()),
+    )?;
+    made.set_item("k_hg", PyArray1::from_vec(py, part(0)))?;
+    made.set_item("sd", PyArray1::from_vec(py, part(1)))?;
+    Ok(made)
+}
+
 /// Columns, results, events and frames of a run, for `haptic_guidance.simulate`.
 #[pyfunction]
 pub(crate) fn simulate<'py>(
@@ -66,6 +86,13 @@ pub(crate) fn simulate<'py>(
         .iter()
         .map(|event| (event.time_s, event.what.as_str()));
     made.set_item("events", events.collect::<Vec<_>>())?;
+    let said = single.said.iter().map(|said| {
+        let faults = fault_names(py, said.faults)?;
+        Ok((said.time_s, format!("{:?}", said.mode), faults))
+    });
+    made.set_item("said", said.collect::<PyResult<Vec<_>>>()?)?;
+    made.set_item("unguided", python(py, &single.unguided)?)?;
+    made.set_item("k_hg", k_hg(py, &single.readings)?)?;
     if record_bus {
         made.set_item("bus", bus(py, &single.bus)?)?;
     }

@@ -1,5 +1,6 @@
 //! The closed loop step by step.
 
+use haptic_core::faults::FaultSet;
 use haptic_log::trace::CHANNELS;
 use haptic_sim::action::WorldFaults;
 use haptic_sim::simulation::Ending;
@@ -8,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::bus::Frame;
+use crate::ecu::fault_names;
 use crate::errors::{finite, within};
 use crate::scenario::Scenario;
 
@@ -119,6 +121,16 @@ pub(crate) struct Outcome {
     guidance_torque_nm: f64,
     /// Whether a limit held the torque back.
     guidance_limited: bool,
+    /// Mode of the ECU, such as ``"Active"``; None without guidance.
+    mode: Option<String>,
+    /// Names of the faults that it reports.
+    faults: Py<PyTuple>,
+    /// Whether it asks the driver to take over.
+    warning: bool,
+    /// K_hg and its standard deviation as its last telemetry has them, once identified.
+    k_hg: Option<(f64, f64)>,
+    /// Why the guidance is away, such as ``"HandsOff"``; None if it is not.
+    unguided: Option<String>,
     /// The truth of this instant by the names of `Run`'s columns, every 5 ms; None in between.
     sample: Option<Py<PyDict>>,
     /// Frames to the ECU, in order of sending.
@@ -139,7 +151,16 @@ fn outcome(py: Python<'_>, from: &haptic_sim::Outcome<'_>) -> PyResult<Outcome> 
         }
         Ok::<_, PyErr>(values.unbind())
     });
+    let faults = from.status.map_or(FaultSet::NONE, |status| status.faults);
     Ok(Outcome {
+        mode: from.status.map(|status| format!("{:?}", status.mode)),
+        faults: fault_names(py, faults)?.unbind(),
+        warning: from.status.is_some_and(|status| status.warning),
+        k_hg: from
+            .status
+            .and_then(|status| status.k_hg)
+            .map(|[k_hg, sd]| (k_hg, sd)),
+        unguided: from.unguided.map(|why| why.to_string()),
         time_s: from.time_s(),
         e_y_m: from.preview.e_y_m,
         e_theta_rad: from.preview.e_theta_rad,

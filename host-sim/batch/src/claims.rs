@@ -4,11 +4,13 @@
 //! The numbers: peak and mean |e| over s in [1080, 1740] m of `paper-course` at 60 km/h, made by a float64
 //! implementation of the same model with exact lane errors, backward differences at 1 kHz and a plant stepped
 //! at 0.2 ms. The orderings (sections 5.1 and 5.2) speak of "no evident difference" and "close"; what that is
-//! in numbers is this project's reading, stated in each claim.
+//! in numbers is this project's reading, stated in each claim. A claim that rests on a run in which the ECU ended guidance
+//! by itself is not held, whatever its numbers are.
 
 use serde::Serialize;
 
 use super::evaluate::{DRIVERS_T_P, EvaluationResults};
+use super::{Away, RunRecord, left_by_themselves};
 use haptic_analysis::metrics::Window;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
@@ -101,25 +103,64 @@ pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
 
 pub(super) fn check(results: &EvaluationResults) -> Vec<Claim> {
     let claims = Claims(results);
-    let mut all = vec![numbers(results)];
+    let mut all = vec![claims.numbers()];
     all.extend(claims.without_failure());
     all.push(claims.with_loss_of_torque());
     all.push(claims.with_failed_input());
     all
 }
 
-fn claim(claim: &str, holds: bool, evidence: String) -> Claim {
-    Claim {
-        claim: claim.into(),
-        holds,
+/// What every evaluation rests on, whatever its course: a claim where it is broken, and nothing where it is not. Of a run that
+/// left the road this is said already, and no guidance stays there.
+pub(super) fn guided_throughout(results: &EvaluationResults) -> Option<Claim> {
+    let on_the_road = results.runs.iter().filter(|record| !record.diverged);
+    let evidence = left_by_themselves(on_the_road.map(named))?;
+    Some(Claim {
+        claim: "guidance stays, but where the evaluation lets it fail".into(),
+        holds: false,
         evidence,
-    }
+    })
 }
 
-/// The orderings of sections 5.1 and 5.2 in the results of an evaluation.
+fn is_nominal(record: &RunRecord) -> bool {
+    record.failure == FailureKind::None
+}
+
+/// A run by what tells it from the others.
+fn named(record: &RunRecord) -> (&Away, String) {
+    let failure = match record.failure {
+        FailureKind::None => String::new(),
+        kind => format!(", failure {kind},"),
+    };
+    let name = format!("t_p {} s, {}{failure}", record.t_p, record.condition);
+    (&record.away, name)
+}
+
+/// The numbers, and the orderings of sections 5.1 and 5.2, in the results of an evaluation.
 struct Claims<'a>(&'a EvaluationResults);
 
 impl Claims<'_> {
+    /// A claim, and which runs it rests on.
+    fn claim(
+        &self,
+        claim: &str,
+        rests_on: impl Fn(&RunRecord) -> bool,
+        holds: bool,
+        mut evidence: String,
+    ) -> Claim {
+        let runs = self.0.runs.iter().filter(|record| rests_on(record));
+        let left = left_by_themselves(runs.map(named));
+        let holds = holds && left.is_none();
+        if let Some(left) = left {
+            evidence.push_str(&format!("; {left}"));
+        }
+        Claim {
+            claim: claim.into(),
+            holds,
+            evidence,
+        }
+    }
+
     fn peak(&self, t_p: f64, condition: Condition, failure: FailureKind) -> f64 {
         let record = self.0.record(t_p, condition, failure);
         record
@@ -147,28 +188,32 @@ impl Claims<'_> {
             peaks.iter().copied().fold(f64::MAX, f64::min),
             peaks.iter().copied().fold(0.0, f64::max),
         );
-        let alike = claim(
+        let alike = self.claim(
             "driver 1: no evident difference between conditions (peaks within 10 %)",
+            |r| is_nominal(r) && r.t_p == first,
             high <= 1.1 * low,
             format!("{low:.3} to {high:.3} m"),
         );
         let [manual, relying, mid, light] = Condition::ALL.map(|condition| nominal(third, condition));
-        let helped = claim(
+        let helped = self.claim(
             "driver 3: guidance helps greatly (high reliance saves a quarter of the peak), the more the higher the \
              reliance",
+            |r| is_nominal(r) && r.t_p == third,
             relying < 0.75 * manual && relying < mid && mid < light && light < manual,
             format!("high {relying:.3}, mid {mid:.3}, low {light:.3}, manual {manual:.3} m"),
         );
-        let between = claim(
+        let between = self.claim(
             "driver 2 lies between drivers 1 and 3 in what guidance saves",
+            |r| is_nominal(r) && [Manual, High].contains(&r.condition),
             gain(first) <= gain(second) && gain(second) <= gain(third),
             DRIVERS_T_P
                 .map(|t_p| format!("{:.1} %", 100.0 * gain(t_p)))
                 .join(", "),
         );
         let distance = |t_p, condition| (nominal(t_p, condition) - nominal(t_p, Manual)).abs();
-        let light_is_manual = claim(
+        let light_is_manual = self.claim(
             "low reliance is close to manual: closer than high reliance (drivers 2 and 3), within 15 %",
+            |r| is_nominal(r) && r.condition != Mid,
             [second, third]
                 .iter()
                 .all(|&t_p| distance(t_p, Low) < distance(t_p, High))
@@ -187,8 +232,9 @@ impl Claims<'_> {
         let raised = |t_p, condition| {
             self.mean(t_p, condition, FailureKind::Torque) > self.mean(t_p, condition, FailureKind::None)
         };
-        claim(
+        self.claim(
             "a failure raises the (mean) error of all three drivers, and the peak the more the higher the reliance",
+            |r| r.failure != FailureKind::Input,
             DRIVERS_T_P.iter().all(|&t_p| {
                 [High, Mid, Low].iter().all(|&condition| raised(t_p, condition))
                     && failed(t_p, High) > failed(t_p, Mid)
@@ -210,9 +256,10 @@ impl Claims<'_> {
         let worst = |t_p, condition| {
             handed(t_p, condition) / self.nominal(t_p, condition).max(self.nominal(t_p, Manual))
         };
-        claim(
+        self.claim(
             "a failed input that the ECU survives costs at most 1.25 times the larger of the no-failure and the \
              manual peak",
+            |r| r.failure != FailureKind::Torque,
             DRIVERS_T_P
                 .iter()
                 .all(|&t_p| [High, Mid, Low].iter().all(|&c| worst(t_p, c) <= 1.25)),
@@ -225,40 +272,79 @@ impl Claims<'_> {
                 .join("; "),
         )
     }
-}
 
-fn numbers(results: &EvaluationResults) -> Claim {
-    let (share, floor_m) = tolerance(results.sensors);
-    let (mut worst_m, mut count, mut holds) = (0.0_f64, 0, true);
-    for reference in TABLE {
-        let cases = [
-            (FailureKind::None, Some(reference.nominal_m)),
-            (FailureKind::Torque, reference.failed_m),
-        ];
-        for (failure, expected) in cases {
-            let Some(expected) = expected else { continue };
-            let record = results.record(reference.t_p, reference.condition, failure);
-            let metrics = record.map(|r| r.metrics).unwrap_or_default();
-            let found = [metrics.peak_lateral_error_m, metrics.mean_abs_lateral_error_m];
-            for (found, expected) in found.into_iter().zip(expected) {
-                count += 1;
-                let off_m = found.map_or(f64::INFINITY, |found| (found - expected).abs());
-                holds &= off_m <= (share * expected).max(floor_m);
-                worst_m = worst_m.max(off_m);
+    fn numbers(&self) -> Claim {
+        let (share, floor_m) = tolerance(self.0.sensors);
+        let (mut worst_m, mut count, mut holds) = (0.0_f64, 0, true);
+        for reference in TABLE {
+            let cases = [
+                (FailureKind::None, Some(reference.nominal_m)),
+                (FailureKind::Torque, reference.failed_m),
+            ];
+            for (failure, expected) in cases {
+                let Some(expected) = expected else { continue };
+                let record = self.0.record(reference.t_p, reference.condition, failure);
+                let metrics = record.map(|r| r.metrics).unwrap_or_default();
+                let found = [metrics.peak_lateral_error_m, metrics.mean_abs_lateral_error_m];
+                for (found, expected) in found.into_iter().zip(expected) {
+                    count += 1;
+                    let off_m = found.map_or(f64::INFINITY, |found| (found - expected).abs());
+                    holds &= off_m <= (share * expected).max(floor_m);
+                    worst_m = worst_m.max(off_m);
+                }
             }
         }
+        let floor = if floor_m > 0.0 {
+            format!(" or {:.0} mm", 1e3 * floor_m)
+        } else {
+            String::new()
+        };
+        self.claim(
+            &format!(
+                "peak and mean lateral errors are those of the independent table within {:.0} %{floor}",
+                100.0 * share
+            ),
+            |r| r.failure != FailureKind::Input,
+            holds,
+            format!("{count} numbers, largest difference {:.1} mm", 1e3 * worst_m),
+        )
     }
-    let floor = if floor_m > 0.0 {
-        format!(" or {:.0} mm", 1e3 * floor_m)
-    } else {
-        String::new()
-    };
-    Claim {
-        claim: format!(
-            "peak and mean lateral errors are those of the independent table within {:.0} %{floor}",
-            100.0 * share
-        ),
-        holds,
-        evidence: format!("{count} numbers, largest difference {:.1} mm", 1e3 * worst_m),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::evaluate;
+    use haptic_sim::unguided::Cause;
+
+    /// Driver 1 with high reliance and no failure: of all claims but the one of driver 3 alone this run is a part.
+    #[test]
+    fn a_claim_is_not_held_where_it_rests_on_a_run_that_was_not_guided_throughout() {
+        let mut results = evaluate(&Scenario::default(), None, || ()).unwrap().results;
+        assert!(results.claims.len() == 7 && results.all_claims_hold());
+        let held = check(&results);
+        let mut left = |why| {
+            let run = results.runs.iter_mut().find(|r| r.condition == High).unwrap();
+            assert_eq!((run.t_p, run.failure), (0.1, FailureKind::None));
+            (run.away.guidance_left_s, run.away.guidance_left_why) = (Some(80.0), Some(why));
+            (check(&results), guided_throughout(&results))
+        };
+        assert_eq!(left(Cause::LaneLost), (held.clone(), None));
+        let (claims, throughout) = left(Cause::TooSlow);
+        let told = "the ECU ended guidance by itself in 1 of";
+        assert!(throughout.is_some_and(|claim| !claim.holds && claim.evidence.starts_with(told)));
+        for (claim, held) in claims.iter().zip(&held) {
+            let rests_on_it = !claim.claim.starts_with("driver 3");
+            assert_eq!(claim == held, !rests_on_it);
+            if rests_on_it {
+                assert!(!claim.holds && claim.evidence.contains(told), "{claim:?}");
+                assert!(
+                    claim
+                        .evidence
+                        .ends_with("t_p 0.1 s, high at 80.0 s: too slow, not back"),
+                    "{claim:?}"
+                );
+            }
+        }
     }
 }

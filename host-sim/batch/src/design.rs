@@ -53,6 +53,8 @@ pub struct Design {
     pub standard_errors: [f64; 6],
     /// How long they would have to drive for the error asked for, s; none if no drive is long enough.
     pub needed_s: Option<f64>,
+    /// Drives in which the ECU ended guidance by itself: from then on they tell what a drive without guidance does.
+    pub left_by_itself: usize,
 }
 
 /// The best design, tried.
@@ -95,6 +97,7 @@ struct Cell {
     course: usize,
     probe: Option<Probe>,
     information: Information,
+    left_by_itself: bool,
 }
 
 /// What the drives of each course, probe and driver tell.
@@ -125,6 +128,7 @@ fn cells(
                 course,
                 probe,
                 information: information(&driven.log, &Options::default(), &truth_of(&driver)),
+                left_by_itself: driven.away.is_by_itself(),
             }
         },
     )
@@ -151,10 +155,19 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Str
             let here = cells.iter().filter(|c| c.course == course && c.probe == probe);
             here.map(|c| &c.information).collect()
         };
+        let left = |probes: &[Option<Probe>]| {
+            let here = cells
+                .iter()
+                .filter(|c| c.course == course && probes.contains(&c.probe));
+            here.filter(|c| c.left_by_itself).count()
+        };
         for &probe in &probes {
             let all: Vec<Information> = of(probe).into_iter().cloned().collect();
             let frequencies = probe.map(|p| p.frequency_hz).into_iter().collect();
-            designs.push(Design::new(question, place, road, probe, frequencies, &all));
+            designs.push(Design {
+                left_by_itself: left(&[probe]),
+                ..Design::new(question, place, road, probe, frequencies, &all)
+            });
         }
         // The slowest and the fastest of each amplitude, half the drive each.
         for &amplitude_nm in &question.amplitudes_nm {
@@ -175,7 +188,10 @@ pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, Str
                 .map(|(a, b)| a.lasting(0.5 * a.span_s).and(&b.lasting(0.5 * b.span_s)))
                 .collect();
             let frequencies = vec![slow.frequency_hz, fast.frequency_hz];
-            designs.push(Design::new(question, place, road, Some(slow), frequencies, &all));
+            designs.push(Design {
+                left_by_itself: left(&[Some(slow), Some(fast)]),
+                ..Design::new(question, place, road, Some(slow), frequencies, &all)
+            });
         }
     }
     let length = |d: &Design| d.needed_s.unwrap_or(f64::INFINITY);
@@ -255,6 +271,7 @@ impl Design {
             span_s,
             standard_errors: std::array::from_fn(rms),
             needed_s: needed(question, place, all),
+            left_by_itself: 0,
         }
     }
 

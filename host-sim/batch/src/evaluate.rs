@@ -48,7 +48,8 @@ pub struct EvaluationResults {
     /// One record for each run: the 21 of section 5 (no failure, or a sudden loss of the torque), then the 9 in
     /// which the guidance's input fails and the ECU hands over.
     pub runs: Vec<RunRecord>,
-    /// What the evaluation must show; empty where it was not run as the paper ran it.
+    /// What the evaluation must show, where it was run as the paper ran it; and wherever it was run, which runs were not
+    /// guided throughout, if there are such.
     pub claims: Vec<Claim>,
     /// What a reader has to know of these results.
     pub notes: Vec<String>,
@@ -121,6 +122,7 @@ pub fn evaluate(
     if claims::apply_to(base, window) {
         results.claims = claims::check(&results);
     }
+    results.claims.extend(claims::guided_throughout(&results));
     Ok(Evaluation { runs, results })
 }
 

@@ -12,6 +12,7 @@
 
 use serde::Serialize;
 
+use super::Away;
 use super::evaluate::DRIVERS_T_P;
 use super::lanes::drive_all;
 use haptic_sim::models::driver::DriverParameters;
@@ -55,6 +56,8 @@ pub struct HandoverRow {
     pub handover_ratio: Option<f64>,
     /// The same of the sudden loss.
     pub loss_ratio: Option<f64>,
+    /// Of the three guided drives, those in which the ECU ended guidance by itself: the bound says nothing of them.
+    pub left_by_itself: usize,
 }
 
 impl HandoverRow {
@@ -63,9 +66,10 @@ impl HandoverRow {
         self.manual_stable && self.condition != Condition::Low
     }
 
-    /// Whether the handover costs too much where it is judged.
+    /// Whether the handover costs too much where it is judged, or the row rests on a drive that was not guided throughout.
     pub fn is_broken(&self) -> bool {
-        self.is_judged() && self.handover_ratio.is_none_or(|ratio| ratio > MOST)
+        let costs = self.handover_ratio.is_none_or(|ratio| ratio > MOST);
+        self.is_judged() && (costs || self.left_by_itself > 0)
     }
 }
 
@@ -95,17 +99,19 @@ pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
         .map(|(kmh, t_p)| scenarios_of(*kmh, *t_p))
         .collect::<Result<Vec<_>, _>>()?
         .concat();
-    let peaks = drive_all(&scenarios, scenarios[0].seed(), |number, run| {
+    let drives = drive_all(&scenarios, scenarios[0].seed(), |number, run| {
         if number % RUNS_OF_A_CASE != 0 && scenarios[number].failure().kind == FailureKind::None {
             progress();
         }
         let course_m = scenarios[number].course().length_m();
         let straight_m = LAST_STRAIGHT_M * scenarios[number].speed_kmh() / DEFAULT_SPEED_KMH;
-        Ok([0.0, course_m - straight_m, course_m - 0.5 * straight_m].map(|from_m| peak_m(run, from_m)))
+        let from_m = [0.0, course_m - straight_m, course_m - 0.5 * straight_m];
+        let away = Away::new(&scenarios[number], &run.trace);
+        Ok((from_m.map(|from_m| peak_m(run, from_m)), away.is_by_itself()))
     })?;
-    let of_cases = cases.iter().zip(peaks.chunks(RUNS_OF_A_CASE));
+    let of_cases = cases.iter().zip(drives.chunks(RUNS_OF_A_CASE));
     let rows: Vec<HandoverRow> = of_cases
-        .flat_map(|((kmh, t_p), peaks)| rows_of(*kmh, *t_p, peaks))
+        .flat_map(|((kmh, t_p), drives)| rows_of(*kmh, *t_p, drives))
         .collect();
     let judged = rows.iter().filter(|row| row.is_judged());
     Ok(HandoverResults {
@@ -149,16 +155,19 @@ fn scenarios_of(speed_kmh: f64, t_p: f64) -> Result<Vec<Scenario>, String> {
         .collect()
 }
 
-/// From the peaks of each run, as [`scenarios_of`] has them: over the whole course, the last straight and its second half.
-fn rows_of(speed_kmh: f64, t_p: f64, peaks: &[[Option<f64>; 3]]) -> impl Iterator<Item = HandoverRow> {
-    let [manual_m, straight_m, second_half_m] = peaks[0];
+/// Peaks of a drive over the whole course, the last straight and its second half, and whether the ECU left by itself.
+type Peaks = ([Option<f64>; 3], bool);
+
+/// From the drives as [`scenarios_of`] has them.
+fn rows_of(speed_kmh: f64, t_p: f64, drives: &[Peaks]) -> impl Iterator<Item = HandoverRow> {
+    let ([manual_m, straight_m, second_half_m], _) = drives[0];
     let manual_stable = match (straight_m, second_half_m) {
         (Some(whole_m), Some(second_half_m)) => second_half_m < (0.9 * whole_m).max(SETTLED_M),
         _ => false,
     };
-    let of_reliances = RELIANCES.into_iter().zip(peaks[1..].chunks(KINDS.len()));
-    of_reliances.map(move |(condition, peaks)| {
-        let [nominal_m, handover_m, loss_m] = [0, 1, 2].map(|kind: usize| peaks[kind][0]);
+    let of_reliances = RELIANCES.into_iter().zip(drives[1..].chunks(KINDS.len()));
+    of_reliances.map(move |(condition, drives)| {
+        let [nominal_m, handover_m, loss_m] = [0, 1, 2].map(|kind: usize| drives[kind].0[0]);
         let larger_m = nominal_m.zip(manual_m).map(|(a, b)| a.max(b));
         let ratio = |failed: Option<f64>| failed.zip(larger_m).map(|(a, b)| a / b);
         HandoverRow {
@@ -172,6 +181,7 @@ fn rows_of(speed_kmh: f64, t_p: f64, peaks: &[[Option<f64>; 3]]) -> impl Iterato
             loss_m,
             handover_ratio: ratio(handover_m),
             loss_ratio: ratio(loss_m),
+            left_by_itself: drives.iter().filter(|(_, left)| *left).count(),
         }
     })
 }

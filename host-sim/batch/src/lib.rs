@@ -33,6 +33,7 @@
 //! Not here: options and exit codes (the command line), how a metric is computed, which files are left and how they look.
 
 pub mod availability;
+mod away;
 pub mod bus_load;
 pub mod claims;
 pub mod course;
@@ -51,6 +52,7 @@ pub mod sweep;
 
 pub mod stability;
 
+pub use away::{Away, left_by_themselves};
 pub use record::{RunRecord, check_window};
 
 /// Version and commit of this program, as results name it.

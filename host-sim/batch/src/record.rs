@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::Away;
 use haptic_analysis::metrics::{self, Circumstances, Metrics, Window};
 use haptic_log::trace::Sample;
 use haptic_sim::input::in_range;
@@ -24,6 +25,9 @@ pub struct RunRecord {
     pub diverged: bool,
     /// Arc length of the last sample, m.
     pub end_m: f64,
+    /// When the guidance was away.
+    #[serde(flatten)]
+    pub away: Away,
     /// Every metric, over the window.
     #[serde(flatten)]
     pub metrics: Metrics,
@@ -54,6 +58,7 @@ impl RunRecord {
                 .map(|sample| sample.s_m),
             diverged: run.diverged(),
             end_m: run.trace.samples.last().map_or(0.0, |sample| sample.s_m),
+            away: Away::new(scenario, &run.trace),
             metrics: metrics::measure(&run.trace, &circumstances),
         }
     }

@@ -7,9 +7,10 @@ use super::RunRecord;
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::reliance::Readings;
 use haptic_log::Event;
-use haptic_sim::ecu_events::EcuEvents;
+use haptic_sim::ecu_events::{EcuEvents, Said};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::{Run, observe, simulate};
+use haptic_sim::unguided::{Unguided, stretches};
 
 /// A scenario with its run.
 #[derive(Debug, Clone)]
@@ -18,8 +19,12 @@ pub struct SingleRun {
     pub scenario: Scenario,
     /// What came of it.
     pub run: Run,
-    /// What the ECU said of itself, from its frames.
+    /// What the ECU said of itself, in order of time.
     pub reported: Vec<Event>,
+    /// Its modes and faults, from the start and at each change.
+    pub said: Vec<Said>,
+    /// The stretches without guidance; none by hand.
+    pub unguided: Vec<Unguided>,
     /// What the ECU said of the driver's reliance; nothing past the bus.
     pub readings: Readings,
     /// The bus, if it was recorded: milliseconds since the start, and what was sent then, in order.
@@ -99,10 +104,13 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
         record,
         notes: failure_notes(scenario.failure().time_s, &[record], window),
     };
+    let unguided = stretches(&run.trace).unwrap_or_default();
     Ok(SingleRun {
         scenario,
         run,
-        reported: ecu.into_events(),
+        reported: ecu.events().collect(),
+        said: ecu.into_said(),
+        unguided,
         readings,
         bus,
         results,

@@ -16,6 +16,7 @@ use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Scenario};
 use haptic_sim::simulation::Run;
 use haptic_sim::stability::{Guided, growth_per_s};
 
+use crate::Away;
 use crate::handover::{peak_m, stretched_curve};
 use crate::lanes::drive_all;
 
@@ -50,6 +51,9 @@ pub struct Drive {
     pub growth_per_s: f64,
     /// Peak lateral error in the curve, m; `None` if the vehicle left the road.
     pub peak_m: Option<f64>,
+    /// When the guidance was away in that drive.
+    #[serde(flatten)]
+    pub away: Away,
 }
 
 impl Drive {
@@ -196,6 +200,7 @@ fn driven(scenario: &Scenario, run: &Run) -> Drive {
         condition,
         growth_per_s: growth(scenario, (condition != Condition::Manual).then_some(law)),
         peak_m: peak_m(run, 0.0),
+        away: Away::new(scenario, &run.trace),
     }
 }
 

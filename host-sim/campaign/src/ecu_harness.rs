@@ -352,4 +352,8 @@ impl Guidance for EcuHarness<'_> {
             limited: false,
         }
     }
+
+    fn status(&self) -> Option<haptic_sim::guidance::Status> {
+        self.record.ecu.status()
+    }
 }

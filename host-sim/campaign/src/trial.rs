@@ -369,7 +369,7 @@ impl World {
                 what: format!("panic: {}", what.unwrap_or_default()),
             });
         }
-        let reported = std::mem::take(&mut record.ecu).into_events();
+        let reported = record.ecu.events().collect();
         let verdict = match self.real {
             None => judge(row, onset_ms, &record),
             // The second opinion on what can be seen knows the paper's world only: here every rule must hold, and what is

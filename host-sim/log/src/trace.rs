@@ -145,10 +145,13 @@ channels! {
     guidance_limited: bool, "1", 0, Guidance;
     /// Speed v of the vehicle.
     speed_m_per_s: f64, "m/s", 6, Vehicle;
+    /// Why the guidance is away: 0 where it is not; -1 torque lost, -2 lane preview lost, -3 request ended, -4 too slow,
+    /// -5 no fault named; above 0 the ECU's fault word.
+    unguided_cause: f64, "1", 0, Guidance;
 }
 
 /// What files of earlier versions do not have.
-const LATER_CHANNEL: &str = "speed_m_per_s";
+const LATER_CHANNELS: [&str; 2] = ["speed_m_per_s", "unguided_cause"];
 
 /// A run's samples, evenly spaced in time.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -181,9 +184,9 @@ impl Trace {
         table.finish()
     }
 
-    /// Reads what [`Trace::write_csv`] has written. Columns of other names are passed over; an empty field is NaN, and so is
-    /// the speed in a file that has none, as they were before it was a channel. The sample rate is that of the first and
-    /// the last time stamp.
+    /// Reads what [`Trace::write_csv`] has written. Columns of other names are passed over; an empty field is NaN, and so are
+    /// the speed and the cause of unguided driving in a file of an earlier version, which has none. The sample rate is that
+    /// of the first and the last time stamp.
     ///
     /// # Errors
     /// What cannot be read, a column that is missing, a field that is no number.
@@ -200,7 +203,7 @@ impl Trace {
         let mut table = TableReader::new(source)?;
         let place = |channel: Channel| {
             let found = table.header().iter().position(|name| *name == channel.name);
-            if found.is_none() && channel.name != LATER_CHANNEL {
+            if found.is_none() && !LATER_CHANNELS.contains(&channel.name) {
                 return Err(TableError::MissingColumn(channel.name.into()));
             }
             Ok(found)

@@ -28,19 +28,20 @@ fn a_trace_is_written_as_the_heading_says() {
         guidance_torque_nm: -0.47,
         guidance_limited: true,
         speed_m_per_s: 16.6666667,
+        unguided_cause: -2.0,
         ..Sample::default()
     };
     assert_eq!(
         written(&trace(vec![sample])),
         "time_s,e_y_m,e_theta_rad,wheel_angle_rad,guidance_torque_nm,driver_torque_nm,lateral_error_m,s_m,\
          heading_error_rad,curvature_1pm,guidance_e_y_m,guidance_e_theta_rad,wheel_rate_rad_per_s,\
-         yaw_rate_rad_per_s,sideslip_rad,guidance_limited,speed_m_per_s\n\
+         yaw_rate_rad_per_s,sideslip_rad,guidance_limited,speed_m_per_s,unguided_cause\n\
          0.008333,0.125000,0.0000000,,-0.47000,0.00000,-0.250000,12.5000,\
-         0.0000000,0.00000000,0.000000,0.0000000,0.000000,0.0000000,0.0000000,1,16.666667\n"
+         0.0000000,0.00000000,0.000000,0.0000000,0.000000,0.0000000,0.0000000,1,16.666667,-2\n"
     );
 }
 
-/// The n-th channel of the k-th sample is n + k/16, which every channel's digits hold but the flag's.
+/// The n-th channel of the k-th sample is n + k/16, which every channel's digits hold but the flag's and the code's.
 #[test]
 fn what_is_written_is_read_back_channel_by_channel() {
     let header = CHANNELS.map(|channel| channel.name).join(",");
@@ -73,17 +74,21 @@ fn what_is_no_trace_is_refused_with_line_and_column() {
     );
 }
 
-/// What was written before speed was a channel.
+/// What earlier versions have written.
 #[test]
-fn a_trace_without_speed_is_read() {
+fn a_trace_without_speed_and_cause_is_read() {
     let text = written(&trace(vec![Sample::default(); 2]));
     let without: String = text
         .lines()
-        .map(|line| line.rsplit_once(',').unwrap().0.to_owned() + "\n")
+        .map(|line| line.rsplitn(3, ',').last().unwrap().to_owned() + "\n")
         .collect();
-    assert!(!without.contains("speed"), "{without}");
+    assert!(
+        !without.contains("speed") && !without.contains("unguided"),
+        "{without}"
+    );
     let read = Trace::read_csv(without.as_bytes()).unwrap();
-    assert!(read.samples.len() == 2 && read.samples.iter().all(|s| s.speed_m_per_s.is_nan()));
+    let is_unknown = |s: &Sample| s.speed_m_per_s.is_nan() && s.unguided_cause.is_nan();
+    assert!(read.samples.len() == 2 && read.samples.iter().all(is_unknown));
 }
 
 /// A unit that is not the end of the channel's name would be a lie in every file.

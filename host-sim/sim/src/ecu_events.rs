@@ -1,4 +1,4 @@
-//! What the ECU said of itself, and when: modes and faults by name, from its guidance frames.
+//! What the ECU said of itself, and when: modes and faults by name.
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
@@ -6,17 +6,27 @@ use haptic_core::bus::messages::{Guidance, Message};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 
+use crate::guidance::Status;
 use crate::models::STEP_S;
 use crate::simulation::Outcome;
 use haptic_log::Event;
+
+/// What an ECU says of itself from an instant on, until it says something else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Said {
+    /// When, s since the start of the run.
+    pub time_s: f64,
+    /// Its mode.
+    pub mode: Mode,
+    /// The faults that are there.
+    pub faults: FaultSet,
+}
 
 /// Listens to an ECU.
 #[derive(Debug, Clone)]
 pub struct EcuEvents {
     receiver: ReceiverState,
-    mode: Option<Mode>,
-    faults: FaultSet,
-    events: Vec<Event>,
+    said: Vec<Said>,
 }
 
 impl EcuEvents {
@@ -24,43 +34,62 @@ impl EcuEvents {
     pub fn new() -> Self {
         Self {
             receiver: ReceiverState::TRUSTED,
-            mode: None,
-            faults: FaultSet::NONE,
-            events: Vec::new(),
+            said: Vec::new(),
         }
     }
 
     /// Takes what came of a step.
     pub fn observe(&mut self, outcome: &Outcome) {
-        if let Some(frame) = outcome.frames_out.first() {
-            self.take_frame(outcome.observation.step, frame);
+        if let Some(status) = &outcome.status {
+            self.take(outcome.observation.step, status.mode, status.faults);
         }
     }
 
     /// Takes the frame of a step.
     pub fn take_frame(&mut self, step: u32, frame: &Frame) {
-        let Ok(guidance) = Guidance::decode(&mut self.receiver, frame) else {
-            return;
-        };
-        let time_s = f64::from(step) * STEP_S;
-        let appeared = guidance.faults.without(self.faults);
-        let names = Fault::ALL.into_iter().filter(|fault| appeared.contains(*fault));
-        self.events.extend(names.map(|fault| Event {
-            time_s,
-            what: format!("The ECU reports {fault:?}"),
-        }));
-        if self.mode.is_some_and(|mode| mode != guidance.mode) {
-            self.events.push(Event {
-                time_s,
-                what: format!("The ECU goes to {:?}", guidance.mode),
-            });
+        if let Ok(guidance) = Guidance::decode(&mut self.receiver, frame) {
+            self.take(step, guidance.mode, guidance.faults);
         }
-        (self.mode, self.faults) = (Some(guidance.mode), guidance.faults);
     }
 
-    /// Everything heard, in order of time.
-    pub fn into_events(self) -> Vec<Event> {
-        self.events
+    fn take(&mut self, step: u32, mode: Mode, faults: FaultSet) {
+        let is_new = |last: &Said| (last.mode, last.faults) != (mode, faults);
+        if self.said.last().is_none_or(is_new) {
+            let time_s = f64::from(step) * STEP_S;
+            self.said.push(Said { time_s, mode, faults });
+        }
+    }
+
+    /// What it said last of mode and faults.
+    pub fn status(&self) -> Option<Status> {
+        self.said.last().map(|said| Status {
+            mode: said.mode,
+            faults: said.faults,
+            ..Status::GUIDES
+        })
+    }
+
+    /// Everything that happened, in order of time: faults that appeared, modes that changed.
+    pub fn events(&self) -> impl Iterator<Item = Event> {
+        let before = std::iter::once(None).chain(self.said.iter().map(Some));
+        self.said.iter().zip(before).flat_map(|(said, before)| {
+            let appeared = said
+                .faults
+                .without(before.map_or(FaultSet::NONE, |before| before.faults));
+            let names = Fault::ALL
+                .into_iter()
+                .filter(move |fault| appeared.contains(*fault));
+            let reports = names.map(|fault| format!("The ECU reports {fault:?}"));
+            let goes = before.filter(|before| before.mode != said.mode);
+            let goes = goes.map(|_| format!("The ECU goes to {:?}", said.mode));
+            let time_s = said.time_s;
+            reports.chain(goes).map(move |what| Event { time_s, what })
+        })
+    }
+
+    /// What it said from the start, and at each change.
+    pub fn into_said(self) -> Vec<Said> {
+        self.said
     }
 }
 
@@ -100,11 +129,7 @@ mod tests {
         ] {
             ecu.take_frame(step, &frame(step, mode, bits));
         }
-        let told: Vec<_> = ecu
-            .into_events()
-            .into_iter()
-            .map(|event| (event.time_s, event.what))
-            .collect();
+        let told: Vec<_> = ecu.events().map(|event| (event.time_s, event.what)).collect();
         let expected = [
             (0.001, "The ECU reports LaneTimeout"),
             (0.001, "The ECU goes to Handover"),

@@ -51,6 +51,7 @@ pub mod scenario;
 pub mod seeds;
 pub mod simulation;
 pub mod stability;
+pub mod unguided;
 pub mod worlds;
 
 pub use action::Action;

@@ -19,7 +19,7 @@ use haptic_core::bus::Frame;
 use haptic_log::trace::{Sample, Trace};
 
 use crate::action::{Action, Request, WorldFaults};
-use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
+use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation, Status};
 use crate::models::disturbances::{ErringCamera, ErringGyro, SensorErrors};
 use crate::models::driver::{Remnant, Vision};
 use crate::models::plant::{Plant, PlantInput, Transition};
@@ -30,6 +30,7 @@ use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::{PreviewPoints, wrapped};
 use crate::scenario::{FAILURE_REACTION_S, Failure, FailureKind, Scenario, SpeedProfile};
 use crate::seeds::Stream;
+use crate::unguided::{Cause, Circumstances, Watch};
 
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
 pub(crate) const DIVERGED_M: f64 = 10.0;
@@ -85,6 +86,10 @@ pub struct Outcome<'a> {
     pub decided: Actuation,
     /// The torque really applied, N.m: zero while the torque is lost.
     pub applied_torque_nm: f64,
+    /// What the ECU says of itself; `None` without guidance.
+    pub status: Option<Status>,
+    /// Why the guidance is away, if it is.
+    pub unguided: Option<Cause>,
     /// The truth of this instant, 200 times a second.
     pub sample: Option<Sample>,
     /// The frames that went to the ECU, in order of sending.
@@ -125,6 +130,7 @@ pub struct Simulation<G = AnyGuidance> {
     pub(crate) end_m: f64,
     /// Step in which something first went wrong.
     failed_at: Option<u32>,
+    watch: Watch,
     target_now_rad: f64,
     motor_torque_nm: f64,
     last_s_m: f64,
@@ -212,6 +218,7 @@ impl<G: Guidance> Simulation<G> {
             camera: PreviewPoints::new(&road, [t_n, t_f], v),
             body: road.tracker(0.0),
             failed_at: None,
+            watch: Watch::default(),
             target_now_rad: 0.0,
             motor_torque_nm: 0.0,
             last_s_m: 0.0,
@@ -266,6 +273,16 @@ impl<G: Guidance> Simulation<G> {
             Some(sensing) => sensing.of_truth(&observation),
         };
         let decided = self.guidance.step(&seen);
+        let status = self.guidance.status();
+        if let Some(status) = &status {
+            let around = Circumstances {
+                lost: faults,
+                request_ended: action.engage == Some(false),
+                speed_m_per_s: seen.speed_m_per_s,
+                least_speed_m_per_s: self.request.least_m_per_s,
+            };
+            self.watch.step(status, around);
+        }
         let applied = if faults.torque_lost {
             Actuation::default()
         } else {
@@ -285,6 +302,7 @@ impl<G: Guidance> Simulation<G> {
                         &observation,
                         [preview, camera],
                         applied,
+                        self.watch.cause(),
                     ));
                 }
                 _ => self.ending = Some(Ending::Diverged { s_m: self.last_s_m }),
@@ -298,6 +316,8 @@ impl<G: Guidance> Simulation<G> {
             observation: seen,
             decided,
             applied_torque_nm: applied.torque_nm,
+            status,
+            unguided: self.watch.cause(),
             sample,
             frames_in: self.guidance.frames_in(),
             frames_out: self.guidance.frames_out(),
@@ -563,6 +583,7 @@ fn record(
     observation: &Observation,
     [preview, camera]: [LaneErrors; 2],
     applied: Actuation,
+    unguided: Option<Cause>,
 ) -> Sample {
     Sample {
         time_s: f64::from(observation.step) * STEP_S,
@@ -582,6 +603,7 @@ fn record(
         driver_torque_nm: observation.driver_torque_nm,
         guidance_torque_nm: applied.torque_nm,
         guidance_limited: applied.limited,
+        unguided_cause: unguided.map_or(0.0, Cause::code),
     }
 }
 

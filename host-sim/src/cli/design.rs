@@ -87,7 +87,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(directory) = &arguments.out {
         eprintln!("Report: {}", directory.join("report.html").display());
     }
-    Ok(if answer.best.is_some() {
+    let best = answer.best.map(|best| &answer.designs[best]);
+    Ok(if best.is_some_and(|best| best.left_by_itself == 0) {
         Outcome::Good
     } else {
         Outcome::Failed

@@ -8,7 +8,7 @@ use haptic_report::studies::experiment as files;
 
 use super::output::Output;
 use super::participants::Participants;
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -58,6 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         print(&readable(&result))?;
     }
+    print_notes(files::left(&result).as_slice());
     eprintln!("Report: {}", arguments.out.join("report.html").display());
     Ok(Outcome::Good)
 }

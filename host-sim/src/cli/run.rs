@@ -64,18 +64,14 @@ fn readable(single: &SingleRun) -> String {
     let results = &single.results;
     let record = &results.record;
     let [from, to] = results.window_m;
-    let ended = if record.diverged {
-        format!("DIVERGED at {:.0} m", record.end_m)
-    } else {
-        "ran to its end".into()
-    };
     format!(
-        "{}, {}, t_p {} s, {}, failure {}: {ended}\n{from} to {to} m of {:.0} m\n\n{}",
+        "{}, {}, t_p {} s, {}, failure {}: {}\n{from} to {to} m of {:.0} m\n\n{}",
         results.course,
         single.scenario.speed(),
         record.t_p,
         record.condition,
         record.failure,
+        files::ended(single),
         results.course_length_m,
         files::table(results).to_text(),
     )

@@ -39,6 +39,13 @@ class Run:
         What the ECU said of itself: time in s, and what.
     bus : dict of str to numpy.ndarray or None
         Every frame, if asked for: ``t_us``, ``id`` and ``data`` (eight bytes a row), in order.
+    unguided : list of dict
+        The stretches without guidance: ``from_s``, ``until_s`` (None: the guidance was not back in this run), ``lasts_s``,
+        ``from_m``, ``to_m``, ``why``, and ``asked_for``: whether the scenario has it so, and it is not the ECU's own decision.
+    said : list of (float, str, tuple of str)
+        Mode and faults of the ECU: time in s, mode, names; from the start and at each change.
+    k_hg : dict of str to numpy.ndarray
+        K_hg as the ECU's telemetry has it, 50 times a second: ``time_s``, ``k_hg``, ``sd``; NaN where it is not identified.
     """
 
     scenario: Scenario
@@ -47,6 +54,9 @@ class Run:
     results: dict[str, Any] = field(repr=False)
     events: list[tuple[float, str]] = field(repr=False)
     bus: Optional[dict[str, np.ndarray]] = field(default=None, repr=False)
+    unguided: list[dict[str, Any]] = field(default_factory=list)
+    said: list[tuple[float, str, tuple[str, ...]]] = field(default_factory=list, repr=False)
+    k_hg: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -58,6 +68,11 @@ class Run:
     def ending(self) -> str:
         """How it ended: ``"course-end"`` or ``"diverged"``."""
         return "diverged" if self.results["diverged"] else "course-end"
+
+    @property
+    def left_by_itself(self) -> bool:
+        """Whether the ECU ended guidance by its own decision: then the metrics are not of guided driving alone."""
+        return any(not stretch["asked_for"] for stretch in self.unguided)
 
     @property
     def metrics(self) -> dict[str, Optional[float]]:
@@ -99,6 +114,11 @@ class Run:
         if failure_s is not None:
             for panel in (error, torque, wheel):
                 panel.axvline(failure_s, color="black", linestyle=":")
+        for stretch in self.unguided:
+            from_s, label = stretch["from_s"], f"no guidance: {stretch['why']}"
+            for panel in (error, torque, wheel):
+                panel.axvspan(from_s, from_s + stretch["lasts_s"], color="#d55e00", alpha=0.2, label=label)
+            torque.legend()
         return figure
 
 
@@ -124,7 +144,17 @@ def simulate(scenario: Scenario, *, bus: bool = False) -> Run:
         A bus to record where there is none.
     """
     made = _native.simulate(scenario, bus)
-    return Run(scenario, made["columns"], made["steps"], made["results"], made["events"], made.get("bus"))
+    return Run(
+        scenario,
+        made["columns"],
+        made["steps"],
+        made["results"],
+        made["events"],
+        made.get("bus"),
+        made["unguided"],
+        made["said"],
+        made["k_hg"],
+    )
 
 
 @dataclass(frozen=True)

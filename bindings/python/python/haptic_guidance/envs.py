@@ -51,7 +51,7 @@ Drives = Union[Scenario, Callable[[np.random.Generator], Scenario], None]
 _CHANNELS = Simulations.channels()
 _SEEN = [_CHANNELS.index(name) for name in OBSERVATION]
 _HIGH = np.array(list(OBSERVATION.values()), dtype=np.float32)
-_INFO = {name: _CHANNELS.index(name) for name in ("time_s", "s_m", "lateral_error_m")}
+_INFO = {name: _CHANNELS.index(name) for name in ("time_s", "s_m", "lateral_error_m", "unguided_cause")}
 _TERMS = ("error", "effort", "conflict")
 # The arm of nobody: the torque on the wheel is the agent's.
 _SLACK = {"a_1": 0.0, "a_2": 0.0, "a_3": 0.0, "K_d": 0.0, "K_hg": 0.0, "K_nms": 0.0}

@@ -9,6 +9,7 @@ use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
 use haptic_sim::simulation;
 
 use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, path_of};
+use crate::Away;
 use crate::lanes::{Checked, Group, in_groups};
 
 /// A drive with what is needed to judge it.
@@ -16,6 +17,7 @@ pub(crate) struct Driven {
     pub(super) scenario: Scenario,
     pub(crate) log: DriveLog,
     pub(super) path: Vec<(f64, f64)>,
+    pub(crate) away: Away,
 }
 
 /// Lets a published driver drive alone, with a remnant and the paper's sensors.
@@ -65,6 +67,7 @@ pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
         scenario: scenario.clone(),
         log: recorder.into_log(),
         path: path_of(&run.trace),
+        away: Away::new(scenario, &run.trace),
     }
 }
 
@@ -113,6 +116,7 @@ fn log_group(group: Group) -> Result<Vec<Driven>, String> {
                     scenario: scenarios[place].clone(),
                     log: std::mem::replace(&mut recorders[place], Recorder::new(true)).into_log(),
                     path: path_of(&run.trace),
+                    away: Away::new(&scenarios[place], &run.trace),
                 });
             }
             Event::HandedBack => (),

@@ -39,6 +39,7 @@ use haptic_sim::models::road::Course;
 use haptic_sim::participants::{Participant, PublishedDriver, participants};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
 
+use crate::Away;
 use crate::lanes::drive_all;
 pub use drives::recorded;
 use drives::{Driven, scenario_of_drive};
@@ -89,6 +90,9 @@ pub struct Drive {
     pub truth: PublishedDriver,
     /// Standard deviation of the remnant, N.m.
     pub remnant_sd_nm: f64,
+    /// When the guidance was away.
+    #[serde(flatten)]
+    pub away: Away,
     /// By the default method.
     pub noise_model: Finding,
     /// By the published method.
@@ -109,6 +113,9 @@ pub struct Finding {
     pub identification: Identification,
     /// Trajectory error of the identified driver, m; none if it leaves the road.
     pub trajectory_error_m: Option<f64>,
+    /// When the guidance was away while the identified driver drove.
+    #[serde(flatten)]
+    pub away: Away,
     /// Path of the identified driver.
     #[serde(skip)]
     pub path: Vec<(f64, f64)>,
@@ -135,19 +142,25 @@ pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, Str
     });
     let found: Vec<[Identified; 2]> = found.collect::<Result<_, _>>()?;
     let again: Vec<Scenario> = found.iter().flatten().map(|f| f.driver.clone()).collect();
-    let paths = drive_all(&again, plan.seed, |_, run| {
-        Ok((path_of(&run.trace), run.diverged()))
+    let paths = drive_all(&again, plan.seed, |number, run| {
+        let away = Away::new(&again[number], &run.trace);
+        Ok((path_of(&run.trace), run.diverged(), away))
     })?;
-    let paths = found.into_iter().flatten().zip(paths);
-    let mut findings = paths.map(|(found, (again, diverged))| (found.identification, again, diverged));
+    let mut findings = found.into_iter().flatten().zip(paths);
     let drives = drives.into_iter().zip(driven).map(|((number, truth), driven)| {
-        let Driven { scenario, log, path } = driven;
+        let Driven {
+            scenario,
+            log,
+            path,
+            away,
+        } = driven;
         let mut finding = || {
-            let (identification, again, diverged) = findings.next()?;
+            let (found, (again, diverged, away)) = findings.next()?;
             Some(Finding {
                 trajectory_error_m: (!diverged).then(|| mean_distance(&path, &again)),
+                away,
                 path: again,
-                identification,
+                identification: found.identification,
             })
         };
         let (noise_model, paper) = finding().zip(finding())?;
@@ -156,6 +169,7 @@ pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, Str
             guided: truth.k_hg.is_some(),
             truth,
             remnant_sd_nm: scenario.driver().remnant_sd_nm,
+            away,
             noise_model,
             paper,
             path,

@@ -120,6 +120,8 @@ pub struct RelianceResults {
     pub limited_steps: [u64; 2],
     /// Runs that diverged and are not counted.
     pub diverged: u32,
+    /// Runs in which the ECU ended guidance by itself; what it read until then counts.
+    pub left_by_itself: u32,
     /// Examples, for the figure.
     #[serde(skip)]
     pub examples: Vec<Example>,
@@ -147,6 +149,7 @@ struct Drive {
     changed: Option<(Point, f64)>,
     limited_steps: [u64; 2],
     diverged: u32,
+    left_by_itself: u32,
     example: Option<Example>,
 }
 
@@ -215,6 +218,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults,
             [a + d.limited_steps[0], b + d.limited_steps[1]]
         }),
         diverged: drives.iter().map(|d| d.diverged).sum(),
+        left_by_itself: drives.iter().map(|d| d.left_by_itself).sum(),
         examples: drives.iter().filter_map(|d| d.example.clone()).collect(),
     })
 }
@@ -226,6 +230,7 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
         changed: None,
         limited_steps: [0; 2],
         diverged: 0,
+        left_by_itself: 0,
         example: None,
     };
     let truth = all[place].guided.gains();
@@ -273,7 +278,7 @@ fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Res
 /// Drives a scenario over the bus, the probe asked for in sessions of a length, and counts what was limited.
 fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Readings {
     let mut simulation = Simulation::with(scenario, OverBus::new(scenario.setup()));
-    let mut readings = Readings::default();
+    let (mut readings, mut left) = (Readings::default(), false);
     loop {
         let into_s = f64::from(simulation.steps()) * STEP_S % session_s;
         let action = Action {
@@ -284,7 +289,9 @@ fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Readings {
             break;
         };
         readings.observe(&outcome);
+        left |= outcome.unguided.is_some_and(|why| !why.is_asked_for());
     }
+    result.left_by_itself += u32::from(left);
     result.limited_steps[0] += u64::from(readings.limited_steps);
     result.limited_steps[1] += u64::from(simulation.steps());
     result.diverged += u32::from(simulation.ending() != Some(Ending::CourseEnd));

@@ -18,13 +18,14 @@ mod tests;
 use std::path::Path;
 
 use haptic_sim::input::InputError;
-use haptic_sim::scenario::Scenario;
+use haptic_sim::scenario::{Condition, Scenario};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use order::Order;
 
 use crate::lanes::drive_all;
+use crate::left_by_themselves;
 use crate::record::RunRecord;
 
 /// A study, checked.
@@ -214,6 +215,20 @@ impl Study {
             .map(result)
             .collect::<Result<Vec<_>, _>>()?;
         let mut notes = self.notes.clone();
+        let guided = sessions.iter().filter_map(|s| {
+            let recorded = s.recorded.as_ref()?;
+            let name = format!("{}/{}", s.participant, s.condition);
+            (recorded.record.condition != Condition::Manual).then_some((&recorded.record.away, name))
+        });
+        notes.extend(
+            left_by_themselves(guided.clone()).map(|left| format!("{left}; the means hold them too")),
+        );
+        match guided.filter(|(away, _)| away.unguided_s.is_none()).count() {
+            0 => {}
+            count => notes.push(format!(
+                "{count} recordings with guidance do not say when it was away"
+            )),
+        }
         let mut versions: Vec<&str> = sessions
             .iter()
             .filter_map(|s| s.recorded.as_ref().map(|r| r.version.as_str()))

@@ -3,11 +3,14 @@
 //! Eight bytes that name the form; the sweep's fingerprint, the chunk's number, its rows and its columns as `u64`;
 //! the rows as `f64` (NaN: no value); a checksum. All little-endian.
 
-use super::Driven;
+use haptic_sim::unguided::Cause;
 
-const FORM: &[u8; 8] = b"HSWEEP1\n";
-/// Columns before the metrics: diverged, end_m.
-const OWN: usize = 2;
+use super::Driven;
+use crate::Away;
+
+const FORM: &[u8; 8] = b"HSWEEP2\n";
+/// Columns before the metrics: diverged, end_m, and when, why (0: never), until when and for how long the guidance was away.
+const OWN: usize = 6;
 
 /// Drives that follow each other.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,8 +30,16 @@ impl Chunk {
             bytes.extend(head.to_le_bytes());
         }
         for row in &self.rows {
-            let own = [f64::from(row.diverged), row.end_m];
-            let metrics = row.metrics.iter().map(|value| value.unwrap_or(f64::NAN));
+            let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+            let own = [
+                f64::from(row.diverged),
+                row.end_m,
+                number(row.away.guidance_left_s),
+                row.away.guidance_left_why.map_or(0.0, Cause::code),
+                number(row.away.guidance_back_s),
+                number(row.away.unguided_s),
+            ];
+            let metrics = row.metrics.iter().map(|value| number(*value));
             for value in own.into_iter().chain(metrics) {
                 bytes.extend(value.to_le_bytes());
             }
@@ -62,13 +73,17 @@ impl Chunk {
 }
 
 fn driven(row: &[f64]) -> Driven {
+    let number = |value: &f64| value.is_finite().then_some(*value);
     Driven {
         diverged: row[0] != 0.0,
         end_m: row[1],
-        metrics: row[OWN..]
-            .iter()
-            .map(|value| value.is_finite().then_some(*value))
-            .collect(),
+        away: Away {
+            guidance_left_s: number(&row[2]),
+            guidance_left_why: Cause::from_code(row[3]),
+            guidance_back_s: number(&row[4]),
+            unguided_s: number(&row[5]),
+        },
+        metrics: row[OWN..].iter().map(number).collect(),
     }
 }
 
@@ -95,6 +110,12 @@ mod tests {
         let row = |end_m, value| Driven {
             diverged: end_m > 5.0,
             end_m,
+            away: Away {
+                guidance_left_s: value.map(|_| 30.5),
+                guidance_left_why: value.map(|_| Cause::TooSlow),
+                guidance_back_s: None,
+                unguided_s: value.map(f64::abs),
+            },
             metrics: vec![Some(0.25), value],
         };
         let chunk = Chunk {

@@ -7,8 +7,8 @@ use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{Run, simulate};
 
 use super::{Chunk, Point, Sweep};
-use crate::RunRecord;
 use crate::record::{default_window, nominal_peak_m};
+use crate::{Away, RunRecord};
 
 /// What came of a drive.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Driven {
     pub diverged: bool,
     /// Arc length of its last sample, m.
     pub end_m: f64,
+    /// When the guidance was away.
+    pub away: Away,
     /// A value for each of [`Sweep::metrics`], if it has one.
     pub metrics: Vec<Option<f64>>,
 }
@@ -69,6 +71,7 @@ impl Sweep {
         Driven {
             diverged: record.diverged,
             end_m: record.end_m,
+            away: record.away,
             metrics: self.metrics.iter().map(|d| (d.value)(&record.metrics)).collect(),
         }
     }

@@ -81,6 +81,16 @@ impl ParquetTable {
         }
         next(&|column| column.flag(driven.diverged));
         next(&|column| column.number(Some(driven.end_m)));
+        let away = driven.away;
+        next(&|column| column.number(away.guidance_left_s));
+        next(&|column| {
+            column.text(
+                away.guidance_left_why
+                    .map_or(String::new(), |why| why.to_string()),
+            )
+        });
+        next(&|column| column.number(away.guidance_back_s));
+        next(&|column| column.number(away.unguided_s));
         for metric in &driven.metrics {
             next(&|column| column.number(*metric));
         }
@@ -134,6 +144,7 @@ fn columns(sweep: &Sweep) -> Vec<Column> {
         }
     }
     columns.extend([Column::Flag(Vec::new()), number()]);
+    columns.extend([number(), Column::Text(Vec::new()), number(), number()]);
     columns.extend(sweep.metrics().iter().map(|_| number()));
     columns
 }

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use haptic_analysis::metrics::Definition;
+use haptic_sim::unguided::Cause;
 use serde::Serialize;
 
 use super::effects::Effects;
 use super::saltelli::{Blocks, SobolIndex};
 use super::{Design, Driven, Effect, Point, Sweep, value};
+use crate::Away;
 
 /// Drives that are shown as the worst.
 const WORST: usize = 10;
@@ -25,6 +27,10 @@ pub struct Summary {
     pub planned: u64,
     /// Drives that were stopped because they diverged.
     pub diverged: u64,
+    /// Drives in which the ECU ended guidance by itself.
+    pub left_by_itself: u64,
+    /// The same by why.
+    pub left_why: BTreeMap<String, u64>,
     /// The metric by which drives are called bad.
     pub judge: &'static str,
     /// Beyond it a drive is bad, if there is a limit.
@@ -75,6 +81,9 @@ pub struct Worst {
     pub values: Vec<String>,
     /// Whether it diverged.
     pub diverged: bool,
+    /// When the guidance was away.
+    #[serde(flatten)]
+    pub away: Away,
     /// The metric by which it is judged.
     pub value: Option<f64>,
 }
@@ -89,6 +98,7 @@ pub(super) struct Summarised<'a> {
     judge: usize,
     drives: u64,
     diverged: u64,
+    left: BTreeMap<Cause, u64>,
     beyond: u64,
     spreads: Vec<Spread>,
     effects: Effects,
@@ -112,6 +122,7 @@ impl<'a> Summarised<'a> {
             judge,
             drives: 0,
             diverged: 0,
+            left: BTreeMap::new(),
             beyond: 0,
             spreads: vec![Spread::default(); metrics],
             effects: Effects::new(sweep, judge),
@@ -123,6 +134,9 @@ impl<'a> Summarised<'a> {
     pub(super) fn add(&mut self, point: &Point, driven: &Driven) {
         self.drives += 1;
         self.diverged += u64::from(driven.diverged);
+        if let Some(why) = driven.away.guidance_left_why.filter(|why| !why.is_asked_for()) {
+            *self.left.entry(why).or_default() += 1;
+        }
         let judged = driven.metrics[self.judge];
         let small = small_is_bad(self.sweep.judge());
         let is_beyond = self.sweep.limit.is_some_and(|limit| {
@@ -163,6 +177,7 @@ impl<'a> Summarised<'a> {
                 seed: point.seed,
                 values,
                 diverged: driven.diverged,
+                away: driven.away,
                 value,
             };
             self.worst.insert(place, worst);
@@ -185,6 +200,12 @@ impl<'a> Summarised<'a> {
             drives: self.drives,
             planned: self.sweep.drives(),
             diverged: self.diverged,
+            left_by_itself: self.left.values().sum(),
+            left_why: self
+                .left
+                .iter()
+                .map(|(why, count)| (why.to_string(), *count))
+                .collect(),
             judge: self.sweep.judge().name,
             limit: self.sweep.limit,
             beyond: self.sweep.limit.map(|_| self.beyond),

@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Driven, Point, Sweep, value};
+use crate::Away;
 
 /// Both tables on their way. Without the feature `parquet` there is only the CSV file.
 pub(super) struct Tables {
@@ -38,6 +39,7 @@ impl Tables {
         ];
         let varied = point.values.iter().map(value::text);
         let own = [u8::from(driven.diverged).to_string(), driven.end_m.to_string()];
+        let own = own.into_iter().chain(driven.away.texts());
         let metrics = driven
             .metrics
             .iter()
@@ -69,7 +71,8 @@ pub(super) fn header(sweep: &Sweep) -> Vec<String> {
     let names = ["drive", "seed", "version"]
         .into_iter()
         .chain(varied)
-        .chain(["diverged", "end_m"]);
+        .chain(["diverged", "end_m"])
+        .chain(Away::NAMES);
     names
         .chain(sweep.metrics().iter().map(|d| d.name))
         .map(String::from)

@@ -3,7 +3,8 @@
 (function () {
   "use strict";
   const HEIGHT = 230;
-  const BAND = { light: "rgba(0,0,0,0.05)", dark: "rgba(0,0,0,0.12)" };
+  const BAND = { light: "rgba(0,0,0,0.05)", dark: "rgba(0,0,0,0.12)", alert: "rgba(213,94,0,0.2)" };
+  const SHADED = { light: "lightly shaded: ", dark: "shaded: ", alert: "shaded in colour: " };
 
   // A colour with an opacity.
   function pale(colour, opacity) {
@@ -17,7 +18,7 @@
   }
 
   // Shaded stretches below everything, markers above them.
-  function backdrop(figure) {
+  function backdrop(figure, panel) {
     return (u) => {
       const { left, top, width, height } = u.bbox;
       const c = u.ctx;
@@ -26,8 +27,9 @@
       c.rect(left, top, width, height);
       c.clip();
       for (const band of figure.bands) {
+        if (band.panel !== null && band.panel !== panel) continue;
         const from = u.valToPos(band.from, "x", true);
-        c.fillStyle = band.dark ? BAND.dark : BAND.light;
+        c.fillStyle = BAND[band.shade];
         c.fillRect(from, top, u.valToPos(band.to, "x", true) - from, height);
       }
       c.strokeStyle = "#555";
@@ -142,7 +144,7 @@
         drag: { x: true, y: false },
       },
       hooks: {
-        drawClear: [backdrop(figure)],
+        drawClear: [backdrop(figure, siblings.length)],
         draw: [uprights(panel)],
         ready: [(u) => u.setScale("x", { min: whole[0], max: whole[1] })],
         setScale: [
@@ -177,7 +179,7 @@
       chart(figure, panel, i + 1 === figure.panels.length, place, siblings, "figure-" + number);
     });
     const keys = new Set(figure.markers.map((m) => "dotted: " + m.label));
-    for (const band of figure.bands) keys.add((band.dark ? "shaded: " : "lightly shaded: ") + band.label);
+    for (const band of figure.bands) keys.add(SHADED[band.shade] + band.label);
     if (keys.size) {
       const line = document.createElement("div");
       line.className = "keys";

@@ -56,7 +56,7 @@ pub(super) fn data(figure: &Figure) -> Option<String> {
         "panels": panels.collect::<Vec<_>>(),
         "markers": figure.markers.iter().map(|m| json!({ "label": m.label, "x": m.x })).collect::<Vec<_>>(),
         "bands": figure.bands.iter()
-            .map(|b| json!({ "label": b.label, "from": b.from, "to": b.to, "dark": b.dark }))
+            .map(|b| json!({ "label": b.label, "from": b.from, "to": b.to, "shade": b.shade, "panel": b.panel }))
             .collect::<Vec<_>>(),
     });
     // Nothing that a browser could take for the end of the script.

@@ -156,19 +156,10 @@ fn legend(figure: &Figure) -> Vec<LegendEntry> {
         add(&marker.label, style::MARKER, LegendShape::Line, "2 2");
     }
     for band in &figure.bands {
-        add(
-            &band.label,
-            &paler("#000000", band_opacity(band.dark)),
-            LegendShape::Rect,
-            "",
-        );
+        let (colour, opacity) = style::of_shade(band.shade);
+        add(&band.label, &paler(colour, opacity), LegendShape::Rect, "");
     }
     entries
-}
-
-/// Bands are a breath of black, so that the grid and the frame show through.
-pub(super) fn band_opacity(dark: bool) -> f64 {
-    if dark { 0.12 } else { 0.05 }
 }
 
 /// A colour as it looks on white paper.

@@ -5,9 +5,7 @@ use kuva::plot::{BandPlot, LinePlot, LineStyle, LollipopPlot, ScatterPlot};
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
-use super::draw::{
-    INTERVAL_OPACITY, LEFT, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, STEM_DOT, TEXT_SIZE, band_opacity, names_room,
-};
+use super::draw::{INTERVAL_OPACITY, LEFT, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, STEM_DOT, TEXT_SIZE, names_room};
 use super::{Figure, Mark, Panel, Series, polyline, style};
 
 /// Height of a row of names.
@@ -124,11 +122,12 @@ impl<'a> Frame<'a> {
             layout = layout.with_x_label(&self.figure.x.label);
         }
         layout.suppress_x_ticks = !self.has_x_axis();
-        for band in &self.figure.bands {
+        for band in self.figure.bands.iter().filter(|band| band.is_in(self.index)) {
             let (from, to) = (band.from.max(across.0), band.to.min(across.1));
             if from < to {
-                let region = ShadedRegion::vertical(from, to).with_color("#000000");
-                layout = layout.with_shaded_region(region.with_opacity(band_opacity(band.dark)));
+                let (colour, opacity) = style::of_shade(band.shade);
+                let region = ShadedRegion::vertical(from, to).with_color(colour);
+                layout = layout.with_shaded_region(region.with_opacity(opacity));
             }
         }
         if up.0 < 0.0 && up.1 > 0.0 {

@@ -24,6 +24,8 @@ pub(crate) use style::{colour, dash, width};
 
 use std::fmt;
 
+use serde::Serialize;
+
 /// A drawing of panels that share an axis.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
@@ -176,8 +178,30 @@ pub struct Band {
     pub from: f64,
     /// End.
     pub to: f64,
-    /// The darker of the two shades.
-    pub dark: bool,
+    /// How it is shaded.
+    pub shade: Shade,
+    /// The one panel that it is in; in all of them if none is named.
+    pub panel: Option<usize>,
+}
+
+impl Band {
+    /// Whether it is in a panel.
+    pub(crate) fn is_in(&self, panel: usize) -> bool {
+        self.panel.is_none_or(|own| own == panel)
+    }
+}
+
+/// How a stretch is shaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shade {
+    /// A breath of grey.
+    #[default]
+    Light,
+    /// Grey.
+    Dark,
+    /// A colour, for what nobody may overlook.
+    Alert,
 }
 
 /// Why a figure could not be drawn.

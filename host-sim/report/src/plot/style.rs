@@ -2,6 +2,8 @@
 
 use kuva::plot::scatter::MarkerShape;
 
+use super::Shade;
+
 pub(super) const MARKER: &str = "#555555";
 
 pub(super) struct Style {
@@ -31,6 +33,15 @@ const ALL: [Style; 7] = [
     style("#56b4e9", "9 4", 1.7, MarkerShape::Plus),
     style("#e69f00", "4 3", 1.7, MarkerShape::TriangleDown),
 ];
+
+/// Colour and opacity of a band: the grid and the frame show through.
+pub(super) fn of_shade(shade: Shade) -> (&'static str, f64) {
+    match shade {
+        Shade::Light => ("#000000", 0.05),
+        Shade::Dark => ("#000000", 0.12),
+        Shade::Alert => ("#d55e00", 0.2),
+    }
+}
 
 /// Number of styles that can be told apart.
 pub(super) const STYLES: usize = ALL.len();

@@ -35,7 +35,8 @@ fn two_panels() -> Figure {
             label: "curve".into(),
             from: 20.0,
             to: 400.0,
-            dark: true,
+            shade: Shade::Dark,
+            panel: None,
         }],
         ..Figure::default()
     }

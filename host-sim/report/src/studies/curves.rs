@@ -1,7 +1,8 @@
-//! The curves of a course as shaded stretches of a figure.
+//! The curves of a course, and the stretches without guidance, as shaded stretches of a figure over the road.
 
-use crate::plot::Band;
+use crate::plot::{Band, Shade};
 use haptic_sim::models::road::Course;
+use haptic_sim::unguided::Unguided;
 
 /// Clothoids in the lighter shade, arcs in the darker; straights stay white.
 pub(super) fn bands(course: &Course) -> Vec<Band> {
@@ -17,10 +18,22 @@ pub(super) fn bands(course: &Course) -> Vec<Band> {
                 label: label.into(),
                 from,
                 to,
-                dark,
+                shade: if dark { Shade::Dark } else { Shade::Light },
+                panel: None,
             });
         }
         from = to;
     }
     bands
+}
+
+/// Stretches of a run without guidance, with why.
+pub(super) fn unguided(stretches: &[Unguided]) -> impl Iterator<Item = Band> {
+    stretches.iter().map(|stretch| Band {
+        label: format!("no guidance: {}", stretch.why),
+        from: stretch.from_m,
+        to: stretch.to_m,
+        shade: Shade::Alert,
+        panel: None,
+    })
 }

@@ -110,6 +110,12 @@ pub fn sentences(answer: &Answer) -> Vec<String> {
         needed_s / 60.0,
         best.course
     )];
+    if best.left_by_itself > 0 {
+        out.push(format!(
+            "It rests on {} drives in which the ECU ended guidance by itself, and does not hold for guided driving.",
+            best.left_by_itself
+        ));
+    }
     if let Some(c) = &answer.confirmation {
         out.push(format!(
             "Confirmed by {} simulated records of {:.0} s: predicted error {:.4}, RMS error {:.4}; {:.0} % of the 95 % intervals \

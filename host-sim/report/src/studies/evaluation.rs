@@ -9,13 +9,14 @@ use crate::document::{
     Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, metrics_table,
     write_json, write_trace,
 };
-use crate::plot::{Axis, Figure, Marker, Panel, Series};
+use crate::plot::{Axis, Band, Figure, Marker, Panel, Series, Shade};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::RunRecord;
 use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
 use haptic_sim::models::road::PAPER_COURSE;
 use haptic_sim::scenario::{Condition, FailureKind, Scenario};
 use haptic_sim::simulation::Run;
+use haptic_sim::unguided::stretches;
 
 /// Metrics of the short table; the report's second table has all of them.
 const IN_SHORT: [&str; 7] = [
@@ -137,13 +138,14 @@ type Shown<'a> = (&'a str, &'a dyn Fn(&Scenario) -> bool);
 /// For each driver one panel for each of `kinds`: lateral error along the road, a line for each condition, the same
 /// axes for all.
 fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
-    let mut panels = Vec::new();
+    let (mut panels, mut absences) = (Vec::new(), Vec::new());
     for (number, t_p) in DRIVERS_T_P.iter().enumerate() {
         for (ending, shown) in kinds {
             let runs = evaluation
                 .runs
                 .iter()
                 .filter(|(s, _)| s.driver().t_p == *t_p && shown(s));
+            absences.extend(absent(runs.clone(), panels.len()));
             // A condition has the same style in all figures.
             let style = |condition| Condition::ALL.iter().position(|c| *c == condition).unwrap_or(0);
             let path = |run: &Run| {
@@ -165,6 +167,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
     let [from, to] = evaluation.results.window_m;
     let course = evaluation.runs.first().map(|(scenario, _)| scenario.course());
     let bands = course.map(curves::bands).unwrap_or_default().into_iter();
+    let bands = bands.chain(absences);
     Figure {
         title: title.into(),
         x: Axis {
@@ -177,6 +180,31 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
         bands: bands.filter(|band| band.from < to && band.to > from).collect(),
         ..Figure::default()
     }
+}
+
+/// Where the ECU ended guidance by itself in some run of a panel; what the scenario lets fail is what the figure is about.
+fn absent<'a>(runs: impl Iterator<Item = &'a (Scenario, Run)>, panel: usize) -> Vec<Band> {
+    let guided = runs.filter(|(scenario, _)| scenario.condition() != Condition::Manual);
+    let stretches = guided.flat_map(|(_, run)| stretches(&run.trace).unwrap_or_default());
+    let mut left: Vec<_> = stretches.filter(|stretch| !stretch.asked_for).collect();
+    left.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
+    let mut bands: Vec<Band> = Vec::new();
+    for stretch in left {
+        let why = format!("no guidance in some run: {}", stretch.why);
+        let touches = |band: &&mut Band| band.label == why && band.to >= stretch.from_m;
+        // Shaded once, however many runs there are.
+        match bands.iter_mut().find(touches) {
+            Some(band) => band.to = band.to.max(stretch.to_m),
+            None => bands.push(Band {
+                label: why,
+                from: stretch.from_m,
+                to: stretch.to_m,
+                shade: Shade::Alert,
+                panel: Some(panel),
+            }),
+        }
+    }
+    bands
 }
 
 fn label(condition: Condition) -> &'static str {
@@ -272,6 +300,11 @@ fn claims_section(results: &EvaluationResults) -> Section {
 
 /// What the evaluation must show, and whether it does.
 pub fn claims_table(results: &EvaluationResults) -> Table {
+    let caption = if results.claims.len() > 1 {
+        "The independent implementation's numbers, and the paper's claims as orderings."
+    } else {
+        "What an evaluation on any course rests on."
+    };
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
         [holds, claim.claim.as_str(), &claim.evidence]
@@ -279,13 +312,19 @@ pub fn claims_table(results: &EvaluationResults) -> Table {
             .to_vec()
     });
     Table {
-        caption: "The independent implementation's numbers, and the paper's claims as orderings.".into(),
+        caption: caption.into(),
         columns: ["Verdict", "Claim", "Evidence"].map(String::from).to_vec(),
         rows: rows.collect(),
     }
 }
 
 fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
+    // A column of its own only where the ECU ended guidance in a run.
+    let some_left = results.runs.iter().any(|r| r.away.is_by_itself());
+    let left = |r: &RunRecord| {
+        let told = r.away.when_and_why().filter(|_| r.away.is_by_itself());
+        some_left.then(|| Cell::Text(told.unwrap_or_default()))
+    };
     let keys = |r: &RunRecord| {
         let ended = if r.diverged {
             format!("diverged at {:.0} m", r.end_m)
@@ -299,13 +338,11 @@ fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definiti
         }]
         .into_iter()
         .chain(texts)
+        .chain(left(r))
         .collect()
     };
     let rows: Vec<(Vec<Cell>, _)> = results.runs.iter().map(|r| (keys(r), r.metrics)).collect();
-    metrics_table(
-        caption,
-        &["t_p (s)", "Condition", "Failure", "Ended"],
-        &rows,
-        shown,
-    )
+    let keys = ["t_p (s)", "Condition", "Failure", "Ended", "Guidance ended"];
+    let keys = &keys[..keys.len() - usize::from(!some_left)];
+    metrics_table(caption, keys, &rows, shown)
 }

@@ -9,6 +9,7 @@ use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, 
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
 use haptic_batch::experiment::{Drive, Experiment, Finding};
+use haptic_batch::left_by_themselves;
 
 /// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
 ///
@@ -202,8 +203,11 @@ fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
         title: "Fourteen drivers, identified".into(),
         summary: format!(
             "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. \
-             Truth beside estimate; a dash where the data do not identify a parameter.",
-            experiment.course, experiment.probe_nm, experiment.seed
+             Truth beside estimate; a dash where the data do not identify a parameter. {}",
+            experiment.course,
+            experiment.probe_nm,
+            experiment.seed,
+            super::notes(left(experiment).as_slice()),
         ),
         sections: vec![
             truth(true, "With guidance"),
@@ -312,4 +316,17 @@ pub fn trajectory_table(experiment: &Experiment) -> Table {
             .to_vec(),
         rows: rows.collect(),
     }
+}
+
+/// Which drives, recorded or driven again, were not guided throughout; none if all were.
+pub fn left(experiment: &Experiment) -> Option<String> {
+    let drives = experiment.drives.iter().filter(|d| d.guided).flat_map(|d| {
+        let name = |what: &str| format!("participant {}, {what},", d.participant);
+        [
+            (&d.away, name("recorded")),
+            (&d.noise_model.away, name("by the noise model")),
+            (&d.paper.away, name("by the published method")),
+        ]
+    });
+    left_by_themselves(drives)
 }

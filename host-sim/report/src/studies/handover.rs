@@ -67,6 +67,7 @@ pub fn table(results: &HandoverResults) -> Table {
         let verdict = match (row.manual_stable, row.is_judged(), row.is_broken()) {
             (false, ..) => "manual driver unstable",
             (true, false, _) => "not judged",
+            (true, true, true) if row.left_by_itself > 0 => "GUIDANCE ENDED",
             (true, true, true) => "TOO MUCH",
             (true, true, false) => "holds",
         };

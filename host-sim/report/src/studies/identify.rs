@@ -6,7 +6,7 @@ use std::path::Path;
 use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
-use crate::plot::{Axis, Band, Figure, Mark, Panel, Series};
+use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
 use haptic_analysis::identify::{History, Identification, Reason, autocorrelation};
 use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
 
@@ -195,7 +195,12 @@ fn left_out_bands(found: &Identification) -> Vec<Band> {
             label: format!("left out: {}", l.reason),
             from: l.from_s,
             to: l.to_s,
-            dark: l.reason != Reason::Asked,
+            shade: if l.reason == Reason::Asked {
+                Shade::Light
+            } else {
+                Shade::Dark
+            },
+            panel: None,
         })
         .collect()
 }
@@ -426,6 +431,8 @@ pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
     let again = drive.results.drives_again.as_ref()?;
     let left_road = if again.diverged { "yes" } else { "no" };
     let row = |name: &str, cell| vec![Cell::Text(name.into()), cell];
+    let left = again.away.when_and_why();
+    let left = left.map(|left| row("guidance ended", Cell::Text(left)));
     Some(Table {
         caption: "The identified driver on the course.".into(),
         columns: vec![String::new(); 2],
@@ -439,7 +446,10 @@ pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
                 number(again.metrics.mean_abs_lateral_error_m),
             ),
             row("left the road", Cell::Text(left_road.into())),
-        ],
+        ]
+        .into_iter()
+        .chain(left)
+        .collect(),
     })
 }
 

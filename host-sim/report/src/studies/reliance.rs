@@ -118,12 +118,16 @@ pub fn settling(results: &RelianceResults) -> String {
     format!(
         "Of {} changes {:.1} % of the estimates are within {NEAR} of the new truth after {SETTLING_S} s; of those by \
          more than 0.3, {:.1} %. RMS error then: {:.3}. A limit held back {limited} of {steps} steps; {} drives \
-         diverged.",
+         diverged.{}",
         settling.count,
         100.0 * settling.near,
         100.0 * settling.near_after_large,
         settling.rms,
         results.diverged,
+        match results.left_by_itself {
+            0 => String::new(),
+            count => format!(" In {count} drives the ECU ended guidance by itself."),
+        }
     )
 }
 

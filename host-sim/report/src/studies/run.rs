@@ -48,6 +48,20 @@ fn provenance(single: &SingleRun) -> Provenance {
     Provenance::of(Some(single.scenario.to_toml()))
 }
 
+/// How the run ended, and when and why the guidance did, if it did before.
+pub fn ended(single: &SingleRun) -> String {
+    let record = &single.results.record;
+    let ended = if record.diverged {
+        format!("DIVERGED at {:.0} m", record.end_m)
+    } else {
+        "ran to its end".into()
+    };
+    match record.away.when_and_why() {
+        Some(left) => format!("{ended}; guidance ended {left}"),
+        None => ended,
+    }
+}
+
 /// Every metric of the run, and what the ECU read of K_hg.
 pub fn table(results: &SingleResults) -> Table {
     let metric = |d: &Definition| {
@@ -126,7 +140,10 @@ fn figure(single: &SingleRun) -> Figure {
             })
             .into_iter()
             .collect(),
-        bands: curves::bands(single.scenario.course()),
+        bands: curves::bands(single.scenario.course())
+            .into_iter()
+            .chain(curves::unguided(&single.unguided))
+            .collect(),
         ..Figure::default()
     }
 }
@@ -152,13 +169,14 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
     Report {
         title: "A run under shared steering control".into(),
         summary: format!(
-            "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}). Metrics are taken over {from} to {to} m. {}",
+            "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}): {}. Metrics are taken over {from} to {to} m. {}",
             scenario.course().name(),
             scenario.speed(),
             scenario.driver().t_p,
             scenario.gains().k_d,
             scenario.gains().k_hg,
             scenario.condition(),
+            ended(single),
             notes(&single.results.notes),
         ),
         sections: vec![
@@ -191,6 +209,14 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
 fn events(single: &SingleRun) -> Vec<Event> {
     let end_s = single.run.trace.samples.last().map_or(0.0, |s| s.time_s);
     let mut events = single.reported.clone();
+    events.extend(single.unguided.iter().flat_map(|stretch| {
+        let event = |time_s, what| Event { time_s, what };
+        let left = event(stretch.from_s, format!("The guidance leaves: {}", stretch.why));
+        let back = stretch
+            .until_s
+            .map(|back_s| event(back_s, "The guidance is back".into()));
+        std::iter::once(left).chain(back)
+    }));
     if let Some(time_s) = single.scenario.failure().at_s().filter(|t| *t <= end_s) {
         let what = match single.scenario.failure().kind {
             FailureKind::Input => "The lane preview stops",

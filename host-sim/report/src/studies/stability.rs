@@ -6,6 +6,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
+use haptic_batch::left_by_themselves;
 use haptic_batch::stability::{DELAYS_S, Drive, Place, SHARES, SPEEDS_KMH, Shares};
 use haptic_sim::scenario::Condition;
 use serde::Serialize;
@@ -80,13 +81,31 @@ pub fn judgement(map: &Map) -> String {
             })
         })
         .collect();
-    if broken.is_empty() {
-        return "Wherever the manual driver is stable, every guided one is.".into();
+    let mut text = if broken.is_empty() {
+        "Wherever the manual driver is stable, every guided one is.".into()
+    } else {
+        format!(
+            "Unstable with guidance where the manual driver is stable: {}.",
+            broken.join("; ")
+        )
+    };
+    let guided = map.places.iter().flat_map(|place| {
+        let guided = place
+            .drives
+            .iter()
+            .filter(|drive| drive.condition != Condition::Manual);
+        guided.map(move |drive| {
+            let name = format!(
+                "{} km/h, t_p {} s, {}",
+                place.speed_kmh, place.t_p, drive.condition
+            );
+            (&drive.away, name)
+        })
+    });
+    if let Some(left) = left_by_themselves(guided) {
+        text.push_str(&format!(" The peaks are not all of guided driving: {left}."));
     }
-    format!(
-        "Unstable with guidance where the manual driver is stable: {}.",
-        broken.join("; ")
-    )
+    text
 }
 
 /// Every place of the map.

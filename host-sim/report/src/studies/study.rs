@@ -5,6 +5,7 @@ use std::path::Path;
 use super::OutputError;
 use crate::document::{Cell, Provenance, Stamped, Table, write_file, write_json};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use haptic_batch::Away;
 use haptic_batch::study::{Recorded, Session, SessionResult, StudyResults, Who};
 
 /// Writes the table of sessions (CSV) and the results (JSON).
@@ -14,10 +15,10 @@ use haptic_batch::study::{Recorded, Session, SessionResult, StudyResults, Who};
 pub fn write(results: &StudyResults, directory: &Path) -> Result<(), OutputError> {
     write_file(&directory.join("sessions.csv"), |file| {
         let metrics: Vec<&str> = DEFINITIONS.iter().map(|d| d.name).collect();
-        let metrics = metrics.join(",");
+        let (away, metrics) = (Away::NAMES.join(","), metrics.join(","));
         writeln!(
             file,
-            "participant,position,condition,who,seed,source,version,diverged,end_m,{metrics}"
+            "participant,position,condition,who,seed,source,version,diverged,end_m,{away},{metrics}"
         )?;
         for session in &results.sessions {
             let Some(recorded) = &session.recorded else {
@@ -49,6 +50,7 @@ fn row(session: &SessionResult, recorded: &Recorded) -> String {
         record.diverged.to_string(),
         record.end_m.to_string(),
     ];
+    fields.extend(record.away.texts());
     let metric = |d: &Definition| (d.value)(&record.metrics).map_or(String::new(), |value| value.to_string());
     fields.extend(DEFINITIONS.iter().map(metric));
     fields.join(",")
@@ -98,11 +100,14 @@ pub fn sessions(results: &StudyResults) -> Table {
                 .and_then(|(r, d)| (d.value)(&r.record.metrics));
             Cell::Number { value, decimals: 3 }
         };
+        let left = recorded.map(|r| r.record.away).filter(Away::is_by_itself);
         let state = match (recorded, session.who) {
-            (Some(recorded), _) if recorded.record.diverged => "left the road",
-            (Some(_), _) => "recorded",
-            (None, Who::Person) => "waits for a person",
-            (None, Who::Simulated) => "not driven",
+            (Some(recorded), _) if recorded.record.diverged => "left the road".into(),
+            (Some(_), _) => left
+                .and_then(|away| away.when_and_why())
+                .map_or("recorded".into(), |left| format!("guidance ended {left}")),
+            (None, Who::Person) => "waits for a person".into(),
+            (None, Who::Simulated) => "not driven".to_owned(),
         };
         vec![
             text(&session.participant),
@@ -129,7 +134,8 @@ pub fn sessions(results: &StudyResults) -> Table {
     }
 }
 
-/// Each metric by condition: mean and standard deviation over the sessions that did not leave the road.
+/// Each metric by condition: mean and standard deviation over the sessions that did not leave the road, guided throughout
+/// or not; the study's notes say which were not.
 pub fn by_condition(results: &StudyResults) -> Table {
     let mut columns = vec!["Metric".to_owned(), "Unit".to_owned()];
     for condition in &results.conditions {

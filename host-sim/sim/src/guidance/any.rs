@@ -2,7 +2,7 @@
 
 use haptic_core::bus::Frame;
 
-use super::{Actuation, Direct, Guidance, NoGuidance, Observation, OverBus};
+use super::{Actuation, Direct, Guidance, NoGuidance, Observation, OverBus, Status};
 use crate::scenario::{Condition, Scenario, Sensors};
 
 /// The guidance that a scenario names.
@@ -42,6 +42,14 @@ impl Guidance for AnyGuidance {
             Self::None(guidance) => guidance.step(observation),
             Self::Direct(guidance) => guidance.step(observation),
             Self::OverBus(guidance) => guidance.step(observation),
+        }
+    }
+
+    fn status(&self) -> Option<Status> {
+        match self {
+            Self::None(guidance) => guidance.status(),
+            Self::Direct(guidance) => guidance.status(),
+            Self::OverBus(guidance) => guidance.status(),
         }
     }
 

@@ -7,13 +7,14 @@ use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
-use super::{Actuation, Guidance, Observation, is_limited};
+use super::{Actuation, Guidance, Observation, Status, is_limited};
 
 /// The shipping controller, fed directly and active from the start.
 #[derive(Debug, Clone)]
 pub struct Direct {
     controller: Controller,
     state: ControllerState,
+    status: Status,
 }
 
 impl Direct {
@@ -22,6 +23,7 @@ impl Direct {
         Self {
             controller: Controller::new(setup.config),
             state: ControllerState::engaged(Instant::from_us(0)),
+            status: Status::GUIDES,
         }
     }
 }
@@ -60,9 +62,18 @@ impl Guidance for Direct {
         };
         let applied = Torque::from_nm(observation.motor_torque_nm);
         let command = self.controller.step(&mut self.state, now, applied, &inputs);
+        self.status = Status {
+            mode: command.mode,
+            faults: command.faults,
+            warning: command.warning,
+            k_hg: None,
+        };
         Actuation {
             torque_nm: command.torque.nm(),
             limited: is_limited(command.limit),
         }
+    }
+    fn status(&self) -> Option<Status> {
+        Some(self.status)
     }
 }

@@ -16,6 +16,8 @@ mod over_bus;
 
 use haptic_core::bus::Frame;
 use haptic_core::envelope::LimitReason;
+use haptic_core::faults::FaultSet;
+use haptic_core::modes::Mode;
 use haptic_core::quantity::Instant;
 
 use crate::action::Request;
@@ -73,6 +75,29 @@ pub struct Actuation {
     pub limited: bool,
 }
 
+/// What an ECU says of itself, as its bus carries it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Status {
+    /// Its mode.
+    pub mode: Mode,
+    /// The faults that are there.
+    pub faults: FaultSet,
+    /// The driver has to take over.
+    pub warning: bool,
+    /// K_hg and its standard deviation in the last telemetry, once identified; never past the bus.
+    pub k_hg: Option<[f64; 2]>,
+}
+
+impl Status {
+    /// It guides, and nothing is wrong.
+    pub const GUIDES: Self = Self {
+        mode: Mode::Active,
+        faults: FaultSet::NONE,
+        warning: false,
+        k_hg: None,
+    };
+}
+
 /// A mode that allows less torque than the law asks for is no limit: a fade or a handover is what was asked.
 fn is_limited(reason: LimitReason) -> bool {
     !matches!(reason, LimitReason::None | LimitReason::Mode)
@@ -85,6 +110,11 @@ pub trait Guidance {
 
     /// One step of 1 ms.
     fn step(&mut self, observation: &Observation) -> Actuation;
+
+    /// What it said of itself in the last step: a law without modes always guides. `None` where nobody guides.
+    fn status(&self) -> Option<Status> {
+        Some(Status::GUIDES)
+    }
 
     /// The frames that went to the ECU in the last step, in order of sending.
     fn frames_in(&self) -> &[Frame] {
@@ -108,5 +138,9 @@ impl Guidance for NoGuidance {
 
     fn step(&mut self, _view: &Observation) -> Actuation {
         Actuation::default()
+    }
+
+    fn status(&self) -> Option<Status> {
+        None
     }
 }

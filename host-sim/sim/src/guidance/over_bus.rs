@@ -1,5 +1,5 @@
 //! The shipping ECU behind its bus: sensors with the paper's resolution, frames with counter and CRC, and the
-//! torque as the actuator reads it from the guidance frame.
+//! torque as the actuator reads it from the guidance frame. What the ECU says of itself is read there too, and in telemetry.
 //!
 //! The bus has no latency here: a frame arrives in the step in which it was sent, and the torque acts from
 //! that step on. The actuator keeps the last good torque, as the ECU's own frame never fails on this bus.
@@ -7,14 +7,14 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
-    Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Vehicle,
+    Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Telemetry, Vehicle,
 };
 use haptic_core::config::Setup;
 use haptic_core::ecu::Ecu;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use heapless::Vec;
 
-use super::{Actuation, Guidance, Observation, is_limited};
+use super::{Actuation, Guidance, Observation, Status, is_limited};
 use crate::models::sensors;
 
 /// The column's sensors send every 2 ms.
@@ -36,6 +36,8 @@ pub struct OverBus {
     answers: Vec<Frame, MAX_ANSWERS>,
     actuator: ReceiverState,
     applied: Actuation,
+    display: ReceiverState,
+    status: Status,
 }
 
 impl OverBus {
@@ -48,6 +50,8 @@ impl OverBus {
             answers: Vec::new(),
             actuator: ReceiverState::TRUSTED,
             applied: Actuation::default(),
+            display: ReceiverState::TRUSTED,
+            status: Status::GUIDES,
         }
     }
 
@@ -110,14 +114,30 @@ impl Guidance for OverBus {
         // MAX_ANSWERS has a place for each.
         let _ = self.answers.push(step.guidance);
         let _ = self.answers.extend_from_slice(&step.others);
-        self.answers.extend(self.ecu.background_step());
+        let telemetry = self.ecu.background_step();
+        self.answers.extend(telemetry);
         if let Ok(guidance) = GuidanceMessage::decode(&mut self.actuator, &step.guidance) {
             self.applied = Actuation {
                 torque_nm: guidance.torque.nm(),
                 limited: is_limited(guidance.limit),
             };
+            self.status = Status {
+                mode: guidance.mode,
+                faults: guidance.faults,
+                warning: guidance.warning,
+                ..self.status
+            };
+        }
+        if let Some(Ok(said)) = telemetry.map(|frame| Telemetry::decode(&mut self.display, &frame)) {
+            self.status.k_hg = said
+                .k_hg
+                .map(|reading| [reading.k_hg.si(), reading.deviation.si()]);
         }
         self.applied
+    }
+
+    fn status(&self) -> Option<Status> {
+        Some(self.status)
     }
 
     fn frames_in(&self) -> &[Frame] {

@@ -21,6 +21,7 @@ use crate::models::{STEP_S, STEPS_PER_SECOND};
 use crate::preview::wrapped;
 use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
 use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Simulation, step_of};
+use crate::unguided::Cause;
 
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
 /// then has the others' rhythm.
@@ -49,6 +50,8 @@ struct Slot {
     plan: Option<Plan>,
     remnant: Option<Remnant>,
     run: Run,
+    /// Why the guidance is away, as a sample has it: it leaves only where the scenario lets something fail.
+    unguided_cause: f64,
     /// Whether the run came to its end without suspicion.
     is_whole: bool,
     /// The next step in which something is planned.
@@ -104,6 +107,7 @@ impl<const N: usize> Lanes<N> {
                     ending: Ending::CourseEnd,
                     steps: 0,
                 },
+                unguided_cause: 0.0,
                 is_whole: false,
                 event: u32::MAX,
                 timeout: u32::MAX,
@@ -130,6 +134,7 @@ impl<const N: usize> Lanes<N> {
         let samples = scenario.duration_s() * f64::from(SAMPLE_RATE_HZ);
         slot.run.trace.samples.reserve(samples as usize + 2);
         slot.scenario = Some(number);
+        slot.unguided_cause = 0.0;
         slot.is_whole = false;
         slot.timeout = u32::MAX;
         if failure.kind == FailureKind::Input {
@@ -156,12 +161,14 @@ impl<const N: usize> Lanes<N> {
         self.worlds.set_transition(lane, plan.transition(step, failed_at));
         if faults.torque_lost {
             self.ecus.lose_torque(lane);
+            slot.unguided_cause = Cause::TorqueLost.code();
         }
         if faults.lane_lost {
             self.ecus.hears[lane] = 0;
         }
         if step == slot.timeout {
             self.ecus.hand_over(lane, step);
+            slot.unguided_cause = Cause::LaneLost.code();
         }
         let noticed = plan.failure_step.saturating_add(step_of(FAILURE_REACTION_S));
         let changed = plan.changed.as_ref().map_or(u32::MAX, |(at, _)| *at);
@@ -360,6 +367,7 @@ impl<const N: usize> Lanes<N> {
                 driver_torque_nm: driver_nm[l],
                 guidance_torque_nm: torque_nm[l],
                 guidance_limited: self.ecus.is_limited(l),
+                unguided_cause: slot.unguided_cause,
             });
         }
     }

@@ -11,6 +11,7 @@ use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitions_table, write_json};
 use figures::{caption, distribution, influence, response};
 use haptic_analysis::metrics::Definition;
+use haptic_batch::Away;
 use haptic_batch::sweep::{Driven, Point, Summary, Sweep};
 
 pub use tables::{short_tables, tables};
@@ -91,6 +92,17 @@ pub fn headline(summary: &Summary) -> String {
             summary.judge
         ));
     }
+    if summary.left_by_itself > 0 {
+        let why = summary
+            .left_why
+            .iter()
+            .map(|(why, count)| format!("{why} {count}"));
+        text.push_str(&format!(
+            " In {} the ECU ended guidance by itself ({}): what is said here of all drives holds these too.",
+            summary.left_by_itself,
+            why.collect::<Vec<_>>().join(", ")
+        ));
+    }
     text
 }
 
@@ -143,5 +155,9 @@ pub fn drive_table(sweep: &Sweep, point: &Point, driven: &Driven) -> Table {
         ("end_m".into(), driven.end_m.to_string()),
     ];
     let metrics = sweep.metrics().iter().zip(&driven.metrics).map(metric);
-    Table::of_pairs(["Field", "Value"], own.into_iter().chain(varied).chain(metrics))
+    let away = driven.away.texts();
+    let away = away.map(|text| if text.is_empty() { "-".into() } else { text });
+    let away = Away::NAMES.map(String::from).into_iter().zip(away);
+    let all = own.into_iter().chain(away).chain(varied).chain(metrics);
+    Table::of_pairs(["Field", "Value"], all)
 }

@@ -215,8 +215,10 @@ fn worst(sweep: &Sweep, summary: &Summary, file: &str) -> Table {
             value: drive.value,
             decimals: decimals(summary.judge),
         });
+        let ended = if drive.diverged { "diverged" } else { "at its end" };
+        let left = drive.away.when_and_why().filter(|_| drive.away.is_by_itself());
         cells.push(Cell::Text(
-            if drive.diverged { "diverged" } else { "at its end" }.into(),
+            left.map_or(ended.into(), |left| format!("{ended}; guidance ended {left}")),
         ));
         cells.push(Cell::Text(format!(
             "host-sim sweep {file} --replay {}",

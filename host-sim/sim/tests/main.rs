@@ -1,0 +1,4 @@
+//! The closed loop through its public interface.
+
+mod changing_speed;
+mod unguided;
