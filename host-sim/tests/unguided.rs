@@ -212,7 +212,7 @@ fn a_sweep_has_columns_for_it_and_counts() {
             here,
             &["sweep", "sweep.toml", "--out", "s", "--replay", drive],
         ));
-        assert_eq!(replayed.contains(away[1]), true);
+        assert!(replayed.contains(away[1]), "{replayed}");
         let told = replayed
             .lines()
             .find(|line| line.starts_with("guidance_left_s"))

@@ -282,19 +282,13 @@ impl Model for Controller {
         let command = self.ecu.step(now).command;
         let _ = self.ecu.background_step();
         self.mode = command.mode;
-        let status = Status {
-            mode: command.mode,
-            faults: command.faults,
-            warning: command.warning,
-            k_hg: None,
-        };
         let around = Circumstances {
             request_ended: engage == 0.0,
             speed_m_per_s: speed,
             least_speed_m_per_s: values[LEAST_SPEED],
             ..Circumstances::default()
         };
-        self.watch.step(&status, around);
+        self.watch.step(&status_of(&command), around);
         let cause = self.watch.cause();
         self.unguided += u64::from(cause.is_some());
         values[TORQUE..OWN].copy_from_slice(&[
@@ -312,5 +306,15 @@ impl Model for Controller {
 
     fn copy(&self) -> Box<dyn Model> {
         Box::new(self.clone())
+    }
+}
+
+/// A command as the watch over guidance reads it.
+fn status_of(command: &haptic_core::controller::Command) -> Status {
+    Status {
+        mode: command.mode,
+        faults: command.faults,
+        warning: command.warning,
+        k_hg: None,
     }
 }

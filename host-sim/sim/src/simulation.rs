@@ -275,39 +275,16 @@ impl<G: Guidance> Simulation<G> {
         let decided = self.guidance.step(&seen);
         let status = self.guidance.status();
         if let Some(status) = &status {
-            let around = Circumstances {
-                lost: faults,
-                request_ended: action.engage == Some(false),
-                speed_m_per_s: seen.speed_m_per_s,
-                least_speed_m_per_s: self.request.least_m_per_s,
-            };
-            self.watch.step(status, around);
+            self.watch
+                .step(status, self.circumstances(action, faults, seen.speed_m_per_s));
         }
         let applied = if faults.torque_lost {
             Actuation::default()
         } else {
             decided
         };
-        let mut sample = None;
-        if let Some(camera) = lane.filter(|_| is_sample) {
-            let [x, y] = self.plant.position_m();
-            match self.road.project(x, y, &mut self.body) {
-                Some(projection) if projection.offset_m.abs() <= DIVERGED_M => {
-                    self.last_s_m = projection.s_m;
-                    self.place_m = projection.s_m;
-                    self.lateral_error_m = Some(projection.offset_m);
-                    sample = Some(record(
-                        &self.plant,
-                        &projection,
-                        &observation,
-                        [preview, camera],
-                        applied,
-                        self.watch.cause(),
-                    ));
-                }
-                _ => self.ending = Some(Ending::Diverged { s_m: self.last_s_m }),
-            }
-        }
+        let camera = lane.filter(|_| is_sample);
+        let sample = camera.and_then(|camera| self.sample(&observation, [preview, camera], applied));
         if self.ending.is_none() {
             self.move_on(preview, applied.torque_nm, remnant_nm, action.takes_over);
         }
@@ -322,6 +299,48 @@ impl<G: Guidance> Simulation<G> {
             frames_in: self.guidance.frames_in(),
             frames_out: self.guidance.frames_out(),
         })
+    }
+
+    /// What an end of guidance is judged by.
+    #[inline]
+    fn circumstances(&self, action: &Action, lost: WorldFaults, speed_m_per_s: f64) -> Circumstances {
+        Circumstances {
+            lost,
+            request_ended: action.engage == Some(false),
+            speed_m_per_s,
+            least_speed_m_per_s: self.request.least_m_per_s,
+        }
+    }
+
+    /// A sample for the record; none, and the end of the run, where the vehicle has left the road.
+    #[inline]
+    fn sample(
+        &mut self,
+        observation: &Observation,
+        seen: [LaneErrors; 2],
+        applied: Actuation,
+    ) -> Option<Sample> {
+        let [x, y] = self.plant.position_m();
+        match self.road.project(x, y, &mut self.body) {
+            Some(projection) if projection.offset_m.abs() <= DIVERGED_M => {
+                self.last_s_m = projection.s_m;
+                self.place_m = projection.s_m;
+                self.lateral_error_m = Some(projection.offset_m);
+                let cause = self.watch.cause();
+                Some(record(
+                    &self.plant,
+                    &projection,
+                    observation,
+                    seen,
+                    applied,
+                    cause,
+                ))
+            }
+            _ => {
+                self.ending = Some(Ending::Diverged { s_m: self.last_s_m });
+                None
+            }
+        }
     }
 
     /// Lets the plant move for 1 ms.

@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_chunk_reads_back_and_a_spoiled_one_does_not() {
-        let row = |end_m, value| Driven {
+        let row = |end_m, value: Option<f64>| Driven {
             diverged: end_m > 5.0,
             end_m,
             away: Away {
