@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy as np
 
 from . import _native
-from ._errors import InputError, check_range
+from ._errors import InputError, check_range, unknown
 from ._native import Scenario
 from ._progress import Progress, telling
 
@@ -49,6 +49,8 @@ class Run:
     bus: Optional[dict[str, np.ndarray]] = field(default=None, repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.columns:
+            raise unknown("columns of the run", name, self.columns)
         return self.columns[name]
 
     def __len__(self) -> int:
