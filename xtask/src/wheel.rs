@@ -44,8 +44,9 @@ const NOT_IN_A_WHEEL: [&str; 10] = [
 const LARGEST_MB: f64 = 5.0;
 const MATURIN: &str = "maturin>=1.9,<2";
 /// The tests, and the packages that the examples and the tests' peers need.
-const TEST_PACKAGES: [&str; 11] = [
+const TEST_PACKAGES: [&str; 12] = [
     "pytest",
+    "mypy",
     "pandas",
     "pyarrow",
     "matplotlib",
