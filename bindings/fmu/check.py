@@ -1,11 +1,14 @@
 """The FMUs, checked by FMPy, those of FMI 2.0 and of FMI 3.0: their descriptions are valid; the controller gives the torques
-of the library for the same samples, bit for bit; a state can be taken and given back; what is refused leaves everything as it
-was; controller, driver and vehicle coupled drive as `host-sim run` does.
+of the library for the same samples, bit for bit; a state can be taken, written, read by another unit and given back; what is
+refused leaves everything as it was; controller, driver and vehicle coupled drive as `host-sim run` does, on any road.
 
     check.py DIRECTORY RUN_CSV
 """
 
+import contextlib
 import csv
+import io
+import shutil
 import sys
 from pathlib import Path
 
@@ -27,20 +30,22 @@ WITHIN_M = 1e-3
 class Unit:
     """One FMU of either standard, by names."""
 
-    def __init__(self, path, **parameters):
+    def __init__(self, path, resource=None, **parameters):
         description = read_model_description(path)
+        self.variables = description.modelVariables
         self.references = {v.name: v.valueReference for v in description.modelVariables}
         self.new = description.fmiVersion.startswith("3")
         arguments = dict(
             guid=description.guid,
-            unzipDirectory=extract(path),
+            unzipDirectory=unpacked(path, resource),
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=description.modelName,
         )
         self.fmu = (FMU3Slave if self.new else FMU2Slave)(**arguments)
         self.fmu.instantiate()
         for name, value in parameters.items():
-            (self.turn if isinstance(value, bool) else self.put)(**{name: value})
+            how = {bool: self.turn, str: self.say}.get(type(value), self.put)
+            how(**{name: value})
         if not self.new:
             self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
@@ -60,6 +65,20 @@ class Unit:
     def turn(self, **values):
         self.fmu.setBoolean([self.references[name] for name in values], list(values.values()))
 
+    def say(self, **values):
+        self.fmu.setString([self.references[name] for name in values], list(values.values()))
+
+    def text(self, name):
+        (text,) = self.fmu.getString([self.references[name]])
+        return text if self.new else text.decode()
+
+    def outputs(self):
+        """Every output, whatever its type."""
+        of = lambda types: [v.name for v in self.variables if v.causality == "output" and v.type in types]
+        codes = [self.code(name) for name in of(("Integer", "Int32"))]
+        flags = [self.fmu.getBoolean([self.references[name]])[0] for name in of(("Boolean",))]
+        return self.get(*of(("Real", "Float64"))) + codes + flags
+
     def step(self, k, step_s=1e-3):
         self.fmu.doStep(k * 1e-3, step_s)
 
@@ -75,12 +94,24 @@ class Unit:
         self.fmu.freeInstance()
 
 
+def unpacked(path, resource):
+    """The folder of a unit, with a file of somebody's own in its resources."""
+    folder = Path(extract(path))
+    if resource is not None:
+        (folder / "resources").mkdir()
+        shutil.copy(resource, folder / "resources")
+    return str(folder)
+
+
 def refused(call):
+    """Why a unit refuses, by its log; nothing if it does not."""
+    log = io.StringIO()
     try:
-        call()
-    except Exception as error:
-        return True
-    return False
+        with contextlib.redirect_stdout(log):
+            call()
+    except Exception:
+        return log.getvalue().strip() or "no reason"
+    return ""
 
 
 def samples():
@@ -157,10 +188,132 @@ def tuned(path):
     return len(tunable)
 
 
-def coupled(directory, ending, until_s):
+def bounds(path):
+    """Every input has a range; beyond it, and for no number, the unit says name, value and range, and stays as it was."""
+    unit, checked = Unit(path), 0
+    for variable in unit.variables:
+        if variable.causality != "input" or variable.type not in ("Real", "Float64"):
+            continue
+        name, low, high = variable.name, float(variable.min), float(variable.max)
+        before = unit.get(name)
+        for value in (low - 1e-3 * (high - low), high + 1e-3 * (high - low), 1e30, float("inf"), float("nan")):
+            why = refused(lambda: unit.put(**{name: value}))
+            assert f"{name} = " in why and ("is outside" in why or "no finite" in why), (name, why)
+            assert unit.get(name) == before
+        for value in (low, high, before[0]):
+            unit.put(**{name: value})
+        checked += 1
+    unit.end()
+    return checked
+
+
+def default_driver(path):
+    """A unit that nobody told anything is the driver of a scenario that says nothing."""
+    unit, scenario = Unit(path), hg.Scenario()
+    assert unit.get("k_d_nm_per_rad", "k_hg", "t_p_s") == [scenario.k_d, scenario.k_hg, scenario.t_p_s]
+    unit.end()
+
+
+def written(path, other):
+    """A state that is written and read by a unit of its own goes on as the original, bit for bit; other bytes are refused."""
+    inputs = [v for v in read_model_description(path).modelVariables if v.causality == "input"]
+
+    def drive(unit, steps):
+        told = []
+        for k in steps:
+            if k == 700 and "k_1" in unit.references:
+                # In Standby, twice the same: the ECU begins anew each time.
+                unit.put(k_1=0.2, torque_limit_nm=2.0)
+            if k % 3 == 0:
+                for i, v in enumerate(inputs):
+                    if v.type == "Boolean":
+                        unit.turn(**{v.name: k >= 1500})
+                    elif v.name == "speed_m_per_s":
+                        unit.put(**{v.name: 16.5})
+                    else:
+                        unit.put(**{v.name: 0.004 * np.sin(0.002 * k + i) if v.name != "authority" else 0.9})
+            unit.step(k)
+            told.append(unit.outputs())
+        return told
+
+    def of(unit, state):
+        return unit.fmu.serializeFMUState(state)
+
+    unit = Unit(path)
+    drive(unit, range(2500))
+    # Set and not yet stepped through.
+    unit.put(**{inputs[0].name: 0.001})
+    state = unit.state()
+    kept = of(unit, state)
+    again = Unit(path)
+    assert not refused(lambda: again.go_to(again.fmu.deserializeFMUState(kept)))
+    assert again.get(inputs[0].name) == [0.001] and again.outputs() == unit.outputs()
+    mine = again.state()
+    assert of(again, mine) == kept, "it can be written again"
+    again.fmu.freeFMUState(mine)
+    expected, got = drive(unit, range(2500, 4000)), drive(again, range(2500, 4000))
+    assert expected == got and np.ptp(np.array(expected), axis=0).max() > 0
+    # Before the start there is a state too.
+    fresh = Unit(path)
+    fresh.fmu.reset()
+    young = fresh.state()
+    fresh.go_to(fresh.fmu.deserializeFMUState(of(fresh, young)))
+    fresh.fmu.freeFMUState(young)
+    assert "before the end of the initialization" in refused(lambda: fresh.step(0))
+    # Nothing but what such a unit wrote; the unit stays as it was.
+    before = again.outputs()
+    assert "no state" in refused(lambda: Unit(other).fmu.deserializeFMUState(kept))
+    for wrong in (b"", kept[:50], kept[:-1], kept[: len(kept) // 2], kept + b"\0"):
+        assert refused(lambda: again.fmu.deserializeFMUState(wrong))
+    for place in range(0, len(kept), max(1, len(kept) // 200)):
+        bytes_ = bytearray(kept)
+        bytes_[place] ^= 0x41
+        # Refused or not: another state, no crash.
+        refused(lambda: again.fmu.deserializeFMUState(bytes(bytes_)))
+    assert again.outputs() == before
+    for each in (unit, again, fresh):
+        each.end()
+    return len(kept)
+
+
+def too_long(path):
+    """After ten hours a state can be taken, and no longer written: what would be written has to be driven again."""
+    unit = Unit(path)
+    for hour in range(11):
+        unit.step(3600_000 * hour, 3600.0)
+    state = unit.state()
+    assert "so long a drive" in refused(lambda: unit.fmu.serializeFMUState(state))
+    unit.go_to(state)
+    unit.end()
+
+
+def roads(directory, ending):
+    """The vehicle drives on a road of the user's: a path, a file in the unit's resources, OpenDRIVE."""
+    path = directory / f"HapticVehicle.{ending}"
+    hill = Path("examples/hill-road.toml").resolve()
+    unit = Unit(path)
+    assert unit.text("course") == "paper-course"
+    assert "course cannot be set now" in refused(lambda: unit.say(course=str(hill)))
+    unit.end()
+    errors = []
+    for place in (dict(course=str(hill)), dict(course=hill.name, resource=hill)):
+        errors.append(coupled(directory, ending, 60.0, **place))
+    assert np.array_equal(*errors)
+    run = hg.simulate(hg.Scenario(course=hill, driver={"t_p": 0.3}))
+    rows = len(errors[0])
+    apart = np.abs(errors[0] - run["lateral_error_m"][:rows]).max()
+    assert apart < WITHIN_M < 0.1 * np.abs(run["lateral_error_m"][:rows]).max(), apart
+    Unit(path, course=str(Path("tests/data/xodr/chain.xodr").resolve())).end()
+    for wrong in ("no-such.toml", "/no/such.xodr", str(Path("core/haptic.dbc").resolve())):
+        why = refused(lambda: Unit(path, course=wrong))
+        assert "course = " in why and Path(wrong).name in why, why
+    return apart
+
+
+def coupled(directory, ending, until_s, **road):
     """Lateral errors every 5 ms of the three, each step under what the others had at its start."""
     path = lambda model: directory / f"{model}.{ending}"
-    vehicle = Unit(path("HapticVehicle"))
+    vehicle = Unit(path("HapticVehicle"), **road)
     driver = Unit(path("HapticDriver"), **DRIVER)
     guidance = Unit(path("HapticController"), engaged_at_start=True)
     guidance.turn(engage=True)
@@ -182,8 +335,10 @@ def coupled(directory, ending, until_s):
         vehicle.put(driver_torque_nm=driver.get("driver_torque_nm")[0], guidance_torque_nm=torque)
         for unit in (guidance, driver, vehicle):
             unit.step(k)
-        if k == 2000:
+        if k == 2000 and not road:
             half = [(unit, unit.state(), unit.get("time")[0] if unit.new else None) for unit in (vehicle, driver, guidance)]
+    if half is None:
+        return np.array(errors)
     after = [vehicle.get("e_y_m")[0], driver.get("driver_torque_nm")[0]]
     for unit, state, time in half:
         unit.go_to(state)
@@ -202,6 +357,13 @@ def main(directory, run_csv):
             assert not problems, (model, ending, problems)
         differing = controller(directory / f"HapticController.{ending}")
         print(f"{ending}: {tuned(directory / f'HapticController.{ending}')} parameters tunable in Standby, with the library's torques")
+        paths = [directory / f"{model}.{ending}" for model in MODELS]
+        default_driver(paths[1])
+        too_long(paths[1])
+        sizes = [written(path, paths[i - 1]) for i, path in enumerate(paths)]
+        print(f"{ending}: {sum(bounds(path) for path in paths)} inputs have ranges; 2.5 s of states are {', '.join(map(str, sizes))} "
+              "bytes, and other units go on from them with the same bits")
+        print(f"{ending}: roads of one's own: {roads(directory, ending) * 1e3:.3f} mm from the library's drive on hill-road.toml")
         print(f"{ending}: fmpy validate: no problem in {', '.join(MODELS)}; controller: {STEPS} torques, {differing} differ "
               "from the library's; state and refusals hold")
     with open(run_csv) as file:

@@ -147,6 +147,23 @@ fn the_documents_list_every_parameter() {
     );
 }
 
+/// The names in the header for C, of which this prints what they should be.
+#[test]
+fn the_header_for_c_names_every_parameter() {
+    let enumerators: Vec<String> = PARAMETERS
+        .iter()
+        .enumerate()
+        .map(|(number, p)| format!("    HG_{} = {number}", p.name.to_uppercase().replace('.', "_")))
+        .collect();
+    let names = format!("typedef enum hg_parameter {{\n{}\n}}", enumerators.join(",\n"));
+    let count = format!("#define HG_PARAMETERS {}\n", PARAMETERS.len());
+    let header = include_str!("../../bindings/c/include/haptic_guidance.h");
+    assert!(
+        header.contains(&names) && header.contains(&count),
+        "bindings/c/include/haptic_guidance.h should hold\n{count}{names}"
+    );
+}
+
 /// A value in each place of a set comes out of the same place.
 #[test]
 fn values_and_fields_are_in_the_order_of_the_list() {

@@ -36,6 +36,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
     let host = host_library(&dist, built)?;
     let target = target_library(&dist)?;
     header()?;
+    parameters(&dist, &host)?;
     let native = output(&mut command(&example(&dist, "main", &host)?.to_string_lossy()))?;
     print!("{native}");
     let image = image(&dist, &target)?;
@@ -93,13 +94,37 @@ fn header() -> Result<()> {
     Ok(())
 }
 
+/// A program that sets every parameter by the name in the header, and asks the library which one it was.
+fn parameters(dist: &Path, library: &Path) -> Result<()> {
+    let header = root().join("bindings/c/include/haptic_guidance.h");
+    let header = std::fs::read_to_string(&header).with_context(|| header.display().to_string())?;
+    let names = header.split_once("typedef enum hg_parameter {");
+    let (names, _) = names
+        .and_then(|(_, rest)| rest.split_once('}'))
+        .context("the header has no enum hg_parameter")?;
+    let checks = names
+        .lines()
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(name, _)| format!("CHECK({})\n", name.trim()));
+    std::fs::write(dist.join("every_parameter.h"), checks.collect::<String>())?;
+    let program = program(dist, "bindings/c/parameters.c", library)?;
+    print!("{}", output(&mut command(&program.to_string_lossy()))?);
+    Ok(())
+}
+
 /// An example of `examples/c`, for the host.
 pub(crate) fn example(dist: &Path, name: &str, library: &Path) -> Result<PathBuf> {
-    let program = dist.join(name);
+    program(dist, &format!("examples/c/{name}.c"), library)
+}
+
+/// A program of one source, for the host.
+fn program(dist: &Path, source: &str, library: &Path) -> Result<PathBuf> {
+    let program = dist.join(Path::new(source).file_stem().context("a file's name")?);
     run(command("gcc")
-        .args(["-std=c99", "-O2", "-Ibindings/c/include"])
+        .args(["-std=c99", "-O2", "-Ibindings/c/include", "-I"])
+        .arg(dist)
         .args(WARNINGS)
-        .arg(format!("examples/c/{name}.c"))
+        .arg(source)
         .arg(library)
         .args(HOST_LIBRARIES)
         .arg("-o")

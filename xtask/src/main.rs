@@ -91,8 +91,8 @@ enum Command {
     Run(boards::Options),
     /// Compares every frame of a board with this host's controller: QEMU's, or a real one behind a CAN adapter.
     Hil(boards::Hil),
-    /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++, and runs
-    /// its example natively and in QEMU.
+    /// Builds the C library into target/dist/c for the host and a Cortex-M4F, holds its header to C99 and C++ and to the
+    /// library's parameters, and runs its example natively and in QEMU.
     C,
     /// Builds the FMUs of controller, driver and vehicle (FMI 2.0 and 3.0 co-simulation) into target/dist, and has FMPy check
     /// them, alone and coupled.

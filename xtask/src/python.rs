@@ -9,7 +9,7 @@ use crate::tool::{Built, command, root, run};
 use crate::wheel;
 
 /// What the tests of the package, its examples, and the peers of recordings and FMUs need.
-pub(crate) const PACKAGES: [&str; 17] = [
+pub(crate) const PACKAGES: [&str; 18] = [
     "asammdf",
     "cantools",
     "commonroad-vehicle-models",
@@ -19,6 +19,7 @@ pub(crate) const PACKAGES: [&str; 17] = [
     "ipykernel",
     "matplotlib",
     "mcap",
+    "mypy",
     "nbclient",
     "numpy",
     "pandas",

@@ -76,11 +76,14 @@ typedef enum hg_parameter {
     HG_PROBE_FREQUENCY_HZ = 11,
     HG_T_NMS_S = 12,
     HG_K_NMS = 13,
-    HG_VEHICLE_CURVATURE_GAIN_PER_M = 14,
-    HG_VEHICLE_STABILITY_FACTOR_S2_PER_M2 = 15,
-    HG_VEHICLE_ALIGNING_GAIN_NM_S2_PER_M = 16,
-    HG_VEHICLE_COLUMN_DAMPING_NM_S = 17,
-    HG_VEHICLE_FAR_TIME_S = 18
+    HG_LOW_SPEED_SHARE = 14,
+    HG_HIGH_SPEED_SHARE = 15,
+    HG_VEHICLE_CURVATURE_GAIN_PER_M = 16,
+    HG_VEHICLE_STABILITY_FACTOR_S2_PER_M2 = 17,
+    HG_VEHICLE_ALIGNING_GAIN_NM_S2_PER_M = 18,
+    HG_VEHICLE_COLUMN_DAMPING_NM_S = 19,
+    HG_VEHICLE_FAR_TIME_S = 20,
+    HG_VEHICLE_NEAR_TIME_S = 21
 } hg_parameter;
 
 /* A classic CAN data frame. */
@@ -106,6 +109,9 @@ typedef struct hg_step {
 /* What an ECU takes on this target, at most HG_ECU_SIZE and HG_ECU_ALIGN. */
 size_t hg_ecu_size(void);
 size_t hg_ecu_align(void);
+
+/* The name of a parameter as docs/parameters.md has it, a string of the library's; null if there is no such number. */
+const char *hg_parameter_name(uint32_t number);
 
 /* Fills HG_PARAMETERS values with the defaults. */
 int32_t hg_parameters_default(double *values);

@@ -172,6 +172,33 @@ pub extern "C" fn hg_ecu_align() -> usize {
     align_of::<Place>()
 }
 
+/// Longer than any name.
+const NAME_SIZE: usize = 48;
+
+/// The names as C has them: zeros follow.
+static NAMES: [[u8; NAME_SIZE]; PARAMETER_COUNT] = {
+    let mut names = [[0; NAME_SIZE]; PARAMETER_COUNT];
+    let mut i = 0;
+    while i < PARAMETER_COUNT {
+        let name = PARAMETERS[i].name.as_bytes();
+        assert!(name.len() < NAME_SIZE, "NAME_SIZE is too small");
+        let mut k = 0;
+        while k < name.len() {
+            names[i][k] = name[k];
+            k += 1;
+        }
+        i += 1;
+    }
+    names
+};
+
+/// The name of a parameter as docs/parameters.md has it, or null.
+#[unsafe(no_mangle)]
+pub extern "C" fn hg_parameter_name(number: u32) -> *const u8 {
+    let name = usize::try_from(number).ok().and_then(|number| NAMES.get(number));
+    name.map_or(core::ptr::null(), |name| name.as_ptr())
+}
+
 /// Fills `HG_PARAMETERS` values with the paper's.
 ///
 /// # Safety

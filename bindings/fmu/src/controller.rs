@@ -10,12 +10,12 @@ use haptic_sim::guidance::Status;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::unguided::{Cause, Circumstances, Watch};
 
-use crate::variable::{About, Kind, Model, Role, Variable, variable};
+use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, variable};
 
 /// The model.
 pub static ABOUT: About = About {
     name: "HapticController",
-    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a02}",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a06}",
     meaning: "The shipping haptic-guidance ECU: SI values in, torque out",
     variables: &VARIABLES,
     make: || Box::new(Controller::default()),
@@ -29,41 +29,46 @@ use Role::{Input, Output, Parameter, Tunable};
 /// Every variable, the controller's own parameters last.
 pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
     let own = [
-        variable(
+        input(
             "e_y_m",
-            Real,
-            Input,
             "m",
+            limits::LATERAL_M,
             "Lateral error at the near point, positive: the target is to the left",
         ),
-        variable("e_theta_rad", Real, Input, "rad", "Yaw error at the far point"),
-        variable(
+        input(
+            "e_theta_rad",
+            "rad",
+            limits::YAW_RAD,
+            "Yaw error at the far point",
+        ),
+        input(
             "driver_torque_nm",
-            Real,
-            Input,
             "N.m",
+            limits::TORQUE_NM,
             "Torque of the driver on the column",
         ),
-        variable(
+        input(
             "wheel_angle_rad",
-            Real,
-            Input,
             "rad",
+            limits::WHEEL_RAD,
             "Angle of the steering wheel",
         ),
-        variable(
+        input(
             "motor_torque_nm",
-            Real,
-            Input,
             "N.m",
+            limits::TORQUE_NM,
             "Torque that the motor delivers",
         ),
-        variable("speed_m_per_s", Real, Input, "m/s", "Speed of the vehicle"),
-        variable(
+        input(
+            "speed_m_per_s",
+            "m/s",
+            limits::SPEED_M_PER_S,
+            "Speed of the vehicle",
+        ),
+        input(
             "yaw_rate_rad_per_s",
-            Real,
-            Input,
             "rad/s",
+            limits::YAW_RATE_RAD_PER_S,
             "Measured yaw rate of the vehicle, positive to the left",
         ),
         variable(
@@ -73,11 +78,10 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
             "",
             "The vehicle measures its yaw rate",
         ),
-        variable(
+        input(
             "authority",
-            Real,
-            Input,
             "",
+            [0.0, 1.0],
             "Share of the guidance torque that is allowed, 0 to 1",
         ),
         variable(
@@ -141,7 +145,6 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
     assert!(matches!(all[TORQUE].name.as_bytes(), b"torque_nm"));
     // Nobody holds the guidance back unless told to.
     all[AUTHORITY].start = 1.0;
-    all[AUTHORITY].range = Some([0.0, 1.0]);
     all
 };
 const AUTHORITY: usize = 8;
@@ -189,7 +192,7 @@ fn setup_of(values: &[f64]) -> Result<Setup, String> {
 }
 
 impl Model for Controller {
-    fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), String> {
         let setup = setup_of(values)?;
         let start = Instant::from_us(0);
         self.ecu = if values[ENGAGED] != 0.0 {

@@ -3,14 +3,14 @@
 use haptic_sim::models::arm::Arm;
 use haptic_sim::models::driver::{ArmGains, DriverParameters, Vision};
 
-use crate::variable::{About, Kind, Model, Role, Variable, parameter, variable};
+use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, parameter, variable};
 use Kind::Real;
-use Role::{Input, Output};
+use Role::Output;
 
 /// The model.
 pub static ABOUT: About = About {
     name: "HapticDriver",
-    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a02}",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a05}",
     meaning: "A driver: two-point vision with an exact delay, and an arm that weighs vision against the guidance",
     variables: &VARIABLES,
     make: || {
@@ -24,33 +24,30 @@ pub static ABOUT: About = About {
 const TORQUE: usize = 4;
 const FIRST: usize = 5;
 
+/// The driver of a scenario that says nothing.
 static VARIABLES: [Variable; 13] = [
-    variable(
+    input(
         "e_y_m",
-        Real,
-        Input,
         "m",
+        limits::LATERAL_M,
         "Lateral error at the driver's near point, positive: the target is to the left",
     ),
-    variable(
+    input(
         "e_theta_rad",
-        Real,
-        Input,
         "rad",
+        limits::YAW_RAD,
         "Yaw error at the driver's far point",
     ),
-    variable(
+    input(
         "wheel_angle_rad",
-        Real,
-        Input,
         "rad",
+        limits::WHEEL_RAD,
         "Angle of the steering wheel",
     ),
-    variable(
+    input(
         "guidance_torque_nm",
-        Real,
-        Input,
         "N.m",
+        limits::TORQUE_NM,
         "Guidance torque on the column",
     ),
     variable(
@@ -75,14 +72,14 @@ static VARIABLES: [Variable; 13] = [
     parameter(
         "k_d_nm_per_rad",
         "N.m/rad",
-        2.0,
+        3.0,
         [0.0, 50.0],
         "Torque per target angle",
     ),
     parameter(
         "k_hg",
         "",
-        0.0,
+        0.5,
         [0.0, 10.0],
         "Share of the guidance torque that the arm works against",
     ),
@@ -95,7 +92,7 @@ struct Driver {
 }
 
 impl Model for Driver {
-    fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), String> {
         let [a_1, a_2, a_3, t_p, t_nms, k_nms, k_d, k_hg, ..] = values[FIRST..] else {
             return Err("variables are missing".into());
         };

@@ -1,27 +1,126 @@
 //! One model under way, whatever the standard: values by reference, steps of whole milliseconds, states, and refusals that
 //! leave everything as it was.
+//!
+//! A state is written as what was given to the unit since its start: whoever reads it drives another unit there, bit for bit.
+
+use std::path::PathBuf;
 
 use crate::MODELS;
-use crate::variable::{About, Kind, Model, Role};
+use crate::history::{Group, History, MOST_STEPS as MOST_STEPS_OF_A_STATE, Reader};
+use crate::variable::{About, Kind, Model, Role, Texts};
 
 /// Longest communication step, ms: an hour.
 const MOST_STEPS: f64 = 3_600_000.0;
 
+/// Begins a state that was written; what follows is its model's token, and the version that wrote it.
+const FORM: &str = "haptic-guidance FMU state 1";
+
 /// Everything that evolves.
 pub(crate) struct State {
     values: Vec<f64>,
+    texts: Texts,
     model: Box<dyn Model>,
     /// Steps so far, 1 ms each: time is a whole number here, whatever a master adds up.
     steps: u64,
-    started: bool,
+    /// The values that it started with, once it has.
+    begun: Option<Vec<f64>>,
+    /// Values of the step before.
+    held: Vec<f64>,
+    history: History,
 }
 
 impl Clone for State {
     fn clone(&self) -> Self {
         Self {
             values: self.values.clone(),
+            texts: self.texts.clone(),
             model: self.model.copy(),
-            ..*self
+            steps: self.steps,
+            begun: self.begun.clone(),
+            held: self.held.clone(),
+            history: self.history.clone(),
+        }
+    }
+}
+
+impl State {
+    fn new(about: &'static About, resources: PathBuf) -> Self {
+        let values: Vec<f64> = about.variables.iter().map(|variable| variable.start).collect();
+        let texts = about.variables.iter().map(|variable| variable.text.into());
+        Self {
+            held: values.clone(),
+            values,
+            texts: Texts {
+                texts: texts.collect(),
+                resources,
+            },
+            model: (about.make)(),
+            steps: 0,
+            begun: None,
+            history: History::default(),
+        }
+    }
+
+    /// The parameters take hold.
+    fn begin(&mut self) -> Result<(), String> {
+        let begun = self.values.clone();
+        self.model.begin(&mut self.values, &self.texts)?;
+        self.held.clone_from(&begun);
+        self.begun = Some(begun);
+        Ok(())
+    }
+
+    /// One step, or none.
+    fn step(&mut self, about: &About) -> Result<(), String> {
+        let before = self.values.clone();
+        if let Err(why) = self.model.step(&mut self.values) {
+            self.values = before;
+            return Err(why);
+        }
+        let differs = |reference: &usize| {
+            about.variables[*reference].role == Role::Input
+                && before[*reference].to_bits() != self.held[*reference].to_bits()
+        };
+        let changed = (0..before.len()).filter(differs);
+        self.history.add(
+            self.steps,
+            changed.map(|reference| (reference, before[reference])),
+        );
+        self.held = before;
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// Takes tunable parameters that were set, which history keeps even if they are the same: the model begins anew.
+    fn tune(&mut self, references: &[usize]) -> Result<(), String> {
+        self.model.tune(&self.values)?;
+        let tuned = references
+            .iter()
+            .map(|&reference| (reference, self.values[reference]));
+        self.history.add(self.steps, tuned);
+        Ok(())
+    }
+
+    /// Drives to where a group of values was given, and gives them.
+    fn take(&mut self, about: &About, group: &Group) -> Result<(), String> {
+        while self.steps < group.step {
+            self.step(about)?;
+        }
+        let mut tuned = Vec::new();
+        for &(reference, value) in &group.values {
+            let variable = about
+                .variables
+                .get(reference)
+                .ok_or("a variable that there is not")?;
+            self.values[reference] = value;
+            if variable.role == Role::Tunable {
+                tuned.push(reference);
+            }
+        }
+        if tuned.is_empty() {
+            Ok(())
+        } else {
+            self.tune(&tuned)
         }
     }
 }
@@ -33,17 +132,49 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
-    /// The model of a token.
-    pub(crate) fn new(token: &str) -> Option<Self> {
+    /// The model of a token, with the folder of its resources.
+    pub(crate) fn new(token: &str, resources: PathBuf) -> Option<Self> {
         let about = *MODELS.iter().find(|about| about.token == token)?;
         Some(Self {
             about,
-            state: start(about),
+            state: State::new(about, resources),
         })
     }
 
     pub(crate) fn reset(&mut self) {
-        self.state = start(self.about);
+        self.state = State::new(self.about, self.state.texts.resources.clone());
+    }
+
+    /// Texts; all of them, or none.
+    pub(crate) fn texts(&self, references: &[u32]) -> Result<Vec<&str>, String> {
+        let text = |&reference: &u32| {
+            let place = self.place(reference, Kind::Text)?;
+            Ok(self.state.texts.texts[place].as_str())
+        };
+        references.iter().map(text).collect()
+    }
+
+    /// Sets texts; all of them, or none.
+    pub(crate) fn set_texts(&mut self, given: Vec<(u32, String)>) -> Result<(), String> {
+        let mut texts = self.state.texts.texts.clone();
+        for (reference, text) in given {
+            let place = self.place(reference, Kind::Text)?;
+            if self.state.begun.is_some() {
+                return Err(format!("{} cannot be set now", self.about.variables[place].name));
+            }
+            texts[place] = text;
+        }
+        self.state.texts.texts = texts;
+        Ok(())
+    }
+
+    /// The place of a variable of a type.
+    fn place(&self, reference: u32, kind: Kind) -> Result<usize, String> {
+        let found = self.about.variables.get(reference as usize);
+        found
+            .filter(|variable| variable.kind == kind)
+            .map(|_| reference as usize)
+            .ok_or_else(|| format!("value reference {reference} is no {kind:?} variable"))
     }
 
     /// Values of one type; the reference behind the last one is the time.
@@ -54,12 +185,10 @@ impl Instance {
         mut put: impl FnMut(usize, f64),
     ) -> Result<(), String> {
         for (i, &reference) in references.iter().enumerate() {
-            match self.about.variables.get(reference as usize) {
-                Some(variable) if variable.kind == kind => put(i, self.state.values[reference as usize]),
-                None if reference as usize == self.about.variables.len() && kind == Kind::Real => {
-                    put(i, self.time_s());
-                }
-                _ => return Err(format!("value reference {reference} is no {kind:?} variable")),
+            if reference as usize == self.about.variables.len() && kind == Kind::Real {
+                put(i, self.time_s());
+            } else {
+                put(i, self.state.values[self.place(reference, kind)?]);
             }
         }
         Ok(())
@@ -73,17 +202,12 @@ impl Instance {
         value: impl Fn(usize) -> f64,
     ) -> Result<(), String> {
         let mut values = self.state.values.clone();
-        let mut tuned = None;
+        let (mut tuned, started) = (Vec::new(), self.state.begun.is_some());
         for (i, &reference) in references.iter().enumerate() {
-            let variable = self
-                .about
-                .variables
-                .get(reference as usize)
-                .filter(|v| v.kind == kind);
-            let variable =
-                variable.ok_or_else(|| format!("value reference {reference} is no {kind:?} variable"))?;
-            let (name, value) = (variable.name, value(i));
-            if variable.role == Role::Output || (variable.role == Role::Parameter && self.state.started) {
+            let place = self.place(reference, kind)?;
+            let (variable, value) = (&self.about.variables[place], value(i));
+            let name = variable.name;
+            if variable.role == Role::Output || (variable.role == Role::Parameter && started) {
                 return Err(format!("{name} cannot be set now"));
             }
             if !value.is_finite() {
@@ -92,31 +216,32 @@ impl Instance {
             if let Some([min, max]) = variable.range
                 && !(min..=max).contains(&value)
             {
+                let unit = variable.unit;
                 return Err(format!(
-                    "{name} = {value} is outside {min} to {max} {}",
-                    variable.unit
+                    "{name} = {value} {unit} is outside {min} to {max} {unit}"
                 ));
             }
-            values[reference as usize] = value;
-            if variable.role == Role::Tunable && self.state.started {
-                tuned = Some(name);
+            values[place] = value;
+            if variable.role == Role::Tunable && started {
+                tuned.push(place);
             }
         }
-        if let Some(name) = tuned {
+        let before = std::mem::replace(&mut self.state.values, values);
+        if let Some(&first) = tuned.first() {
             // A model that refuses stays as it was.
-            let mut model = self.state.model.copy();
-            model.tune(&values).map_err(|why| format!("{name}: {why}"))?;
-            self.state.model = model;
+            let model = self.state.model.copy();
+            if let Err(why) = self.state.tune(&tuned) {
+                (self.state.model, self.state.values) = (model, before);
+                return Err(format!("{}: {why}", self.about.variables[first].name));
+            }
         }
-        self.state.values = values;
         Ok(())
     }
 
     /// The parameters take hold.
     pub(crate) fn begin(&mut self) -> Result<(), String> {
         let mut state = self.state.clone();
-        state.model.begin(&mut state.values)?;
-        state.started = true;
+        state.begin()?;
         self.state = state;
         Ok(())
     }
@@ -129,36 +254,110 @@ impl Instance {
                 "communicationStepSize = {step_s} s is no multiple of 0.001 s"
             ));
         }
-        if !self.state.started {
+        if self.state.begun.is_none() {
             return Err("a step before the end of the initialization".into());
         }
         // The step that could fail is the one to go back from; the controller's never fails.
         let before = (steps > 1.0).then(|| self.state.clone());
         for _ in 0..steps as u32 {
-            let values = self.state.values.clone();
-            if let Err(why) = self.state.model.step(&mut self.state.values) {
-                self.state.values = values;
+            if let Err(why) = self.state.step(self.about) {
                 if let Some(before) = before {
                     self.state = before;
                 }
                 return Err(why);
             }
-            self.state.steps += 1;
         }
         Ok(())
+    }
+
+    /// A state as bytes.
+    pub(crate) fn written(&self, state: &State) -> Result<Vec<u8>, String> {
+        let history = state
+            .history
+            .to_bytes()
+            .ok_or("the state of so long a drive cannot be written; it can be taken and given back")?;
+        let head = format!("{FORM}\n{}\n{}\n", self.about.token, env!("CARGO_PKG_VERSION"));
+        let mut bytes = head.into_bytes();
+        bytes.push(state.begun.is_some().into());
+        bytes.extend(state.steps.to_le_bytes());
+        for value in state
+            .begun
+            .as_ref()
+            .unwrap_or(&state.values)
+            .iter()
+            .chain(&state.values)
+        {
+            bytes.extend(value.to_le_bytes());
+        }
+        for text in &state.texts.texts {
+            bytes.extend((text.len() as u32).to_le_bytes());
+            bytes.extend(text.as_bytes());
+        }
+        bytes.extend(history);
+        Ok(bytes)
+    }
+
+    /// The state that was written as these bytes, by this version, of this model.
+    pub(crate) fn read(&self, bytes: &[u8]) -> Result<State, String> {
+        let head = format!("{FORM}\n{}\n{}\n", self.about.token, env!("CARGO_PKG_VERSION"));
+        let body = bytes
+            .strip_prefix(head.as_bytes())
+            .ok_or("these bytes are no state that this version of this model wrote")?;
+        self.driven(body)
+            .ok_or("the state is cut short, or of another kind")?
+            .map_err(|why| format!("the state cannot be driven to again: {why}"))
+    }
+
+    /// Drives a unit to a state; `None` where there are not the bytes of one.
+    fn driven(&self, body: &[u8]) -> Option<Result<State, String>> {
+        let mut from = Reader(body);
+        let [started] = from.number()?;
+        let steps = u64::from_le_bytes(from.number()?);
+        let count = self.about.variables.len();
+        let (begun, values) = (from.values(count)?, from.values(count)?);
+        let mut state = State::new(self.about, self.state.texts.resources.clone());
+        for text in &mut state.texts.texts {
+            *text = from.text()?;
+        }
+        if steps > MOST_STEPS_OF_A_STATE {
+            return None;
+        }
+        state.values = begun;
+        if started == 0 {
+            return (steps == 0 && from.0.is_empty()).then_some(Ok(state));
+        }
+        if let Err(why) = state.begin() {
+            return Some(Err(why));
+        }
+        let mut at = 0;
+        while !from.0.is_empty() {
+            let group = from.group(at).filter(|group| group.step <= steps)?;
+            at = group.step;
+            if let Err(why) = state.take(self.about, &group) {
+                return Some(Err(why));
+            }
+        }
+        let nothing = Group {
+            step: steps,
+            values: Vec::new(),
+        };
+        if let Err(why) = state.take(self.about, &nothing) {
+            return Some(Err(why));
+        }
+        // What was set and not yet stepped through; what came out has to be what came out then.
+        for (place, variable) in self.about.variables.iter().enumerate() {
+            if variable.role != Role::Output {
+                state.values[place] = values[place];
+            } else if state.values[place].to_bits() != values[place].to_bits() {
+                let [then, now] = [values[place], state.values[place]];
+                return Some(Err(format!("{} is {now}, and was {then}", variable.name)));
+            }
+        }
+        Some(Ok(state))
     }
 
     /// Time that was simulated, s.
     pub(crate) fn time_s(&self) -> f64 {
         self.state.steps as f64 * 1e-3
-    }
-}
-
-fn start(about: &'static About) -> State {
-    State {
-        values: about.variables.iter().map(|variable| variable.start).collect(),
-        model: (about.make)(),
-        steps: 0,
-        started: false,
     }
 }

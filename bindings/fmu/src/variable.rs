@@ -1,5 +1,7 @@
 //! Variables of a model: the one list that both standards' descriptions and every access follow from.
 
+use std::path::PathBuf;
+
 /// What a variable is to FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -22,6 +24,8 @@ pub enum Kind {
     Integer,
     /// 0 or 1.
     Boolean,
+    /// A name or a path.
+    Text,
 }
 
 /// One variable; its value reference is its place in the model's list.
@@ -37,6 +41,8 @@ pub struct Variable {
     pub unit: &'static str,
     /// Value at the start.
     pub start: f64,
+    /// Value of a text at the start.
+    pub text: &'static str,
     /// Least and largest value, if there are such.
     pub range: Option<[f64; 2]>,
     /// What it is.
@@ -58,9 +64,40 @@ pub const fn variable(
         role,
         unit,
         start: 0.0,
+        text: "",
         range: None,
         meaning,
     }
+}
+
+/// An input that starts at zero.
+#[must_use]
+pub const fn input(
+    name: &'static str,
+    unit: &'static str,
+    range: [f64; 2],
+    meaning: &'static str,
+) -> Variable {
+    Variable {
+        range: Some(range),
+        ..variable(name, Kind::Real, Role::Input, unit, meaning)
+    }
+}
+
+/// What inputs can be at all. A bus saturates before that; what is beyond is a mistake of whoever couples the units.
+pub mod limits {
+    /// A lateral error, m.
+    pub const LATERAL_M: [f64; 2] = [-100.0, 100.0];
+    /// A yaw error, rad: half a turn.
+    pub const YAW_RAD: [f64; 2] = [-3.2, 3.2];
+    /// An angle of the steering wheel, rad: three turns.
+    pub const WHEEL_RAD: [f64; 2] = [-20.0, 20.0];
+    /// A torque on the column, N.m.
+    pub const TORQUE_NM: [f64; 2] = [-100.0, 100.0];
+    /// A speed, m/s.
+    pub const SPEED_M_PER_S: [f64; 2] = [0.0, 100.0];
+    /// A yaw rate, rad/s.
+    pub const YAW_RATE_RAD_PER_S: [f64; 2] = [-10.0, 10.0];
 }
 
 /// A parameter with its start and range.
@@ -93,13 +130,22 @@ pub struct About {
     pub make: fn() -> Box<dyn Model>,
 }
 
+/// The texts that were set.
+#[derive(Debug, Clone)]
+pub struct Texts {
+    /// One for each of [`About::variables`], empty if that is none.
+    pub texts: Vec<String>,
+    /// The folder `resources` of the unpacked unit.
+    pub resources: PathBuf,
+}
+
 /// A model under way, moved in steps of 1 ms. The values are those of [`About::variables`].
 pub trait Model: Send {
     /// Begins with the parameters that were set, and gives the outputs of the start.
     ///
     /// # Errors
     /// A parameter that cannot be, with its name.
-    fn begin(&mut self, values: &mut [f64]) -> Result<(), String>;
+    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), String>;
 
     /// One step of 1 ms under the inputs; writes the outputs.
     ///

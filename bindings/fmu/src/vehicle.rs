@@ -3,21 +3,21 @@
 
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::road::Course;
+use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::scenario::Condition;
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Scenario, Simulation};
 
-use crate::variable::{About, Kind, Model, Role, Variable, parameter, variable};
-use Kind::Real;
-use Role::{Input, Output};
+use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, parameter, variable};
+use Kind::{Real, Text};
+use Role::{Output, Parameter};
 
 /// The model.
 pub static ABOUT: About = About {
     name: "HapticVehicle",
-    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a03}",
-    meaning: "A vehicle with its steering column on the project's course, and what a driver and a camera see of it",
+    token: "{6a0d2f9e-6f0c-4f0b-9c53-3e0c3b2f7a04}",
+    meaning: "A vehicle with its steering column on a road, and what a driver and a camera see of it",
     variables: &VARIABLES,
     make: || {
         Box::new(Vehicle {
@@ -31,20 +31,19 @@ pub static ABOUT: About = About {
 const OUTPUTS: usize = 2;
 const SPEED: usize = 12;
 const FIRST: usize = 13;
+const COURSE: usize = 24;
 
-static VARIABLES: [Variable; 24] = [
-    variable(
+static VARIABLES: [Variable; 25] = [
+    input(
         "driver_torque_nm",
-        Real,
-        Input,
         "N.m",
+        limits::TORQUE_NM,
         "Torque of the driver on the column",
     ),
-    variable(
+    input(
         "guidance_torque_nm",
-        Real,
-        Input,
         "N.m",
+        limits::TORQUE_NM,
         "Torque of the guidance on the column",
     ),
     variable(
@@ -153,7 +152,29 @@ static VARIABLES: [Variable; 24] = [
         [0.02, 0.2],
         "Front wheel angle per steering wheel angle",
     ),
+    Variable {
+        text: PAPER_COURSE,
+        ..variable(
+            "course",
+            Text,
+            Parameter,
+            "",
+            "The road: paper-course, or a file (TOML, or OpenDRIVE if it ends with .xodr); a relative path is one in resources",
+        )
+    },
 ];
+
+/// The road that was asked for.
+fn course(texts: &Texts) -> Result<Course, String> {
+    let name = texts.texts[COURSE].as_str();
+    if name == PAPER_COURSE {
+        return Ok(Course::paper());
+    }
+    let path = texts.resources.join(name);
+    let bytes = std::fs::read(&path).map_err(|why| format!("course = {}: {why}", path.display()))?;
+    let text = String::from_utf8_lossy(&bytes);
+    Course::from_text(name, &text, &LaneChoice::default()).map_err(|why| format!("course = {why}"))
+}
 
 /// A guidance that applies what it is told.
 #[derive(Clone, Default)]
@@ -225,8 +246,8 @@ fn ended(simulation: &Simulation<Told>) -> String {
 }
 
 impl Model for Vehicle {
-    fn begin(&mut self, values: &mut [f64]) -> Result<(), String> {
-        let [m, i, l_f, l_r, k_f, k_r, k_s, e_t, b_s, j_s, k_t] = values[FIRST..] else {
+    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), String> {
+        let [m, i, l_f, l_r, k_f, k_r, k_s, e_t, b_s, j_s, k_t] = values[FIRST..COURSE] else {
             return Err("variables are missing".into());
         };
         let driver = DriverParameters {
@@ -237,7 +258,7 @@ impl Model for Vehicle {
             ..DriverParameters::default()
         };
         let scenario = Scenario::builder()
-            .course(Course::paper())
+            .course(course(texts)?)
             .condition(Condition::High)
             .speed_kmh(values[SPEED] * 3.6)
             .vehicle(VehicleParameters {

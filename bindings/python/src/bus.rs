@@ -5,7 +5,8 @@ use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, Turni
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyIterator, PyTuple};
 
-use crate::errors::{finite, within};
+use crate::errors::{clock, finite, whole, within};
+use crate::pickle::Parts;
 
 /// A classic CAN data frame; unpacks as ``id, data``.
 ///
@@ -88,11 +89,11 @@ impl Frame {
 }
 
 /// What makes a frame again.
-trait Parts<'py> {
+trait Arguments<'py> {
     fn arguments(&self) -> PyResult<Bound<'py, PyTuple>>;
 }
 
-impl<'py> Parts<'py> for Bound<'py, Frame> {
+impl<'py> Arguments<'py> for Bound<'py, Frame> {
     fn arguments(&self) -> PyResult<Bound<'py, PyTuple>> {
         let frame = self.get();
         (frame.id, frame.data(self.py())).into_pyobject(self.py())
@@ -139,6 +140,21 @@ impl Bus {
         Self::default()
     }
 
+    /// From what `__reduce__` took apart.
+    #[staticmethod]
+    fn _of(counters: [u8; 4], sent: [u32; 3], start_us: Option<u64>) -> Self {
+        Self {
+            counters,
+            sent,
+            start_us,
+        }
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Parts<'py>> {
+        let parts = (self.counters, self.sent, self.start_us);
+        Ok((py.get_type::<Self>().getattr("_of")?, parts.into_pyobject(py)?))
+    }
+
     /// The lane preview of the camera, about every 8.3 ms.
     ///
     /// Parameters
@@ -148,7 +164,7 @@ impl Bus {
     /// e_theta_rad : float
     ///     Heading of the road at the far point less the direction of movement, rad.
     /// age_us : int, optional
-    ///     Age of the picture, microseconds, up to 51,100.
+    ///     Age of the picture, microseconds, up to 204,700; the ECU uses none that is older than 150,000.
     /// valid : bool, optional
     ///     Whether the camera vouches for it.
     ///
@@ -161,14 +177,15 @@ impl Bus {
         py: Python<'_>,
         e_y_m: f64,
         e_theta_rad: f64,
-        age_us: u32,
+        age_us: i64,
         valid: bool,
     ) -> PyResult<Frame> {
-        within(py, "age_us", f64::from(age_us), [0.0, 51_100.0], "us")?;
+        let age_us = whole(py, "age_us", age_us, [0, 204_700], "us")?;
         let preview = LanePreview {
             e_y: Metres::from_m(finite(py, "e_y_m", e_y_m, "m")?),
             e_theta: Radians::from_rad(finite(py, "e_theta_rad", e_theta_rad, "rad")?),
-            age: Micros::from_us(age_us),
+            // In range as just checked.
+            age: Micros::from_us(age_us as u32),
             valid,
         };
         Ok(self.send(LANE, &preview))
@@ -287,7 +304,7 @@ impl Bus {
     fn frames(
         &mut self,
         py: Python<'_>,
-        t_us: u64,
+        t_us: i64,
         e_y_m: Option<f64>,
         e_theta_rad: Option<f64>,
         driver_torque_nm: f64,
@@ -301,6 +318,7 @@ impl Bus {
     ) -> PyResult<Vec<Frame>> {
         // A copy, so that a refused value sends nothing.
         let mut bus = *self;
+        let t_us = clock(py, t_us)?;
         let elapsed_us = t_us.saturating_sub(*bus.start_us.get_or_insert(t_us));
         let mut frames = Vec::with_capacity(4);
         if bus.is_due(LANE, LanePreview::INFO.period_ms, elapsed_us)

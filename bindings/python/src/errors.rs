@@ -21,6 +21,46 @@ pub(crate) fn input(py: Python<'_>, message: impl std::fmt::Display) -> PyErr {
     raise(py, "InputError", (message.to_string(),))
 }
 
+/// A name that is none of those known in a place.
+pub(crate) fn unknown(py: Python<'_>, place: &str, name: &str, known: &[&str]) -> PyErr {
+    let made = py
+        .import("haptic_guidance._errors")
+        .and_then(|module| module.getattr("unknown")?.call1((place, name, known)));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// What is wrong with a text that was made of keywords: the keyword in the place of line and column.
+pub(crate) fn in_keywords(py: Python<'_>, text: &str, refusal: &str) -> PyErr {
+    let line = refusal
+        .split_once("TOML parse error at line ")
+        .and_then(|(_, rest)| rest.split_once(',')?.0.parse().ok());
+    // Behind the line that marks the place.
+    let what = refusal.rsplit_once('^').map(|(_, what)| what.trim());
+    let (Some(line), Some(what)) = (line, what) else {
+        return input(py, refusal);
+    };
+    let lines: Vec<&str> = text.lines().take(line).collect();
+    let table = lines.iter().rfind(|line| line.starts_with('['));
+    let table = table.map_or("", |table| table.trim_matches(['[', ']']));
+    let mut names = what.split('`').skip(1).step_by(2);
+    let key = lines.last().and_then(|line| line.split_once(" = "));
+    let place = match (table, key) {
+        (table, None) => table.to_owned(),
+        ("", Some((key, _))) => key.to_owned(),
+        (table, Some((key, _))) => format!("{table}.{key}"),
+    };
+    match (what, names.next()) {
+        (what, Some(name)) if what.starts_with("unknown field") => {
+            let table = if table.is_empty() { "Scenario" } else { table };
+            unknown(py, table, name, &names.collect::<Vec<_>>())
+        }
+        (what, Some(name)) if what.starts_with("unknown variant") => {
+            unknown(py, &place, name, &names.collect::<Vec<_>>())
+        }
+        _ => input(py, format!("{place}: {what}")),
+    }
+}
+
 /// A value outside its range.
 pub(crate) fn range(py: Python<'_>, error: &RangeError) -> PyErr {
     let RangeError {
@@ -82,4 +122,23 @@ pub(crate) fn within(
     haptic_sim::input::in_range(field, value, min..=max, unit)
         .map(|()| value)
         .map_err(|error| range(py, &error))
+}
+
+/// Refuses a whole number outside `min` to `max`, negative ones among them.
+pub(crate) fn whole(
+    py: Python<'_>,
+    field: &str,
+    value: i64,
+    [min, max]: [i64; 2],
+    unit: &'static str,
+) -> PyResult<u64> {
+    within(py, field, value as f64, [min as f64, max as f64], unit).map(|_| value as u64)
+}
+
+/// An instant of a clock that counts microseconds.
+pub(crate) fn clock(py: Python<'_>, t_us: i64) -> PyResult<u64> {
+    if t_us >= 0 {
+        return Ok(t_us as u64);
+    }
+    whole(py, "t_us", t_us, [0, i64::MAX], "us")
 }

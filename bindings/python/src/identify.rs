@@ -3,68 +3,100 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{COLUMNS, DriveLog, Mapping, Options, Recording, SPEED_COLUMN, open_mapped};
-use haptic_batch::identify::{Method, single_track};
+use haptic_analysis::identify::{
+    COLUMNS, DriveLog, FixError, Mapping, Options, Recording, SPEED_COLUMN, open_mapped,
+};
+use haptic_batch::identify::{Method, identify as one, identify_several as several, single_track};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors;
+use crate::errors::{self, within};
 use crate::interrupt::interruptible;
 use crate::run::python;
 use crate::scenario::Scenario;
 
-/// Findings of an identification, for `haptic_guidance.identify`.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
-pub(crate) fn identify<'py>(
-    py: Python<'py>,
-    path: Option<PathBuf>,
-    columns: Option<&Bound<'py, PyDict>>,
+/// A drive as Python has it: a path, or columns by name.
+#[derive(FromPyObject)]
+pub(crate) enum Drive<'py> {
+    File(PathBuf),
+    Columns(Bound<'py, PyDict>),
+}
+
+/// How to identify, as keywords of `haptic_guidance.identify` have it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct How<'py> {
     manual: bool,
     fix: Vec<String>,
     estimate: Vec<String>,
     between: Vec<[f64; 2]>,
     as_published: bool,
+    max_gap: f64,
+    preprocessing: bool,
+    lane_smoothing: bool,
     maps: Vec<String>,
     dbc: Option<PathBuf>,
-    vehicle: Option<&Bound<'py, Scenario>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let mut options = Options::given(manual, &fix).map_err(|error| errors::input(py, error))?;
-    for what in &estimate {
-        options.estimate(what).map_err(|error| errors::input(py, error))?;
-    }
-    let (from, to): (Vec<f64>, Vec<f64>) = between.into_iter().map(|[from, to]| (from, to)).unzip();
-    options
-        .between(&from, &to)
-        .map_err(|error| errors::input(py, error))?;
-    let (name, (log, converted)) = match (path, columns) {
-        (Some(path), _) => {
-            let maps = maps
-                .iter()
-                .map(|map| map.parse())
-                .collect::<Result<Vec<Mapping>, _>>();
-            let maps = maps.map_err(|error| errors::input(py, error))?;
-            let how = Recording {
-                dbc: dbc.as_deref(),
-                vehicle: vehicle.map(|scenario| single_track(&scenario.get().inner)),
-                manual,
-            };
-            let opened = open_mapped(&path, &maps, &how).map_err(|error| errors::input(py, error))?;
-            (path.display().to_string(), opened)
+    vehicle: Option<Bound<'py, Scenario>>,
+}
+
+impl How<'_> {
+    fn options(&self, py: Python<'_>) -> PyResult<Options> {
+        let refused = |error: FixError| errors::input(py, error);
+        let mut options = Options::given(self.manual, &self.fix).map_err(refused)?;
+        for what in &self.estimate {
+            options.estimate(what).map_err(refused)?;
         }
-        (None, Some(columns)) => ("columns".to_owned(), (log_of(py, columns, manual)?, Vec::new())),
-        (None, None) => return Err(errors::input(py, "neither a path nor columns")),
-    };
-    let method = if as_published {
+        let (from, to): (Vec<f64>, Vec<f64>) = self.between.iter().map(|[from, to]| (from, to)).unzip();
+        options.between(&from, &to).map_err(refused)?;
+        options.bridge_s = within(py, "max_gap", self.max_gap, [0.0, 1.0], "s")?;
+        options.leave_out = self.preprocessing;
+        options.lane_noise = self.lane_smoothing;
+        Ok(options)
+    }
+
+    /// The log of a drive, and what a reader of the results has to know of it.
+    fn open(&self, py: Python<'_>, drive: &Drive<'_>) -> PyResult<(DriveLog, Vec<String>)> {
+        let path = match drive {
+            Drive::File(path) => path,
+            Drive::Columns(columns) => return Ok((log_of(py, columns, self.manual)?, Vec::new())),
+        };
+        let maps = self.maps.iter().map(|map| map.parse());
+        let maps = maps.collect::<Result<Vec<Mapping>, _>>();
+        let maps = maps.map_err(|error| errors::input(py, error))?;
+        let how = Recording {
+            dbc: self.dbc.as_deref(),
+            vehicle: self
+                .vehicle
+                .as_ref()
+                .map(|scenario| single_track(&scenario.get().inner)),
+            manual: self.manual,
+        };
+        open_mapped(path, &maps, &how).map_err(|error| errors::input(py, error))
+    }
+}
+
+/// Findings of an identification, for `haptic_guidance.identify`: of one drive, or of several of one driver.
+#[pyfunction]
+pub(crate) fn identify<'py>(
+    py: Python<'py>,
+    drives: Vec<Drive<'py>>,
+    how: How<'py>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let options = how.options(py)?;
+    let opened = drives.iter().map(|drive| how.open(py, drive));
+    let (mut logs, mut notes): (Vec<_>, Vec<_>) = opened.collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
+    let method = if how.as_published {
         Method::Paper
     } else {
         Method::NoiseModel
     };
-    let drive = interruptible(py, None, move |_| {
-        haptic_batch::identify::identify(&name, &log, &options, method)
+    let drive = interruptible(py, None, move |_| match logs.len() {
+        1 => one("drive", &logs.remove(0), &options, method).map_err(|error| error.to_string()),
+        _ => several("drives", &logs, &options),
     })?
     .map_err(|error| errors::input(py, error))?;
+    let converted = notes.drain(..1).flatten();
     let mut found = drive.results.identification;
     found.notes.splice(0..0, converted);
     let made = PyDict::new(py);

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
 /// How often Ctrl-C and progress are looked after.
@@ -34,6 +34,17 @@ pub(crate) fn interruptible<T: Send + 'static>(
     told: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
+    static NEVER: AtomicBool = AtomicBool::new(false);
+    until(py, &NEVER, told, work)
+}
+
+/// The same until somebody stops it: Ctrl-C reaches the main thread of Python alone.
+pub(crate) fn until<T: Send + 'static>(
+    py: Python<'_>,
+    stopped: &AtomicBool,
+    told: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Progress) -> T + Send + 'static,
+) -> PyResult<T> {
     let progress = Arc::new(Progress::default());
     let (sender, mut receiver) = channel();
     let worker = Arc::clone(&progress);
@@ -48,6 +59,7 @@ pub(crate) fn interruptible<T: Send + 'static>(
         let done = progress.done.load(Ordering::Relaxed);
         let looked = py.check_signals().and_then(|()| match told {
             Some(told) if done > heard => told.call1((done - heard,)).map(|_| ()),
+            _ if stopped.load(Ordering::Relaxed) => Err(PyKeyboardInterrupt::new_err(())),
             _ => Ok(()),
         });
         if let Err(error) = looked {

@@ -52,10 +52,16 @@ pub(crate) struct Scenario {
 
 impl Scenario {
     /// From the text of a file, which says the same as `fields`.
-    fn make(py: Python<'_>, name: &str, text: &str, fields: Table, folder: &Path) -> PyResult<Self> {
+    fn make(
+        py: Python<'_>,
+        name: &str,
+        text: &str,
+        fields: Table,
+        folder: &Path,
+        refused: impl FnOnce(InputError) -> PyErr,
+    ) -> PyResult<Self> {
         let open = |named: &str, lane: &LaneChoice| load_lane(&folder.join(named), lane);
-        let builder =
-            ScenarioBuilder::from_toml(name, text, open).map_err(|error| errors::input(py, error))?;
+        let builder = ScenarioBuilder::from_toml(name, text, open).map_err(refused)?;
         let inner = builder.build().map_err(|error| errors::scenario(py, &error))?;
         Ok(Self {
             inner,
@@ -69,7 +75,9 @@ impl Scenario {
             complete(course);
         }
         let text = fields.to_string();
-        Self::make(py, "scenario", &text, fields, folder)
+        Self::make(py, "scenario", &text, fields, folder, |error| {
+            errors::in_keywords(py, &text, &error.to_string())
+        })
     }
 }
 
@@ -137,8 +145,9 @@ impl Scenario {
     /// Scenario
     #[staticmethod]
     fn from_toml(py: Python<'_>, text: &str) -> PyResult<Self> {
-        let fields = parse_toml("scenario", text).map_err(|error| errors::input(py, error))?;
-        Self::make(py, "scenario", text, fields, Path::new(""))
+        let refused = |error| errors::input(py, error);
+        let fields = parse_toml("scenario", text).map_err(refused)?;
+        Self::make(py, "scenario", text, fields, Path::new(""), refused)
     }
 
     /// Reads a scenario file.
@@ -155,10 +164,10 @@ impl Scenario {
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let name = path.display().to_string();
-        let text =
-            std::fs::read_to_string(&path).map_err(|e| errors::input(py, InputError::new(&name, e)))?;
-        let fields = parse_toml(&name, &text).map_err(|error| errors::input(py, error))?;
-        Self::make(py, &name, &text, fields, folder)
+        let refused = |error| errors::input(py, error);
+        let text = std::fs::read_to_string(&path).map_err(|e| refused(InputError::new(&name, e)))?;
+        let fields = parse_toml(&name, &text).map_err(refused)?;
+        Self::make(py, &name, &text, fields, folder, refused)
     }
 
     /// The same scenario with some fields changed; a table is changed field by field.

@@ -4,13 +4,13 @@ use haptic_core::faults::FaultSet;
 use haptic_log::trace::CHANNELS;
 use haptic_sim::action::WorldFaults;
 use haptic_sim::simulation::Ending;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::bus::Frame;
 use crate::ecu::fault_names;
-use crate::errors::{finite, within};
+use crate::errors::{finite, whole, within};
+use crate::pickle::{Parts, attributes, part};
 use crate::scenario::Scenario;
 
 /// Steps between two looks at Ctrl-C, 0.1 s of work at the most.
@@ -36,10 +36,10 @@ pub(crate) struct Action {
     inner: haptic_sim::Action,
 }
 
-type Parts = (Option<bool>, Option<f64>, Option<bool>, f64, bool, bool);
+type Given = (Option<bool>, Option<f64>, Option<bool>, f64, bool, bool);
 
 impl Action {
-    fn parts(&self) -> Parts {
+    fn parts(&self) -> Given {
         let haptic_sim::Action {
             engage,
             authority,
@@ -139,6 +139,36 @@ pub(crate) struct Outcome {
     frames_out: Vec<Py<Frame>>,
 }
 
+#[pymethods]
+impl Outcome {
+    /// From what `__reduce__` took apart.
+    #[staticmethod]
+    fn _of(parts: &Bound<'_, PyDict>) -> PyResult<Self> {
+        Ok(Self {
+            time_s: part(parts, "time_s")?,
+            e_y_m: part(parts, "e_y_m")?,
+            e_theta_rad: part(parts, "e_theta_rad")?,
+            driver_torque_nm: part(parts, "driver_torque_nm")?,
+            wheel_angle_rad: part(parts, "wheel_angle_rad")?,
+            decided_torque_nm: part(parts, "decided_torque_nm")?,
+            guidance_torque_nm: part(parts, "guidance_torque_nm")?,
+            guidance_limited: part(parts, "guidance_limited")?,
+            mode: part(parts, "mode")?,
+            faults: part(parts, "faults")?,
+            warning: part(parts, "warning")?,
+            k_hg: part(parts, "k_hg")?,
+            unguided: part(parts, "unguided")?,
+            sample: part(parts, "sample")?,
+            frames_in: part(parts, "frames_in")?,
+            frames_out: part(parts, "frames_out")?,
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Parts<'py>> {
+        attributes(slf)
+    }
+}
+
 fn outcome(py: Python<'_>, from: &haptic_sim::Outcome<'_>) -> PyResult<Outcome> {
     let frames = |frames: &[haptic_core::bus::Frame]| {
         let frames = frames.iter().map(|frame| Py::new(py, Frame::from(frame)));
@@ -229,11 +259,10 @@ impl Simulation {
         &mut self,
         py: Python<'_>,
         action: Option<&Bound<'_, Action>>,
-        steps: u32,
+        steps: i64,
     ) -> PyResult<Option<Outcome>> {
-        if steps == 0 {
-            return Err(PyValueError::new_err("steps = 0 is outside 1 to 4294967295"));
-        }
+        // In range as checked.
+        let steps = whole(py, "steps", steps, [1, i64::from(u32::MAX)], "")? as u32;
         let action = action.map_or(
             Action {
                 inner: haptic_sim::Action::default(),
@@ -318,7 +347,7 @@ impl Simulation {
 
     fn __setstate__(&mut self, py: Python<'_>, actions: Vec<(u32, Py<Action>)>) -> PyResult<()> {
         for (steps, action) in actions {
-            self.step(py, Some(action.bind(py)), steps)?;
+            self.step(py, Some(action.bind(py)), i64::from(steps))?;
         }
         Ok(())
     }

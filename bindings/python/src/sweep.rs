@@ -1,6 +1,7 @@
 //! A sweep's chunks for `haptic_guidance.sweep`, which hands them to an engine of the caller's.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use haptic_batch::VERSION;
 use haptic_batch::sweep::{Shard, Store, Sweep as Inner};
@@ -8,13 +9,23 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::errors;
-use crate::interrupt::interruptible;
+use crate::interrupt::until;
 use crate::run::python;
 
 /// A sweep file with all that it names, and the directory of its results.
 #[pyclass(frozen)]
 pub(crate) struct Sweep {
     inner: Inner,
+    stopped: AtomicBool,
+}
+
+impl From<Inner> for Sweep {
+    fn from(inner: Inner) -> Self {
+        Self {
+            inner,
+            stopped: AtomicBool::new(false),
+        }
+    }
 }
 
 #[pymethods]
@@ -23,14 +34,14 @@ impl Sweep {
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let inner = Inner::load(&path).map_err(|error| errors::input(py, error))?;
-        Ok(Self { inner })
+        Ok(inner.into())
     }
 
     /// A sweep from a text that names no other file, as `text` is one.
     #[staticmethod]
     fn from_text(py: Python<'_>, text: &str) -> PyResult<Self> {
         let inner = Inner::from_text("sweep", text).map_err(|error| errors::input(py, error))?;
-        Ok(Self { inner })
+        Ok(inner.into())
     }
 
     #[getter]
@@ -56,11 +67,16 @@ impl Sweep {
     /// Drives a chunk; its bytes.
     fn run_chunk<'py>(&self, py: Python<'py>, number: u64) -> PyResult<Bound<'py, PyBytes>> {
         let inner = self.inner.clone();
-        let chunk = interruptible(py, None, move |_| inner.run_chunk(number))?;
+        let chunk = until(py, &self.stopped, None, move |_| inner.run_chunk(number))?;
         let bytes = chunk
             .map_err(|error| errors::input(py, error))?
             .to_bytes(Store::fingerprint_of(&self.inner, VERSION));
         Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Ends every `run_chunk` of this sweep, in whatever thread, with a KeyboardInterrupt.
+    fn stop(&self) {
+        self.stopped.store(true, Ordering::Relaxed);
     }
 
     /// Keeps a chunk's bytes.

@@ -1,5 +1,8 @@
 """The shipping ECU and the senders on its bus."""
 
+import copy
+import pickle
+
 import pytest
 
 import haptic_guidance as hg
@@ -92,6 +95,64 @@ def test_a_clone_is_independent():
     assert torques[0][-1] > 0 and torques[1] == [0.0] * 10
 
 
+def test_a_picture_is_used_until_it_is_150_ms_old():
+    def guides(age_us):
+        ecu, bus, torque_nm = hg.Ecu(), hg.Bus(), 0.0
+        for k in range(1000):
+            now = 1000 * k
+            values = dict(driver_torque_nm=0.0, wheel_angle_rad=0.0, motor_torque_nm=torque_nm, speed_m_per_s=16.7)
+            for frame in bus.frames(now, e_y_m=None, e_theta_rad=None, engage=k >= 600, **values):
+                ecu.receive(*frame, now)
+            if k % 10 == 0:
+                ecu.receive(*bus.lane_preview(0.0, 0.0, age_us=age_us), now)
+            step = ecu.step(now)
+            torque_nm = step.torque_nm
+        return step.mode == "Active"
+
+    assert guides(0) and guides(100_000) and guides(150_000) and not guides(151_000)
+
+
+def test_a_step_can_be_pickled_and_copied():
+    _, _, step = settled(e_y_m=0.2)
+    assert step.torque_nm > 0.05 and step != settled()[2]
+    ecu, bus, _ = settled()
+    blind = max((ecu.step(1000 * k) for k in range(900, 1000)), key=lambda step: (len(step.faults), len(step.frames)))
+    assert blind.faults and blind.warning and len(blind.frames) > 1
+    for each in (step, blind):
+        for again in (pickle.loads(pickle.dumps(each)), copy.copy(each), copy.deepcopy(each)):
+            assert again == each and repr(again) == repr(each)
+            for name in ("torque_nm", "mode", "limit", "faults", "warning", "permitted", "frames"):
+                assert getattr(again, name) == getattr(each, name), name
+
+
+@pytest.mark.parametrize("params", [None, {"k_1": 0.2, "torque_limit_nm": 2.0}, hg.Scenario(guidance={"K_1": 0.2})])
+def test_a_pickled_ecu_goes_on_as_the_original(params):
+    """Beyond the wrap of its clock, with a step that came late and frames that it refused."""
+    start, inputs = 2**32 - 1_000_000, dict(driver_torque_nm=0.1, wheel_angle_rad=0.01, speed_m_per_s=16.7)
+    ecu, bus = hg.Ecu(params, t_us=start), hg.Bus()
+    torque_nm, step = 0.0, None
+
+    def drive(ecu, bus, steps, torque_nm):
+        taken = []
+        for k in steps:
+            now = start + 1000 * k + (300 if k == 1500 else 0)
+            for frame in bus.frames(now, e_y_m=0.1, e_theta_rad=0.0, motor_torque_nm=torque_nm, engage=k >= 600, probe=True, **inputs):
+                ecu.receive(*frame, now)
+            if k % 100 == 0:
+                assert ecu.receive(0x100, bytes(8), now) == "Crc" and ecu.receive(0x100, b"", now) == "Length"
+            taken.append(ecu.step(now))
+            torque_nm = taken[-1].torque_nm
+        return taken
+
+    step = drive(ecu, bus, range(2000), torque_nm)[-1]
+    assert step.mode == "Active"
+    again = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(ecu))))
+    # The senders count on where they are.
+    buses = [copy.deepcopy(bus), bus]
+    expected, got = (drive(each, of, range(2000, 3000), step.torque_nm) for each, of in zip((ecu, again), buses))
+    assert got == expected and any(step.torque_nm for step in got)
+
+
 def test_parameters_are_checked_by_name_and_range():
     listed = {parameter["name"]: parameter for parameter in hg.parameters()}
     assert listed["torque_limit_nm"]["max"] == 5.0 and listed["k_1"]["unit"] == "N.m"
@@ -122,7 +183,12 @@ def test_values_that_no_sensor_gives_are_refused_and_send_nothing():
         lambda: bus.lane_preview(float("nan"), 0.0),
         lambda: bus.column(0.0, float("inf"), 0.0),
         lambda: bus.demand(True, authority=1.2),
-        lambda: bus.lane_preview(0.0, 0.0, age_us=60_000),
+        lambda: bus.lane_preview(0.0, 0.0, age_us=205_000),
+        lambda: bus.lane_preview(0.0, 0.0, age_us=-1),
+        lambda: bus.frames(-1, e_y_m=0, e_theta_rad=0, driver_torque_nm=0, wheel_angle_rad=0, motor_torque_nm=0, speed_m_per_s=9),
+        lambda: hg.Ecu().step(-1),
+        lambda: hg.Ecu().receive(0x100, bytes(8), -1),
+        lambda: hg.Ecu(t_us=-1),
     ):
         with pytest.raises(hg.RangeError):
             refused()

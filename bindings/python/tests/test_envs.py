@@ -133,6 +133,30 @@ def test_a_seed_gives_the_same_drives_again():
     assert np.array_equal(drives(5)[:, 1], drives(6)[:, 0]), "loop i has seed + i"
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_another_seed_is_another_drive_unless_told_otherwise(name):
+    def drive(seed):
+        env = gymnasium.make(name)
+        first = env.reset(seed=seed)[0]
+        assert env.reset(seed=seed)[0][-1] == first[-1]
+        action = np.zeros(1, dtype=np.float32)
+        seen = [first] + [env.step(action)[0] for _ in range(30)]
+        # The next drive is drawn too.
+        return np.stack(seen), np.stack([env.reset()[0]] + [env.step(action)[0] for _ in range(30)])
+
+    drives = [each for seed in (1, 2, 1) for each in drive(seed)]
+    assert np.array_equal(drives[0], drives[4]) and np.array_equal(drives[1], drives[5])
+    for i in range(4):
+        for other in drives[:i]:
+            assert not np.array_equal(drives[i], other)
+
+
+def test_the_drivers_speed_is_drawn_from_50_to_80():
+    env = envs.DriverEnv()
+    speeds = [float(env.reset(seed=seed)[0][-1]) * 3.6 for seed in range(20)]
+    assert len(set(speeds)) == 20 and 50 <= min(speeds) < 60 and 70 < max(speeds) <= 80
+
+
 def test_a_function_makes_a_scenario_for_each_drive():
     env = envs.AuthorityEnv(lambda rng: short(speed=float(rng.uniform(40, 90))))
     speeds = {float(env.reset(seed=seed)[0][-1]) for seed in (1, 2, 1, 3)}

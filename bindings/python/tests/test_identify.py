@@ -95,6 +95,49 @@ def test_a_stretch_and_more_parameters_can_be_asked_for():
         hg.identify(run, between_s=[(10.0, 5.0)])
 
 
+def test_gaps_lanes_and_rows_are_taken_as_asked():
+    run = probed_run()
+    columns = {name: column.copy() for name, column in run.columns.items()}
+    # Half a second of the torque is lost.
+    columns["driver_torque_nm"][4000:4100] = np.nan
+    asked = lambda **options: hg.identify(columns, **options).results
+    default = asked()
+    assert asked(max_gap=0.3, preprocessing=True, lane_smoothing=True) == default
+    bridged = asked(max_gap=1.0)
+    assert bridged["rows"] > default["rows"] and bridged["parameters"] != default["parameters"]
+    # Half of the drive nobody holds the wheel: without preprocessing these rows count too.
+    free = {name: column.copy() for name, column in run.columns.items()}
+    free["driver_torque_nm"][: len(run) // 2] = 0.0
+    assert hg.identify(free, preprocessing=False).results["rows"] > hg.identify(free).results["rows"]
+    noisy = {**run.columns, "e_y_m": run["e_y_m"] + np.random.default_rng(1).normal(0.0, 0.03, len(run))}
+    smoothed, taken = hg.identify(noisy), hg.identify(noisy, lane_smoothing=False)
+    assert smoothed.results["parameters"] != taken.results["parameters"]
+    for gap in (-0.1, 1.5, float("nan")):
+        with pytest.raises(hg.RangeError, match="max_gap = .* s is outside 0 to 1 s"):
+            hg.identify(columns, max_gap=gap)
+
+
+def test_several_drives_of_one_driver_are_one_fit():
+    driver = {"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}
+    one, other = (hg.simulate(hg.Scenario(driver=driver, seed=seed, guidance={"probe": True})) for seed in (1, 2))
+    alone, both = hg.identify(one), hg.identify(one, also=[other.columns])
+    assert both.results["rows"] > 1.8 * alone.results["rows"]
+    assert both["k_hg"].standard_error < 0.85 * alone["k_hg"].standard_error
+    assert abs(both["k_hg"].estimate - 0.4) < 3 * both["k_hg"].standard_error
+    log = LOGS / "guided-probe-clean.csv"
+    assert hg.identify(log, also=[log]).results["parameters"] == hg.identify(table(log), also=[log]).results["parameters"]
+    for wrong, says in [(dict(also=log), "a list of drives"), (dict(also=[log], as_published=True), "takes one drive"),
+                        (dict(also=["no-such.csv"]), "no-such")]:
+        with pytest.raises(hg.InputError, match=says):
+            hg.identify(log, **wrong)
+
+
+def test_a_parameter_that_there_is_not_is_named():
+    fit = hg.identify(LOGS / "guided-probe-clean.csv")
+    with pytest.raises(KeyError, match="no 'K_HG'; did you mean 'k_hg'\\? There are gain_1, "):
+        fit["K_HG"]
+
+
 FOREIGN = {
     "time_s": "t",
     "e_y_m": "Lane Offset",

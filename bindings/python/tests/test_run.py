@@ -122,6 +122,20 @@ def test_a_clone_and_a_pickle_go_on_as_the_original():
             assert got.frames_out == outcome.frames_out
 
 
+def test_an_outcome_can_be_pickled_and_copied():
+    simulation = hg.Simulation(hg.Scenario(course=SHORT))
+    names = [name for name in dir(hg.Outcome) if not name.startswith("_")]
+    assert {"time_s", "sample", "frames_out"} <= set(names)
+    for outcome in (simulation.step(), simulation.step()):
+        for again in (pickle.loads(pickle.dumps(outcome)), copy.copy(outcome), copy.deepcopy(outcome)):
+            assert all(getattr(again, name) == getattr(outcome, name) for name in names)
+
+
+def test_a_column_that_there_is_not_is_named():
+    with pytest.raises(KeyError, match="no 'lateral_eror_m'; did you mean 'lateral_error_m'\\? There are time_s, "):
+        hg.simulate(hg.Scenario(course=SHORT))["lateral_eror_m"]
+
+
 def test_a_hand_on_the_wheel_moves_the_vehicle_to_its_side():
     free, pushed = (hg.Simulation(hg.Scenario(course=SHORT)) for _ in range(2))
     left = pushed.step(hg.Action(hand_torque_nm=0.5), steps=1000)
@@ -134,8 +148,9 @@ def test_what_an_action_cannot_be_is_refused():
     assert (caught.value.field, caught.value.max) == ("authority", 1.0)
     with pytest.raises(hg.RangeError, match="hand_torque_nm"):
         hg.Action(hand_torque_nm=float("nan"))
-    with pytest.raises(ValueError, match="steps"):
-        hg.Simulation(hg.Scenario()).step(steps=0)
+    for steps in (0, -1, 2**32):
+        with pytest.raises(hg.RangeError, match=f"steps = {steps} is outside 1 to 4294967295"):
+            hg.Simulation(hg.Scenario()).step(steps=steps)
 
 
 def test_a_failure_after_the_end_is_refused():

@@ -104,9 +104,15 @@ def test_nan_is_out_of_range():
 @pytest.mark.parametrize(
     ("fields", "says"),
     [
-        ({"sped": 60}, "sped"),
-        ({"speed": "fast"}, "expected a number"),
-        ({"condition": "hihg"}, "hihg"),
+        ({"sped": 60}, "^Scenario: there is no 'sped'; did you mean 'speed'\\? There are course, road, "),
+        ({"driver": {"t_pp": 0.3}}, "^driver: there is no 't_pp'; did you mean 't_p'\\? There are .*t_p, t_n"),
+        ({"speed": 60, "driver": {"t_p": 0.3, "xyz": 1}}, "^driver: there is no 'xyz'. There are .*t_p, t_n"),
+        ({"speed": "fast"}, "^speed: .*expected a number"),
+        ({"driver": {"t_p": "slow"}}, "^driver.t_p: .*expected a number"),
+        ({"seed": -1}, "^seed: .*expected a whole number, 0 or more"),
+        ({"course": {"segment": [{"lenght": 100}]}}, "^course: "),
+        ({"driver_change": {"time": 3}}, "^driver_change: missing field `K_d`"),
+        ({"condition": "hihg"}, "^condition: there is no 'hihg'; did you mean 'high'\\? There are manual, high, "),
         ({"driver": {"t_p": object()}}, "driver.t_p: a object is no number"),
         ({"course": "no-such.toml"}, "no-such.toml"),
         ({"condition": "manual", "failure": {"kind": "torque"}}, "manual"),
@@ -116,6 +122,14 @@ def test_nan_is_out_of_range():
 def test_what_makes_no_scenario_is_refused_by_name(fields, says):
     with pytest.raises(hg.InputError, match=says):
         hg.Scenario(**fields)
+
+
+def test_a_wrong_keyword_is_a_key_error_and_bad_input_at_once():
+    for error in (KeyError, ValueError, hg.InputError):
+        with pytest.raises(error) as caught:
+            hg.Scenario().replace(sped=60)
+        assert "TOML" not in str(caught.value) and str(caught.value).startswith("Scenario: ")
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
 def test_everything_public_is_documented():

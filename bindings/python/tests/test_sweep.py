@@ -3,9 +3,10 @@
 import csv
 import os
 import signal
+import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
 import pytest
@@ -91,6 +92,40 @@ def test_processes_give_the_same_bytes_and_a_sweep_goes_on(spec, tmp_path):
     again = hg.sweep(spec, out=tmp_path / "processes", progress=lambda done, of: calls.append((done, of)))
     assert files(again) == whole
     assert 0 < len(calls) < calls[-1][1] and calls[-1][0] == calls[-1][1]
+
+
+def test_ctrl_c_ends_a_sweep_and_what_is_under_way(tmp_path, monkeypatch):
+    """Of 2000 chunks, 256 of them handed out, those on this machine's cores are given up and no other begins."""
+    path, begun, ended = tmp_path / "sweep.toml", [], []
+    path.write_text(SPEC.replace("samples = 200", "samples = 512000"))
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, fn, *arguments):
+            def counted():
+                begun.append(None)
+                try:
+                    return fn(*arguments)
+                finally:
+                    ended.append(sys.exc_info()[0])
+
+            return super().submit(counted)
+
+    monkeypatch.setattr("haptic_guidance._sweep.ThreadPoolExecutor", Counting)
+    kept = []
+
+    def interrupt(done, of):
+        kept.append(done)
+        if done == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        hg.sweep(path, out=tmp_path / "out", progress=interrupt)
+    # Nothing is under way any more, and what was ended without its chunk.
+    cores = os.cpu_count()
+    assert len(ended) == len(begun) <= kept[-1] + 4 * cores
+    assert KeyboardInterrupt in ended
+    # The chunks that are done are kept.
+    assert len(list((tmp_path / "out" / "chunks").iterdir())) == kept[-1]
 
 
 def test_bad_input_is_not_tried_again(tmp_path):

@@ -48,7 +48,7 @@ fn version_2(about: &About) {
 <fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{token}" version="{version}"
     description="{meaning}" generationTool="haptic-guidance">
   <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"
-      canGetAndSetFMUstate="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
+      canGetAndSetFMUstate="true" canSerializeFMUstate="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
     );
     print_units(about);
     println!("  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>");
@@ -68,6 +68,7 @@ fn version_2(about: &About) {
             Kind::Real => "Real",
             Kind::Integer => "Integer",
             Kind::Boolean => "Boolean",
+            Kind::Text => "String",
         };
         println!("      <{element} {}/>\n    </ScalarVariable>", value(variable));
     }
@@ -91,7 +92,7 @@ fn version_3(about: &About) {
 <fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{token}" version="{version}"
     description="{meaning}" generationTool="haptic-guidance">
   <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"
-      canGetAndSetFMUState="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
+      canGetAndSetFMUState="true" canSerializeFMUState="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
     );
     print_units(about);
     println!("  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>");
@@ -106,12 +107,20 @@ fn version_3(about: &About) {
             Kind::Real => "Float64",
             Kind::Integer => "Int32",
             Kind::Boolean => "Boolean",
+            Kind::Text => "String",
+        };
+        // A text has its start inside.
+        let (value, end) = match variable.kind {
+            Kind::Text => (
+                String::new(),
+                format!(r#"><Start value="{}"/></String>"#, escaped(variable.text)),
+            ),
+            _ => (value(variable), "/>".to_owned()),
         };
         println!(
-            r#"    <{element} name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}" {}/>"#,
+            r#"    <{element} name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}" {value}{end}"#,
             variable.name,
-            escaped(variable.meaning.trim()),
-            value(variable)
+            escaped(variable.meaning.trim())
         );
     }
     let time = about.variables.len();
@@ -156,6 +165,7 @@ fn value(variable: &Variable) -> String {
         }
         Kind::Integer => format!(r#"start="{start}""#),
         Kind::Boolean => format!(r#"start="{}""#, start != 0.0),
+        Kind::Text => format!(r#"start="{}""#, escaped(variable.text)),
     }
 }
 

@@ -11,7 +11,7 @@ Examples
 'course-end'
 """
 
-from ._errors import InputError, RangeError
+from ._errors import InputError, RangeError, UnknownNameError
 from ._identify import Fit, Parameter, identify
 from ._native import (
     Action,
@@ -45,6 +45,7 @@ __all__ = [
     "Simulation",
     "Step",
     "SweepResult",
+    "UnknownNameError",
     "evaluate",
     "experiment",
     "identify",

@@ -10,7 +10,7 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from . import _native
-from ._errors import InputError
+from ._errors import InputError, unknown
 from ._native import Scenario
 from ._results import Run
 
@@ -65,6 +65,8 @@ class Fit:
     traces: dict[str, np.ndarray] = field(repr=False)
 
     def __getitem__(self, name: str) -> Parameter:
+        if name not in self.parameters:
+            raise unknown("parameters of the driver", name, self.parameters)
         return self.parameters[name]
 
     @property
@@ -96,14 +98,22 @@ class Fit:
         return names, matrix * np.outer(errors, errors)
 
 
+#: A recorded drive.
+Drive = Union[str, "os.PathLike[str]", Mapping[str, Any], Run]
+
+
 def identify(
-    drive: Union[str, os.PathLike[str], Mapping[str, Any], Run],
+    drive: Drive,
     *,
+    also: Sequence[Drive] = (),
     manual: bool = False,
     fix: Optional[Mapping[str, float]] = None,
     estimate: Optional[Mapping[str, Optional[tuple[float, float]]]] = None,
     between_s: Sequence[tuple[float, float]] = (),
     as_published: bool = False,
+    max_gap: float = 0.3,
+    preprocessing: bool = True,
+    lane_smoothing: bool = True,
     map: Optional[Mapping[str, str]] = None,
     dbc: Union[str, os.PathLike[str], None] = None,
     vehicle: Optional[Scenario] = None,
@@ -117,6 +127,8 @@ def identify(
         too); or a run.
         Needed are ``time_s``, ``e_y_m``, ``e_theta_rad``, ``wheel_angle_rad``, ``guidance_torque_nm`` and
         ``driver_torque_nm``. Where the speed changes, ``speed_m_per_s`` says so.
+    also : sequence of drives, optional
+        More drives of the same driver, of the same rate: all are one fit.
     manual : bool, optional
         A drive without guidance: K_hg is no part of the model.
     fix : mapping of str to float, optional
@@ -127,6 +139,12 @@ def identify(
         Stretches of the drive to use, s; all of it if not given.
     as_published : bool, optional
         The paper's method instead of prediction errors with a noise model.
+    max_gap : float, optional
+        Pauses of a signal (lost rows, NaN, a stuck sensor) up to so long are bridged, s, 0 to 1; longer ones cut the drive.
+    preprocessing : bool, optional
+        False uses every row: hands off, standstill and lane changes are not looked for.
+    lane_smoothing : bool, optional
+        False takes the lane signals as they are: no camera noise is estimated and removed.
     map : mapping of str to str, optional
         Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}``. Without a scale the unit
         is converted if a file says it.
@@ -147,21 +165,31 @@ def identify(
     """
     fixed = [f"{name}={float(value)!r}" for name, value in (fix or {}).items()]
     wanted = [name if ends is None else f"{name}={ends[0]!r}..{ends[1]!r}" for name, ends in (estimate or {}).items()]
-    options = (manual, fixed, wanted, [list(stretch) for stretch in between_s], as_published)
     maps = dict(map or {})
-    if isinstance(drive, (str, os.PathLike)):
-        texts = [f"{name}={channel}" for name, channel in maps.items()]
-        frames = None if dbc is None else os.fspath(dbc)
-        made = _native.identify(os.fspath(drive), None, *options, texts, frames, vehicle)
-    else:
-        for name, given in (("dbc", dbc), ("vehicle", vehicle)):
-            if given is not None:
-                raise InputError(f"{name}: only for a recording of the bus; columns need none")
-        table = drive.columns if isinstance(drive, Run) else drive
-        columns = {str(name): _column(name, table[name]) for name in table.keys()}
-        columns = {name: column for name, column in columns.items() if column is not None}
-        columns.update({name: _mapped(name, channel, columns) for name, channel in maps.items()})
-        made = _native.identify(None, columns, *options, [], None, None)
+    if isinstance(also, (str, os.PathLike, Mapping, Run)):
+        raise InputError("also: a list of drives is wanted")
+    if also and as_published:
+        raise InputError("also: the published method takes one drive")
+    drives = [drive, *also]
+    files = [isinstance(each, (str, os.PathLike)) for each in drives]
+    for name, given in (("dbc", dbc), ("vehicle", vehicle)):
+        if given is not None and not all(files):
+            raise InputError(f"{name}: only for a recording of the bus; columns need none")
+    how = dict(
+        manual=manual,
+        fix=fixed,
+        estimate=wanted,
+        between=[list(stretch) for stretch in between_s],
+        as_published=as_published,
+        max_gap=max_gap,
+        preprocessing=preprocessing,
+        lane_smoothing=lane_smoothing,
+        maps=[f"{name}={channel}" for name, channel in maps.items()],
+        dbc=None if dbc is None else os.fspath(dbc),
+        vehicle=vehicle,
+    )
+    given = [os.fspath(each) if file else _columns(each, maps) for each, file in zip(drives, files)]
+    made = _native.identify(given, how)
     parameters = {}
     for name, unit in made["units"].items():
         found = dict(made["results"]["parameters"][name])
@@ -170,6 +198,15 @@ def identify(
             name=name, unit=unit, interval_95=None if interval is None else tuple(interval), **found
         )
     return Fit(parameters, made["results"], made["traces"])
+
+
+def _columns(drive: Any, maps: Mapping[str, str]) -> dict[str, np.ndarray]:
+    """The columns of a run or of a mapping, those that are mapped beside them."""
+    table = drive.columns if isinstance(drive, Run) else drive
+    columns = {str(name): _column(name, table[name]) for name in table.keys()}
+    columns = {name: column for name, column in columns.items() if column is not None}
+    columns.update({name: _mapped(name, channel, columns) for name, channel in maps.items()})
+    return columns
 
 
 def _column(name: Any, values: Any) -> Optional[np.ndarray]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy as np
 
 from . import _native
-from ._errors import InputError, check_range
+from ._errors import InputError, check_range, unknown
 from ._native import Scenario
 from ._progress import Progress, telling
 
@@ -59,6 +59,8 @@ class Run:
     k_hg: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.columns:
+            raise unknown("columns of the run", name, self.columns)
         return self.columns[name]
 
     def __len__(self) -> int:

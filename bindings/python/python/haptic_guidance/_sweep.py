@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Optional, Union
 
@@ -108,16 +108,22 @@ def sweep(
         tell = progress if bar is None else lambda done, of: bar(1)
         if executor is None:
             with ThreadPoolExecutor(os.cpu_count()) as threads:
-                _drive_all(plan, todo, threads, out, in_flight, retries, tell or None)
+                submit = lambda text, number, attempt: threads.submit(plan.run_chunk, number)
+                try:
+                    _drive_all(plan, todo, submit, out, in_flight, retries, tell or None)
+                except BaseException:
+                    # Leaving the block waits for the threads.
+                    plan.stop()
+                    raise
         else:
-            _drive_all(plan, todo, executor, out, in_flight, retries, tell or None)
+            _drive_all(plan, todo, partial(executor.submit, _drive), out, in_flight, retries, tell or None)
     return SweepResult(out, plan.finish(out))
 
 
 def _drive_all(
     plan: Sweep,
     todo: list[int],
-    executor: Any,
+    submit: Callable[[str, int, int], Any],
     out: Path,
     in_flight: int,
     retries: int,
@@ -127,24 +133,29 @@ def _drive_all(
     left = {number: retries for number in todo}
     todo = todo[::-1]
     running: dict[Any, int] = {}
-    while todo or running:
-        while todo and len(running) < in_flight:
-            number = todo.pop()
-            running[executor.submit(_drive, text, number, left[number])] = number
-        for future in _wait(list(running)):
-            number = running.pop(future)
-            try:
-                chunk = future.result()
-            except ValueError:
-                # Bad input stays bad.
-                raise
-            except Exception:
-                left[number] -= 1
-                if left[number] < 0:
+    try:
+        while todo or running:
+            while todo and len(running) < in_flight:
+                number = todo.pop()
+                running[submit(text, number, left[number])] = number
+            for future in _wait(list(running)):
+                number = running.pop(future)
+                try:
+                    chunk = future.result()
+                except ValueError:
+                    # Bad input stays bad.
                     raise
-                todo.append(number)
-                continue
-            plan.put(out, number, chunk)
-            done += 1
-            if progress is not None:
-                progress(done, plan.chunks)
+                except Exception:
+                    left[number] -= 1
+                    if left[number] < 0:
+                        raise
+                    todo.append(number)
+                    continue
+                plan.put(out, number, chunk)
+                done += 1
+                if progress is not None:
+                    progress(done, plan.chunks)
+    finally:
+        # After an error or an interrupt nobody waits for these.
+        for future in running:
+            future.cancel()

@@ -48,10 +48,8 @@ REWARD: dict[str, float] = {"error": 1.0, "effort": 0.1, "conflict": 1.0, "off_r
 
 Drives = Union[Scenario, Callable[[np.random.Generator], Scenario], None]
 
-_CHANNELS = Simulations.channels()
-_SEEN = [_CHANNELS.index(name) for name in OBSERVATION]
 _HIGH = np.array(list(OBSERVATION.values()), dtype=np.float32)
-_INFO = {name: _CHANNELS.index(name) for name in ("time_s", "s_m", "lateral_error_m", "unguided_cause")}
+_TOLD = ("time_s", "s_m", "lateral_error_m", "unguided_cause")
 _TERMS = ("error", "effort", "conflict")
 # The arm of nobody: the torque on the wheel is the agent's.
 _SLACK = {"a_1": 0.0, "a_2": 0.0, "a_3": 0.0, "K_d": 0.0, "K_hg": 0.0, "K_nms": 0.0}
@@ -73,8 +71,9 @@ class _Loops:
         most: Optional[float] = None,
     ) -> None:
         self.count = count
-        self.loops = Simulations(count)
-        self.scenario = Scenario(**self.default) if scenario is None else scenario
+        # What is cut is cut to what the space holds.
+        self.loops = Simulations(count, list(zip(OBSERVATION, _HIGH.tolist())), list(_TOLD))
+        self.scenario = self.default if scenario is None else scenario
         if not (isinstance(self.scenario, Scenario) or callable(self.scenario)):
             raise InputError(f"scenario: a {type(scenario).__name__} is no Scenario and no function that makes one")
         if period_ms is not None:
@@ -87,7 +86,8 @@ class _Loops:
             raise InputError(f"reward: {', '.join(set(weights) - set(REWARD))} is none of {', '.join(REWARD)}")
         for name, weight in weights.items():
             check_range(f"reward.{name}", weight, 0.0, 1e9, "")
-        self.weights = np.array([weights[name] for name in _TERMS])
+        self.weights_of_one = [float(weights[name]) for name in _TERMS]
+        self.weights = np.array(self.weights_of_one)
         self.off_road = float(weights["off_road"])
         if most is not None:
             self.low, self.high = -most, most
@@ -95,7 +95,7 @@ class _Loops:
         self.observation_space = Box(-_HIGH, _HIGH, dtype=np.float32)
         self.slack: Optional[Scenario] = None
 
-    def begin(self, index: int, rng: np.random.Generator, options: Optional[Mapping[str, Any]]) -> np.ndarray:
+    def begin(self, index: int, rng: np.random.Generator, options: Optional[Mapping[str, Any]]):
         """Begins a drive: its scenario, and a seed that the generator draws."""
         scenario = (options or {}).get("scenario", self.scenario)
         if callable(scenario):
@@ -107,8 +107,22 @@ class _Loops:
     def prepared(self, scenario: Scenario) -> Scenario:
         return scenario
 
+    def step_one(self, action: Any):
+        """Moves the only one; what is seen and told, reward, how it ended, terms of the reward."""
+        array = np.asarray(action, dtype=np.float64)
+        if array.shape != (1,):
+            raise InputError(f"action: shape {array.shape} where (1,) is wanted")
+        value = array.item()
+        if not self.low <= value <= self.high:
+            check_range(self.field, value, self.low, self.high, self.unit)
+        hand, authority = (value, 1.0) if self.field == "hand_torque_nm" else (0.0, value)
+        seen, told, costs, ending = self.loops.step_one(0, hand, authority, self.period_ms)
+        error, effort, conflict = (cost * weight for cost, weight in zip(costs, self.weights_of_one))
+        reward = -(error + effort + conflict) * (self.period_ms * 1e-3) - self.off_road * (ending == 2)
+        return seen, told, reward, ending, costs
+
     def step(self, actions: Any, active: np.ndarray):
-        """Moves those that are active; what is seen, rewards, how they ended, terms of the reward."""
+        """Moves those that are active; what is seen and told, rewards, how they ended, terms of the reward."""
         actions = np.asarray(actions, dtype=np.float64)
         if actions.shape != (self.count, 1):
             raise InputError(f"action: shape {actions.shape} where {(self.count, 1)} is wanted")
@@ -117,18 +131,18 @@ class _Loops:
             check_range(self.field, value, self.low, self.high, self.unit)
         hands, authorities = np.zeros(self.count), np.ones(self.count)
         (hands if self.field == "hand_torque_nm" else authorities)[active] = actions[active, 0]
-        seen, costs, endings = self.loops.step(hands, authorities, active, self.period_ms)
-        # Added up in one order whatever the number of loops, so that one and many give the same bits.
+        seen, told, costs, endings = self.loops.step(hands, authorities, active, self.period_ms)
+        # Added up in the order of `step_one`, so that one and many give the same bits.
         error, effort, conflict = (costs * self.weights).T
         rewards = -(error + effort + conflict) * (self.period_ms * 1e-3) - self.off_road * (endings == 2)
-        return seen, rewards, endings, costs
-
-    def observations(self, seen: np.ndarray) -> np.ndarray:
-        return np.clip(seen[:, _SEEN], -_HIGH, _HIGH).astype(np.float32)
+        return seen, told, rewards, endings, costs
 
 
 class _Driver(_Loops):
-    default = {"condition": "mid"}
+    @staticmethod
+    def default(rng: np.random.Generator) -> Scenario:
+        return Scenario(condition="mid", speed=rng.uniform(50.0, 80.0))
+
     field, unit = "hand_torque_nm", "N.m"
 
     def prepared(self, scenario: Scenario) -> Scenario:
@@ -140,12 +154,12 @@ class _Driver(_Loops):
         return self.slack
 
 
-def _slack(scenario: Scenario) -> dict[str, float]:
+def _slack(scenario: Scenario) -> Any:
     return {name: value for name, value in _SLACK.items() if name != "K_hg" or scenario.condition != "manual"}
 
 
 class _Authority(_Loops):
-    default = {"condition": "mid", "driver": {"remnant_sd": 0.072}}
+    default = Scenario(condition="mid", driver={"remnant_sd": 0.072})
     period_ms = 100
     field, unit = "authority", ""
 
@@ -166,27 +180,23 @@ class _Env(gymnasium.Env):
         self.action_space, self.observation_space = loops.action_space, loops.observation_space
         self._ended: Optional[str] = "not begun"
 
-    def reset(self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None):
+    def reset(
+        self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin a drive. ``options={"scenario": ...}`` drives another one this once."""
         _check_options(options)
         super().reset(seed=seed)
-        seen = self._loops.begin(0, self.np_random, options)
+        seen, told = self._loops.begin(0, self.np_random, options)
         self._ended = None
-        return self._loops.observations(seen[None])[0], _info(seen)
+        return seen, dict(zip(_TOLD, told))
 
-    def step(self, action: Any):
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Drive on under an action for ``period_ms``."""
         if self._ended is not None:
             raise InputError(f"the drive has {self._ended}: reset() begins one")
-        seen, rewards, endings, costs = self._loops.step(np.asarray(action)[None], np.array([True]))
-        ending = int(endings[0])
+        seen, told, reward, ending, costs = self._loops.step_one(action)
         self._ended = (None, "ended", "left the road")[ending]
-        info = {**_info(seen[0]), **dict(zip(_TERMS, costs[0].tolist()))}
-        return self._loops.observations(seen)[0], float(rewards[0]), ending == 2, ending == 1, info
-
-
-def _info(seen: np.ndarray) -> dict[str, float]:
-    return {name: float(seen[place]) for name, place in _INFO.items()}
+        return seen, reward, ending == 2, ending == 1, dict(zip(_TOLD + _TERMS, told + costs))
 
 
 class _VectorEnv(VectorEnv):
@@ -204,7 +214,9 @@ class _VectorEnv(VectorEnv):
         self._over = np.zeros(self.num_envs, dtype=bool)
         self._begun = False
 
-    def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None, options: Optional[dict[str, Any]] = None):
+    def reset(
+        self, *, seed: Union[int, Sequence[Optional[int]], None] = None, options: Optional[dict[str, Any]] = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin all drives; loop ``i`` with ``seed + i``, as `gymnasium.make` with that seed begins."""
         _check_options(options)
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
@@ -214,29 +226,30 @@ class _VectorEnv(VectorEnv):
         for i, one in enumerate(seeds):
             if one is not None or self._generators[i] is None:
                 self._generators[i] = seeding.np_random(one)[0]
-        seen = np.stack([self._loops.begin(i, self._generators[i], options) for i in range(self.num_envs)])
+        begun = [self._loops.begin(i, self._generators[i], options) for i in range(self.num_envs)]
+        seen, told = (np.stack(each) for each in zip(*begun))
         self._over[:] = False
         self._begun = True
-        return self._loops.observations(seen), self._infos(seen, None, ~self._over)
+        return seen, self._infos(told, None, ~self._over)
 
-    def step(self, actions: Any):
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Drive all on; those that ended in the step before begin anew instead."""
         if not self._begun:
             raise InputError("the drives have not begun: reset() begins them")
         fresh = self._over
-        seen, rewards, endings, costs = self._loops.step(actions, ~fresh)
+        seen, told, rewards, endings, costs = self._loops.step(actions, ~fresh)
         for i in np.flatnonzero(fresh):
-            seen[i] = self._loops.begin(i, self._generators[i], None)
+            seen[i], told[i] = self._loops.begin(i, self._generators[i], None)
         rewards[fresh] = 0.0
         terminated, truncated = endings == 2, endings == 1
         self._over = terminated | truncated
-        return self._loops.observations(seen), rewards, terminated, truncated, self._infos(seen, costs, ~fresh)
+        return seen, rewards, terminated, truncated, self._infos(told, costs, ~fresh)
 
-    def _infos(self, seen: np.ndarray, costs: Optional[np.ndarray], moved: np.ndarray) -> dict[str, np.ndarray]:
+    def _infos(self, told: np.ndarray, costs: Optional[np.ndarray], moved: np.ndarray) -> dict[str, np.ndarray]:
         every = np.ones(self.num_envs, dtype=bool)
         infos: dict[str, np.ndarray] = {}
-        for name, place in _INFO.items():
-            infos[name], infos[f"_{name}"] = seen[:, place].copy(), every
+        for name, column in zip(_TOLD, told.T):
+            infos[name], infos[f"_{name}"] = column.copy(), every
         if costs is not None and moved.any():
             for name, column in zip(_TERMS, costs.T):
                 infos[name], infos[f"_{name}"] = column.copy(), moved
