@@ -47,4 +47,4 @@ mod wire;
 pub use invariants::Violation;
 pub use residual::Seen;
 pub use speed_change::SpeedChange;
-pub use trial::{Deviation, TrialOutcome, World};
+pub use trial::{Deviation, OFF_ROAD_M, TrialOutcome, World};

@@ -61,7 +61,7 @@ const NOTICES_MS: u32 = 1000;
 pub(crate) const MOST_EXCESS_M: f64 = 0.1;
 /// Who goes further aside than a lane is wide without any torque is thrown off the road whatever the ECU does: metres
 /// beyond that say nothing of a handover, and are not judged.
-const OFF_ROAD_M: f64 = 3.6;
+pub const OFF_ROAD_M: f64 = 3.6;
 /// From the middle of a lane of 3.6 m to where a vehicle of 1.7 m begins to leave it, m.
 const LANE_EDGE_M: f64 = 0.95;
 

@@ -71,7 +71,7 @@ fn readable(single: &SingleRun) -> String {
         record.t_p,
         record.condition,
         record.failure,
-        files::ended(single),
+        files::how_it_ended(single),
         results.course_length_m,
         files::table(results).to_text(),
     )

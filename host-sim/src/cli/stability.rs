@@ -50,10 +50,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.json {
         print_json(&files::stamped(&map))?;
     } else {
-        let table = files::table(&map).to_text();
         print(&format!(
-            "{}\n\n{table}\n{}\n{}",
+            "{}\n\n{}\n{}\n{}\n{}",
             files::SUMMARY,
+            files::growth_table(&map).to_text(),
+            files::peak_table(&map).to_text(),
             files::shares(&map).to_text(),
             files::judgement(&map)
         ))?;

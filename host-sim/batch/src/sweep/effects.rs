@@ -1,19 +1,37 @@
-//! How much each varied field matters by itself: the share of a metric's variance that lies between its levels.
+//! What each varied field does to the metrics: the share of a metric's variance that lies between its levels, the metric that
+//! judges by level, and which level is best.
+//!
+//! Drives of one sample are no independent observations: they share drawn values and seeds. So a sample counts once in an
+//! interval, with the mean of its drives; where nothing is drawn, a repeat does. What a list compares meets the same samples,
+//! and its values are compared sample by sample.
 
 use serde::Serialize;
 
-use super::{Driven, Point, SLICES, Sweep, value};
+use super::groups::{CONFIDENCE, Drives, Group, Moments, share_between, student};
+use super::summary::small_is_bad;
+use super::{Driven, Point, SLICES, Sweep, units, value};
 
 /// A list with more rows is cut into slices.
 const MOST_LEVELS: usize = 64;
+/// Most repeats that are told apart; of more, those with the same remainder are one observation.
+const MOST_REPEATS: u64 = 64;
+/// Means that differ by a smaller share of themselves are called equal, however certain the difference is.
+const SMALL: f64 = 0.01;
 
 /// What an axis does to the metrics.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Effect {
     /// Its first column.
     pub field: String,
+    /// Unit of its values, `-` if that is 1; none if the sweep gives the field a name or a factor of its own.
+    pub unit: Option<String>,
+    /// Whether the levels are slices of a distribution or of a long list, and not values.
+    pub sliced: bool,
     /// Its values, or the sixteenths of its distribution.
     pub levels: Vec<Level>,
+    /// Labels of the best level and of those that are not told apart from it: of the least share of drives beyond the limit,
+    /// if there is one, else of the best mean among those with the fewest diverged drives. Empty if no level is told apart from it.
+    pub best: Vec<String>,
     /// For each metric: the share of its variance that lies between the levels (epsilon squared, Kelley 1935: what
     /// chance alone would give is taken off); none if the metric does not vary.
     pub shares: Vec<(&'static str, Option<f64>)>,
@@ -26,12 +44,9 @@ pub struct Level {
     pub label: String,
     /// The same as a number, if it is one.
     pub x: Option<f64>,
-    /// Drives with it.
-    pub drives: u64,
-    /// Mean of the metric that judges.
-    pub mean: Option<f64>,
-    /// Share of the drives beyond the limit, if there is one.
-    pub beyond: Option<f64>,
+    /// What came of its drives.
+    #[serde(flatten)]
+    pub drives: Drives,
     /// The same for each value of the field that the sweep compares; of that field itself none.
     pub compared: Vec<Compared>,
 }
@@ -41,12 +56,9 @@ pub struct Level {
 pub struct Compared {
     /// The value.
     pub label: String,
-    /// Drives with it.
-    pub drives: u64,
-    /// Mean of the metric that judges.
-    pub mean: Option<f64>,
-    /// Share of the drives beyond the limit, if there is one.
-    pub beyond: Option<f64>,
+    /// What came of them.
+    #[serde(flatten)]
+    pub drives: Drives,
 }
 
 /// Effects on their way.
@@ -54,56 +66,36 @@ pub(super) struct Effects {
     axes: Vec<Axis>,
     metrics: Vec<&'static str>,
     has_limit: bool,
+    small_is_bad: bool,
     compare: Option<usize>,
     judge: usize,
+    repeats: u64,
+    /// Repeats that are observations of their own.
+    apart: u64,
+    /// The sample under way.
+    sample: u64,
 }
 
 struct Axis {
     field: String,
+    unit: Option<String>,
     /// Its first column among all.
     column: usize,
     rows: usize,
     exact: bool,
     levels: Vec<Sums>,
-}
-
-/// Welford's sums.
-#[derive(Debug, Clone, Copy, Default)]
-struct Moments {
-    count: u64,
-    mean: f64,
-    squares: f64,
+    /// By two levels, the lower one first: how much worse the first is in the same observation.
+    pairs: Vec<Moments>,
 }
 
 #[derive(Debug, Clone, Default)]
 struct Sums {
     label: Option<String>,
     x: Moments,
-    drives: u64,
-    beyond: u64,
     metrics: Vec<Moments>,
+    all: Group,
     /// By the level of the axis that is compared.
-    compared: Vec<Part>,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Part {
-    drives: u64,
-    beyond: u64,
-    judged: Moments,
-}
-
-impl Moments {
-    fn add(&mut self, value: f64) {
-        self.count += 1;
-        let before = value - self.mean;
-        self.mean += before / self.count as f64;
-        self.squares += before * (value - self.mean);
-    }
-
-    fn mean(&self) -> Option<f64> {
-        (self.count > 0).then_some(self.mean)
-    }
+    compared: Vec<Group>,
 }
 
 impl Effects {
@@ -116,23 +108,40 @@ impl Effects {
             column += axis.columns.len();
             Axis {
                 field: axis.columns[0].name.clone(),
+                unit: units::of(&axis.columns[0]),
                 column: first,
                 rows,
                 exact: of_list.is_some_and(|rows| rows <= MOST_LEVELS),
                 levels: Vec::new(),
+                pairs: vec![Moments::default(); MOST_LEVELS * MOST_LEVELS],
             }
         };
         Self {
             axes: sweep.axes().map(axis).collect(),
             metrics: sweep.metrics().iter().map(|d| d.name).collect(),
             has_limit: sweep.limit.is_some(),
+            small_is_bad: small_is_bad(sweep.judge()),
             compare: sweep.compare,
             judge,
+            repeats: sweep.repeats,
+            apart: if sweep.samples > 1 {
+                1
+            } else {
+                sweep.repeats.min(MOST_REPEATS)
+            },
+            sample: 0,
         }
     }
 
+    /// Drives come in the order of their numbers.
     pub(super) fn add(&mut self, point: &Point, driven: &Driven, is_beyond: bool) {
+        if point.sample != self.sample {
+            self.end_sample();
+            self.sample = point.sample;
+        }
         let metrics = self.metrics.len();
+        let repeat = (point.drive % self.repeats % self.apart) as usize;
+        let judged = driven.metrics[self.judge];
         let part = self.compare.map(|axis| point.levels[axis] as usize);
         for (axis, level) in self.axes.iter_mut().zip(&point.levels) {
             let level = *level as usize;
@@ -156,33 +165,48 @@ impl Effects {
             if let Some(x) = value::number(own) {
                 sums.x.add(x);
             }
-            sums.drives += 1;
-            sums.beyond += u64::from(is_beyond);
             for (moments, value) in sums.metrics.iter_mut().zip(&driven.metrics) {
                 if let Some(value) = value {
                     moments.add(*value);
                 }
             }
+            sums.all.add(repeat, driven, judged, is_beyond);
             if let Some(part) = part {
-                sums.add_to(part, is_beyond, driven.metrics[self.judge]);
+                if sums.compared.len() <= part {
+                    sums.compared.resize(part + 1, Group::default());
+                }
+                sums.compared[part].add(repeat, driven, judged, is_beyond);
             }
         }
     }
 
-    pub(super) fn finish(self) -> Vec<Effect> {
+    fn end_sample(&mut self) {
+        for axis in &mut self.axes {
+            for (i, first) in axis.levels.iter().enumerate() {
+                for (j, second) in axis.levels.iter().enumerate().skip(i + 1) {
+                    for ((_, a), (_, b)) in first.all.now.iter().zip(&second.all.now) {
+                        if let (Some(a), Some(b)) = (a.mean(), b.mean()) {
+                            axis.pairs[i * MOST_LEVELS + j].add(a - b);
+                        }
+                    }
+                }
+            }
+            for level in &mut axis.levels {
+                level.all.end_sample();
+                level.compared.iter_mut().for_each(Group::end_sample);
+            }
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Vec<Effect> {
+        self.end_sample();
         // What the compared values are called; each axis met the same ones.
         let labels: Vec<String> = self.compare.map_or_else(Vec::new, |compared| {
-            let levels = self.axes[compared].levels.iter();
-            levels
-                .map(|level| level.label.clone().unwrap_or_default())
-                .collect()
+            self.axes[compared].levels.iter().map(Sums::label).collect()
         });
-        let share = |part: u64, of: u64| (self.has_limit && of > 0).then(|| part as f64 / of as f64);
-        let compared = |(part, label): (&Part, &String)| Compared {
+        let compared = |(part, label): (&Group, &String)| Compared {
             label: label.clone(),
-            drives: part.drives,
-            mean: part.judged.mean(),
-            beyond: share(part.beyond, part.drives),
+            drives: part.finish(self.has_limit),
         };
         let effect = |(place, axis): (usize, &Axis)| {
             let labels = if self.compare == Some(place) {
@@ -193,24 +217,22 @@ impl Effects {
             let of_variance =
                 |metric: usize| share_between(axis.levels.iter().map(|level| level.metrics[metric]));
             let level = |level: &Sums| Level {
-                label: level
-                    .label
-                    .clone()
-                    .unwrap_or_else(|| format!("{:.4}", level.x.mean)),
+                label: level.label(),
                 x: level.x.mean(),
-                drives: level.drives,
-                mean: level.metrics[self.judge].mean(),
-                beyond: share(level.beyond, level.drives),
+                drives: level.all.finish(self.has_limit),
                 compared: level.compared.iter().zip(labels).map(compared).collect(),
             };
             Effect {
                 field: axis.field.clone(),
+                unit: axis.unit.clone(),
+                sliced: !axis.exact,
                 levels: axis
                     .levels
                     .iter()
-                    .filter(|level| level.drives > 0)
+                    .filter(|level| level.all.drives > 0)
                     .map(level)
                     .collect(),
+                best: axis.best(self.has_limit, self.small_is_bad),
                 shares: self
                     .metrics
                     .iter()
@@ -224,46 +246,88 @@ impl Effects {
 }
 
 impl Sums {
-    fn add_to(&mut self, part: usize, is_beyond: bool, judged: Option<f64>) {
-        if self.compared.len() <= part {
-            self.compared.resize(part + 1, Part::default());
-        }
-        let part = &mut self.compared[part];
-        part.drives += 1;
-        part.beyond += u64::from(is_beyond);
-        if let Some(value) = judged {
-            part.judged.add(value);
-        }
+    fn label(&self) -> String {
+        self.label
+            .clone()
+            .unwrap_or_else(|| format!("{:.4}", self.x.mean))
     }
 }
 
-/// Epsilon squared of groups: (SSB - (k - 1) MSW) / SST, not below zero.
-fn share_between(groups: impl Iterator<Item = Moments> + Clone) -> Option<f64> {
-    let groups = || groups.clone().filter(|group| group.count > 0);
-    let count: u64 = groups().map(|group| group.count).sum();
-    let k = groups().count() as u64;
-    if k < 2 || count <= k {
-        return None;
+impl Axis {
+    /// As [`Effect::best`] says.
+    fn best(&self, has_limit: bool, small_is_bad: bool) -> Vec<String> {
+        let driven: Vec<usize> = (0..self.levels.len())
+            .filter(|i| self.levels[*i].all.drives > 0)
+            .collect();
+        let lost = |i: usize| self.levels[i].all.diverged as f64 / self.levels[i].all.drives as f64;
+        let fewest = driven.iter().map(|i| lost(*i)).fold(f64::INFINITY, f64::min);
+        let badness = |i: &usize| {
+            let all = &self.levels[*i].all;
+            match (has_limit, small_is_bad) {
+                (true, _) => Some(all.beyond as f64 / all.drives as f64),
+                // The metrics of a drive that diverged end there: a level looks better by them than it is.
+                _ if lost(*i) > fewest => None,
+                (false, true) => Some(-all.judged.mean()?),
+                (false, false) => all.judged.mean(),
+            }
+        };
+        let judged: Vec<(usize, f64)> = driven.iter().filter_map(|i| Some((*i, badness(i)?))).collect();
+        let Some((least, _)) = judged.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return Vec::new();
+        };
+        // Each of the others might seem different by chance.
+        let certainty = 1.0 - (1.0 - CONFIDENCE) / (2.0 * (driven.len() as f64 - 1.0).max(1.0));
+        let apart = |i: usize| {
+            if has_limit {
+                self.shares_differ(i, least)
+            } else {
+                self.means_differ(i, least, certainty)
+            }
+        };
+        let alike: Vec<usize> = judged
+            .into_iter()
+            .map(|(i, _)| i)
+            .filter(|i| *i == least || !apart(*i))
+            .collect();
+        if alike.len() == driven.len() {
+            return Vec::new();
+        }
+        alike.into_iter().map(|i| self.levels[i].label()).collect()
     }
-    let mean = groups().map(|group| group.count as f64 * group.mean).sum::<f64>() / count as f64;
-    let between: f64 = groups()
-        .map(|group| group.count as f64 * (group.mean - mean).powi(2))
-        .sum();
-    let within: f64 = groups().map(|group| group.squares).sum();
-    let total = between + within;
-    let by_chance = (k - 1) as f64 * within / (count - k) as f64;
-    (total > 0.0).then(|| ((between - by_chance) / total).max(0.0))
+
+    /// Whether the intervals of two shares lie apart.
+    fn shares_differ(&self, i: usize, j: usize) -> bool {
+        let [i, j] = [i, j].map(|level| self.levels[level].all.finish(true).beyond_interval);
+        i.zip(j)
+            .is_some_and(|([low, high], [other_low, other_high])| low > other_high || other_low > high)
+    }
+
+    /// Whether two means are told apart: in the observations that both levels have, if there are two; else by what each has
+    /// of its own (Welch). A single observation is all there is where nothing is drawn.
+    fn means_differ(&self, i: usize, j: usize, certainty: f64) -> bool {
+        let own = [i, j].map(|level| self.levels[level].all.observed);
+        let pair = &self.pairs[i.min(j) * MOST_LEVELS + i.max(j)];
+        let (difference, half) = match (pair.count, pair.of_mean(), own.map(|own| own.of_mean())) {
+            (_, Some((variance, free)), _) => (pair.mean, student(certainty, free) * variance.sqrt()),
+            (0, _, [Some((a, free_a)), Some((b, free_b))]) => {
+                let free = (a + b).powi(2) / (a * a / free_a + b * b / free_b);
+                let half = if a + b > 0.0 {
+                    student(certainty, free) * (a + b).sqrt()
+                } else {
+                    0.0
+                };
+                (own[0].mean - own[1].mean, half)
+            }
+            (1, ..) if own.iter().all(|own| own.count == 1) => (pair.mean, 0.0),
+            _ => return false,
+        };
+        difference.abs() > half.max(SMALL * own[0].mean.abs().max(own[1].mean.abs()))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn group(values: &[f64]) -> Moments {
-        let mut moments = Moments::default();
-        values.iter().for_each(|value| moments.add(*value));
-        moments
-    }
 
     /// Counted again from the rows of the table.
     #[test]
@@ -295,9 +359,9 @@ mod tests {
                     .collect();
                 let bad = peaks.iter().filter(|peak| **peak > 0.3).count();
                 beyond += bad;
-                assert_eq!((own.drives, peaks.len()), (20, 20));
-                assert_eq!(own.beyond, Some(bad as f64 / 20.0));
-                assert!((own.mean.unwrap() - peaks.iter().sum::<f64>() / 20.0).abs() < 1e-12);
+                assert_eq!((own.drives.count, peaks.len()), (20, 20));
+                assert_eq!(own.drives.beyond, Some(bad as f64 / 20.0));
+                assert!((own.drives.mean.unwrap() - peaks.iter().sum::<f64>() / 20.0).abs() < 1e-12);
             }
         }
         assert!((1..80).contains(&beyond), "{beyond}");
@@ -311,24 +375,113 @@ mod tests {
         let drives = slices
             .iter()
             .flat_map(|level| &level.compared)
-            .map(|own| own.drives);
+            .map(|own| own.drives.count);
         assert_eq!(drives.sum::<u64>(), 80);
     }
 
-    /// By hand: groups 1,2,3 and 4,5,6. SSB 13.5, SSW 4, MSW 1, SST 17.5: (13.5 - 1) / 17.5.
+    /// Effects of a sweep whose drives have these peaks; none: it diverged.
+    fn effects_of(text: &str, vary: &str, peak: impl Fn(&Point) -> Option<f64>) -> Vec<Effect> {
+        let text = format!("metrics = [\"peak_lateral_error_m\"]\n{text}");
+        let sweep = crate::sweep::tests::with_road(&text, vary);
+        let mut effects = Effects::new(&sweep, 0);
+        for drive in 0..sweep.drives() {
+            let point = sweep.point(drive);
+            let peak = peak(&point);
+            let driven = Driven {
+                diverged: peak.is_none(),
+                end_m: 0.0,
+                away: Default::default(),
+                metrics: vec![peak],
+            };
+            let is_beyond = sweep
+                .limit
+                .is_some_and(|limit| peak.is_none_or(|peak| peak > limit));
+            effects.add(&point, &driven, is_beyond);
+        }
+        effects.finish()
+    }
+
+    const TWO_FIELDS: &str = "[vary]\nspeed = [50, 60, 80]\n\"driver.t_p\" = { uniform = [0.1, 0.4] }\n";
+
+    /// What every sample shares is no doubt about a list's values: means of 1.0, 0.9 and 1.1 with a spread of 1 between samples
+    /// are told apart as soon as the difference is the same in each sample. Of 20 samples with peaks 0, 2, 0, 2 ... the interval
+    /// is 2.093 times sqrt(1.0526 / 20), Student's quantile of 19 degrees.
     #[test]
-    fn the_share_is_that_of_a_table_by_hand() {
-        let groups = [group(&[1.0, 2.0, 3.0]), group(&[4.0, 5.0, 6.0])];
-        let share = share_between(groups.into_iter()).unwrap();
-        assert!((share - 12.5 / 17.5).abs() < 1e-12, "{share}");
-        // Levels without a difference explain nothing, and a metric that does not vary has no share.
+    fn values_are_compared_sample_by_sample() {
+        let base = |point: &Point| 2.0 * (point.sample % 2) as f64;
+        let better = [0.1, 0.0, 0.2];
+        let found = effects_of("samples = 20\n", TWO_FIELDS, |point| {
+            Some(base(point) + better[point.levels[0] as usize])
+        });
+        let speed = &found[0];
         assert_eq!(
-            share_between([group(&[1.0, 3.0]), group(&[3.0, 1.0])].into_iter()),
-            Some(0.0)
+            (speed.best.as_slice(), speed.unit.as_deref()),
+            (&["60".to_string()][..], Some("km/h"))
         );
+        let drives = &speed.levels[1].drives;
+        let [low, high] = drives.interval.unwrap();
+        let half = 2.093_02 * (1.052_63_f64 / 20.0).sqrt();
+        assert!(
+            (low - (1.0 - half)).abs() < 1e-4 && (high - (1.0 + half)).abs() < 1e-4,
+            "{low} {high}"
+        );
+        assert!(
+            found[1].sliced && found[1].best.is_empty(),
+            "the delay does nothing here"
+        );
+        // Nothing differs: nothing is best. Nor is a difference of half a percent, however sure.
+        for small in [0.0, 0.005] {
+            let alike = effects_of("samples = 20\n", TWO_FIELDS, |point| {
+                Some(base(point) + small * f64::from(point.levels[0]) / 2.0)
+            });
+            assert!(alike[0].best.is_empty(), "{:?}", alike[0].best);
+        }
+        // A difference that comes and goes with the samples is chance.
+        let noisy = effects_of("samples = 20\n", TWO_FIELDS, |point| {
+            let sign = if (point.sample / 2 + u64::from(point.levels[0])).is_multiple_of(2) {
+                1.0
+            } else {
+                -1.0
+            };
+            Some(1.0 + 0.5 * sign)
+        });
+        assert!(noisy[0].best.is_empty(), "{:?}", noisy[0].best);
+    }
+
+    #[test]
+    fn a_level_whose_drives_diverge_is_not_the_best() {
+        let found = effects_of("samples = 20\n", TWO_FIELDS, |point| match point.levels[0] {
+            0 => (point.sample > 0).then_some(0.1),
+            1 => Some(0.5),
+            _ => Some(0.7),
+        });
         assert_eq!(
-            share_between([group(&[1.0, 1.0]), group(&[1.0, 1.0])].into_iter()),
-            None
+            (found[0].best.as_slice(), found[0].levels[0].drives.diverged),
+            (&["60".to_string()][..], 1)
         );
+    }
+
+    /// Where nothing is drawn each mean is all there is; where there is a limit, its share counts: 1 of 20 against 12 and 20.
+    #[test]
+    fn lists_alone_and_limits_are_judged_too() {
+        let lists = effects_of(
+            "",
+            "[vary]\nspeed = [50, 60]\n\"driver.t_p\" = [0.1, 0.2]\n",
+            |point| Some(1.0 + 0.1 * f64::from(point.levels[1])),
+        );
+        assert_eq!(lists[0].field, "driver.t_p");
+        let best: Vec<_> = lists.iter().map(|effect| effect.best.clone()).collect();
+        assert_eq!(best, [Vec::<String>::new(), vec!["50".into()]]);
+        assert_eq!(lists[1].levels[0].drives.interval, None);
+        let limited = effects_of("samples = 20\nlimit = 0.3\n", TWO_FIELDS, |point| {
+            let bad = point.sample < [1, 12, 20][point.levels[0] as usize];
+            Some(if bad {
+                0.4
+            } else {
+                0.2 - 0.01 * f64::from(point.levels[0])
+            })
+        });
+        assert_eq!(limited[0].best, ["50"]);
+        assert_eq!(limited[0].levels[1].drives.beyond, Some(0.6));
     }
 }

@@ -17,6 +17,7 @@ mod design;
 mod drive;
 mod effects;
 mod file;
+mod groups;
 mod lanes;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -30,6 +31,7 @@ mod summary;
 mod table;
 #[cfg(test)]
 mod tests;
+mod units;
 mod value;
 mod vary;
 
@@ -37,6 +39,7 @@ pub use chunk::Chunk;
 pub use drive::Driven;
 pub use effects::{Compared, Effect, Level};
 pub use file::{Design, Stop};
+pub use groups::Drives;
 pub use run::{Progress, Shard, drive_all};
 pub use saltelli::SobolIndex;
 pub use store::{Store, StoreError};

@@ -107,7 +107,7 @@ pub(super) struct Summarised<'a> {
 }
 
 /// Whether a small value of a metric is the bad one.
-fn small_is_bad(metric: &Definition) -> bool {
+pub(super) fn small_is_bad(metric: &Definition) -> bool {
     metric.name.ends_with("time_to_lane_crossing_s")
 }
 

@@ -46,7 +46,7 @@
     };
   }
 
-  // Stems to zero, and the intervals of single points.
+  // Stems and bounds from zero, the intervals of single points, and crosses where lines end.
   function uprights(panel) {
     return (u) => {
       const { left, top, width, height } = u.bbox;
@@ -57,13 +57,26 @@
       c.clip();
       c.lineWidth = 1.2 * devicePixelRatio;
       for (const series of panel.series) {
-        const ends = series.mark === "stems" ? series.y.map((y) => [0, y]) : series.ends || [];
+        const fromZero = series.mark === "stems" || series.mark === "bounds";
+        const ends = fromZero ? series.y.map((y) => [0, y]) : series.ends || [];
         c.strokeStyle = series.colour;
+        c.setLineDash(series.mark === "bounds" ? [2 * devicePixelRatio, 2 * devicePixelRatio] : []);
         ends.forEach(([low, high], i) => {
           const x = u.valToPos(series.x[i], "x", true);
           c.beginPath();
           c.moveTo(x, u.valToPos(low, "y", true));
           c.lineTo(x, u.valToPos(high, "y", true));
+          c.stroke();
+        });
+        if (series.mark !== "ends") continue;
+        const half = 5 * devicePixelRatio;
+        series.x.forEach((place, i) => {
+          const [x, y] = [u.valToPos(place, "x", true), u.valToPos(series.y[i], "y", true)];
+          c.beginPath();
+          c.moveTo(x - half, y - half);
+          c.lineTo(x + half, y + half);
+          c.moveTo(x - half, y + half);
+          c.lineTo(x + half, y - half);
           c.stroke();
         });
       }
@@ -82,9 +95,26 @@
     return (u, v) => (v == null ? "–" : String(Number(v.toPrecision(digits))));
   }
 
-  function look(series, index) {
-    const points = series.mark !== "line" && series.mark !== "interval";
-    const label = series.label || "value";
+  // What stands before a name: the line with its dashes, the dot, the cross, the area.
+  function swatch(series) {
+    const dots = ["dots", "whiskers", "stems", "bounds"].includes(series.mark);
+    const stroke = `fill="none" stroke="${series.colour}" stroke-width="${series.width}"`;
+    let drawn = "";
+    if (series.mark === "line" || series.joined) {
+      drawn += `<path d="M0 6H40" ${stroke} stroke-dasharray="${series.dash.join(" ")}"/>`;
+    }
+    if (dots) drawn += `<circle cx="20" cy="6" r="3.5" fill="${series.colour}"/>`;
+    if (series.mark === "ends") drawn += `<path d="M15 1L25 11M15 11L25 1" ${stroke}/>`;
+    if (series.mark === "interval") {
+      drawn += `<rect x="10" width="20" height="12" fill="${series.colour}" fill-opacity="0.25"/>`;
+    }
+    return `<svg class="swatch" width="40" height="12">${drawn}</svg>`;
+  }
+
+  function look(series, index, unnamed) {
+    const points = !["line", "interval", "ends"].includes(series.mark);
+    const label = series.label || unnamed;
+    const lines = series.mark === "line" || series.joined;
     if (series.mark === "interval") {
       return {
         label: label + (index ? ", to" : ", from"),
@@ -97,10 +127,9 @@
     return {
       label,
       stroke: series.colour,
-      width: points ? 0 : series.width,
-      fill: points ? series.colour : undefined,
+      width: lines ? series.width : 0,
       dash: series.dash.length ? series.dash : undefined,
-      paths: points ? () => null : undefined,
+      paths: lines ? undefined : () => null,
       points: points ? { show: true, size: 7, fill: series.colour, width: 0 } : { show: false },
       value: read(5),
     };
@@ -115,7 +144,7 @@
       if (series.mark === "interval") {
         areas.push({ series: [shown.length + 1, shown.length], fill: pale(series.colour, 0.25) });
       }
-      columns(series).forEach((_, i) => shown.push(look(series, i)));
+      columns(series).forEach((_, i) => shown.push(look(series, i, panel.label)));
     }
     const whole = figure.limits;
     const options = {
@@ -123,6 +152,7 @@
       height: HEIGHT,
       title: panel.title || undefined,
       series: shown,
+      legend: { markers: { show: false } },
       bands: areas,
       pxAlign: 0,
       scales: {
@@ -161,6 +191,16 @@
       },
     };
     const made = new uPlot(options, data, place);
+    const names = made.root.querySelectorAll(".u-legend .u-series th");
+    const swatches = panel.series.flatMap((series) => columns(series).map(() => swatch(series)));
+    swatches.forEach((drawn, i) => names[i + 1].insertAdjacentHTML("afterbegin", drawn));
+    // Why lines end is said once.
+    const said = new Set();
+    panel.series.flatMap((series) => columns(series).map(() => series)).forEach((series, i) => {
+      if (series.mark !== "ends") return;
+      if (said.has(series.label)) names[i + 1].closest(".u-series").style.display = "none";
+      said.add(series.label);
+    });
     // The whole stretch again, not only as far as this panel's data reach.
     made.over.addEventListener("dblclick", () => made.setScale("x", { min: whole[0], max: whole[1] }));
     siblings.push(made);

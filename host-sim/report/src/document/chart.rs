@@ -27,9 +27,10 @@ pub(super) fn script_hash() -> &'static str {
     HASH.get_or_init(|| format!("sha256-{}", STANDARD.encode(Sha256::digest(SCRIPT))))
 }
 
-/// The figure's data as JSON that can stand in a page; none for a figure of rows, whose drawing says it all.
+/// The figure's data as JSON that can stand in a page; none for a figure of rows and for a map, whose drawing says it all.
 pub(super) fn data(figure: &Figure) -> Option<String> {
-    if !figure.rows.is_empty() || figure.panels.is_empty() {
+    let is_map = figure.has(|mark| matches!(mark, Mark::Fields { .. }));
+    if !figure.rows.is_empty() || figure.panels.is_empty() || is_map {
         return None;
     }
     let x_limits = figure.x_limits();
@@ -70,11 +71,14 @@ fn series(series: &Series, (left, right): (f64, f64)) -> Value {
         "colour": colour(series.style),
         "dash": dash(series.style),
         "width": width(series.style),
+        "joined": series.joined,
     });
     let (mark, mut points) = match &series.mark {
         Mark::Line => ("line", thinned(&series.points, inside)),
-        Mark::Dots => ("dots", series.points.clone()),
+        Mark::Dots | Mark::Fields { .. } => ("dots", series.points.clone()),
         Mark::Stems => ("stems", series.points.clone()),
+        Mark::Bounds => ("bounds", series.points.clone()),
+        Mark::Ends => ("ends", series.points.clone()),
         Mark::Whiskers(ends) => {
             value["ends"] = ends.iter().map(|ends| json!(ends.map(rounded))).collect();
             ("whiskers", series.points.clone())
@@ -129,11 +133,7 @@ mod tests {
         let points = vec![(0.0, 0.123_456_789), (1.0, f64::NAN), (2.0, -4.0), (9.0, 5.0)];
         let whiskers = Mark::Whiskers(vec![[0.5, 1.5]]);
         let figure = Figure {
-            x: Axis {
-                label: "s".into(),
-                limits: Some((0.0, 3.0)),
-                ..Axis::default()
-            },
+            x: Axis::of("Distance", "m").within(0.0, 3.0),
             panels: vec![Panel {
                 series: vec![
                     Series::line("a", 1, points),

@@ -7,7 +7,7 @@
 
 use haptic_log::Event;
 
-use super::{Block, Cell, Provenance, Report, Section, Table, chart};
+use super::{Block, Cell, Provenance, Report, Section, Table, chart, signed};
 use crate::plot::{Figure, PlotError};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -81,11 +81,16 @@ fn block(id: &str, block: &Block) -> Result<Markup, PlotError> {
 
 fn figure(id: &str, figure: &Figure, caption: &str) -> Result<Markup, PlotError> {
     // Names of clip paths have to differ from those of the page's other drawings.
-    let svg = figure.to_svg()?.replace("kuva-clip-", &format!("clip-{id}-"));
+    let drawing = |(number, piece): (usize, Figure)| {
+        let named = format!("clip-{id}-{number}-");
+        Ok(piece.to_svg()?.replace("kuva-clip-", &named))
+    };
+    let drawings = figure.pages().into_iter().enumerate().map(drawing);
+    let drawings = drawings.collect::<Result<Vec<String>, PlotError>>()?;
     let data = chart::data(figure);
     Ok(html! {
         figure {
-            (PreEscaped(svg))
+            @for svg in drawings { (PreEscaped(svg)) }
             figcaption {
                 (caption)
                 @if data.is_some() { span.hint { " Drag to zoom, double-click to see all again." } }
@@ -114,7 +119,7 @@ fn table(table: &Table) -> Markup {
     let is_number = |column: usize| {
         matches!(
             table.rows.first().and_then(|r| r.get(column)),
-            Some(Cell::Number { .. })
+            Some(Cell::Number { .. } | Cell::Signed(_))
         )
     };
     html! {
@@ -141,6 +146,7 @@ fn cell(cell: &Cell) -> Markup {
         // Names of conditions stay on one line, sentences break.
         Cell::Text(text) => html! { td.short[text.chars().count() <= 20] { (text) } },
         Cell::Number { value, decimals } => html! { td.number { (number(*value, *decimals)) } },
+        Cell::Signed(value) => html! { td.number { (signed(*value)) } },
     }
 }
 

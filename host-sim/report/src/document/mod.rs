@@ -104,6 +104,8 @@ pub enum Cell {
         /// Digits after the point.
         decimals: usize,
     },
+    /// A number whose sign is what it says ([`signed`]).
+    Signed(f64),
 }
 
 impl Cell {
@@ -113,6 +115,16 @@ impl Cell {
             value: Some(value),
             decimals,
         }
+    }
+}
+
+/// A number with its sign, and with as many digits as tell it from zero: three behind the point at least.
+pub fn signed(value: f64) -> String {
+    let enough = (3..18).find(|decimals| value.abs() >= 0.5 * 0.1_f64.powi(*decimals));
+    match enough {
+        Some(decimals) => format!("{value:+.0$}", decimals as usize),
+        None if value.is_nan() => "\u{2013}".into(),
+        None => "0".into(),
     }
 }
 

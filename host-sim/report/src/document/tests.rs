@@ -124,12 +124,30 @@ fn a_number_that_is_none_is_a_dash() {
 }
 
 #[test]
-fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
-    let x = Axis {
-        label: "x".into(),
-        limits: Some((1.0, 0.0)),
-        ..Axis::default()
+fn a_sign_can_be_read_off_a_number_however_small() {
+    for (value, written) in [
+        (-0.0614, "-0.061"),
+        (0.0004, "+0.0004"),
+        (-0.000_04, "-0.00004"),
+        (12.0, "+12.000"),
+        (0.0, "0"),
+        (-0.0, "0"),
+        (f64::NAN, "\u{2013}"),
+    ] {
+        assert_eq!(signed(value), written);
+    }
+    let table = Table {
+        columns: vec!["Growth".into()],
+        rows: vec![vec![Cell::Signed(-0.0004)]],
+        ..Table::default()
     };
+    assert!(table.to_text().ends_with("-0.0004\n"));
+    assert!(report_of(vec![Block::Table(table)]).contains("<td class=\"number\">-0.0004</td>"));
+}
+
+#[test]
+fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
+    let x = Axis::of("x", "m").within(1.0, 0.0);
     let figure = Figure {
         title: "Figure 8".into(),
         x,

@@ -1,6 +1,6 @@
 //! A table for a terminal: columns as wide as their widest cell, long headings on several lines.
 
-use super::{Cell, Table, html};
+use super::{Cell, Table, html, signed};
 
 /// A heading may be as wide as this, or as its column's widest cell.
 const HEADING: usize = 11;
@@ -62,6 +62,7 @@ impl Column {
 fn words(cell: &Cell) -> String {
     match cell {
         Cell::Text(text) => text.clone(),
+        Cell::Signed(value) => signed(*value),
         Cell::Number { value, decimals } => match value.filter(|v| v.is_finite()) {
             None => "-".into(),
             some => html::number(some, *decimals),

@@ -1,15 +1,20 @@
 //! One panel: where it lies, what its axes show, and its series as the drawing library wants them.
 
 use kuva::plot::annotations::{ReferenceLine, ShadedRegion};
-use kuva::plot::{BandPlot, LinePlot, LineStyle, LollipopPlot, ScatterPlot};
+use kuva::plot::scatter::MarkerShape;
+use kuva::plot::{BandPlot, LinePlot, LineStyle, ScatterPlot};
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
+use kuva::render::render::{Primitive, TextAnchor};
 
-use super::draw::{INTERVAL_OPACITY, LEFT, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, STEM_DOT, TEXT_SIZE, names_room};
+use super::draw::{LEFT, LETTER, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, TEXT_SIZE, names_room, text};
+use super::style::Style;
 use super::{Figure, Mark, Panel, Series, polyline, style};
 
 /// Height of a row of names.
 const ROW_HEIGHT: f64 = 15.0;
+/// Height of a row of fields.
+const FIELD_HEIGHT: f64 = 24.0;
 /// Below a panel with and without tick labels and axis label, and above one with and without title.
 const AXIS_ROOM: f64 = 52.0;
 const GAP: f64 = 8.0;
@@ -29,6 +34,12 @@ const MOST_AREA_POINTS: usize = 600;
 /// A whole axis no longer than this has a tick at every number.
 const MOST_WHOLE_TICKS: f64 = 20.0;
 const STEM_WIDTH: f64 = 1.2;
+const STEM_DOT: f64 = 2.2;
+/// Half the length of the stroke at a bound, in rows.
+const BOUND: f64 = 0.3;
+const MARKER_WIDTH: f64 = 1.5;
+const DOTTED: &str = "2 2";
+pub(super) const INTERVAL_OPACITY: f64 = 0.25;
 
 /// Where a panel lies and what its axes show.
 pub(super) struct Frame<'a> {
@@ -41,10 +52,10 @@ pub(super) struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     pub(super) fn new(figure: &'a Figure, index: usize, y_limits: (f64, f64)) -> Self {
-        let plot = if figure.rows.is_empty() {
-            PANEL_HEIGHT
-        } else {
-            ROW_HEIGHT * figure.rows.len() as f64
+        let plot = match figure.panels[index].fields() {
+            Some([_, height]) => FIELD_HEIGHT * ((y_limits.1 - y_limits.0) / height).round(),
+            None if figure.rows.is_empty() => PANEL_HEIGHT,
+            None => ROW_HEIGHT * figure.rows.len() as f64,
         };
         let mut frame = Frame {
             figure,
@@ -76,6 +87,14 @@ impl<'a> Frame<'a> {
         if titled { TITLE_ROOM } else { GAP }
     }
 
+    fn left(&self) -> f64 {
+        match (self.lies(), self.index) {
+            (true, 0) => names_room(self.figure),
+            (true, _) => RIGHT,
+            (false, _) => LEFT,
+        }
+    }
+
     fn below(&self) -> f64 {
         if self.has_x_axis() { AXIS_ROOM } else { GAP }
     }
@@ -86,18 +105,13 @@ impl<'a> Frame<'a> {
         } else {
             (self.x_limits, self.y_limits)
         };
-        let left = match (self.lies(), self.index) {
-            (true, 0) => names_room(self.figure),
-            (true, _) => RIGHT,
-            (false, _) => LEFT,
-        };
         let mut layout = Layout::new(across, up)
             .with_clamp_axis()
             .with_x_axis_min(across.0)
             .with_x_axis_max(across.1)
             .with_y_axis_min(up.0)
             .with_y_axis_max(up.1)
-            .with_force_margins(left, RIGHT)
+            .with_force_margins(self.left(), RIGHT)
             .with_force_margins_y(self.above(), self.below())
             .with_box_axes()
             .with_title_size(TEXT_SIZE)
@@ -115,6 +129,12 @@ impl<'a> Frame<'a> {
             return layout;
         }
         layout = layout.with_y_label(&panel.y.label);
+        if let Some([width, height]) = panel.fields() {
+            layout = layout
+                .with_x_tick_step(width)
+                .with_y_tick_step(height)
+                .with_show_grid(false);
+        }
         if self.figure.x.whole && across.1 - across.0 <= MOST_WHOLE_TICKS {
             layout = layout.with_x_tick_step(1.0);
         }
@@ -141,7 +161,7 @@ impl<'a> Frame<'a> {
             .filter(|m| m.x >= across.0 && m.x <= across.1)
         {
             let line = ReferenceLine::vertical(marker.x).with_color(style::MARKER);
-            layout = layout.with_reference_line(line.with_dasharray("2 2").with_stroke_width(1.5));
+            layout = layout.with_reference_line(line.with_dasharray(DOTTED).with_stroke_width(MARKER_WIDTH));
         }
         layout
     }
@@ -162,10 +182,19 @@ impl<'a> Frame<'a> {
 
     fn plots_of(&self, series: &Series) -> Vec<Plot> {
         let style = style::of(series.style);
-        match &series.mark {
-            Mark::Line if self.lies() => vec![line(self.places(series), style, style.dash, style.width)],
+        let places = self.places(series);
+        let from_zero = || -> Vec<_> {
+            let foot = |(x, y): (f64, f64)| if self.lies() { (0.0, y) } else { (x, 0.0) };
+            places.iter().map(|place| [foot(*place), *place]).collect()
+        };
+        let mut plots = match series.mark {
             Mark::Line => self.lines(series),
-            Mark::Dots => vec![self.dots(style).with_data(self.places(series)).into()],
+            _ if series.joined => self.lines(series),
+            _ => Vec::new(),
+        };
+        plots.extend(match &series.mark {
+            Mark::Line => Vec::new(),
+            Mark::Dots => vec![dots(style).with_data(places).into()],
             Mark::Whiskers(ends) => {
                 let whole = series
                     .points
@@ -173,34 +202,11 @@ impl<'a> Frame<'a> {
                     .zip(ends)
                     .filter(|(p, _)| p.0.is_finite() && p.1.is_finite());
                 let arms = whole.map(|(p, [low, high])| (p.1 - low, high - p.1));
-                let dots = self.dots(style).with_data(self.places(series));
-                vec![
-                    if self.lies() {
-                        dots.with_x_err_asymmetric(arms)
-                    } else {
-                        dots.with_y_err_asymmetric(arms)
-                    }
-                    .into(),
-                ]
+                vec![whiskers(style, self.lies(), &places, arms)]
             }
-            Mark::Stems if self.lies() => {
-                let places = self.places(series);
-                let stem = |(x, y): &(f64, f64)| line(vec![(0.0, *y), (*x, *y)], style, "", STEM_WIDTH);
-                let dots = ScatterPlot::new().with_color(style.colour).with_size(STEM_DOT);
-                places
-                    .iter()
-                    .map(stem)
-                    .chain([dots.with_data(places.clone()).into()])
-                    .collect()
-            }
-            Mark::Stems => {
-                let stems = LollipopPlot::new()
-                    .with_points(self.places(series))
-                    .with_color(style.colour);
-                vec![Plot::Lollipop(
-                    stems.with_dot_radius(STEM_DOT).with_stem_width(STEM_WIDTH),
-                )]
-            }
+            Mark::Stems => stems(style, &from_zero()),
+            Mark::Bounds => bounds(style, &from_zero(), BOUND),
+            Mark::Ends => vec![ends(style).with_data(places).into()],
             Mark::Interval(upper) => polyline::pieces(&series.points, upper)
                 .into_iter()
                 .map(|piece| {
@@ -210,14 +216,63 @@ impl<'a> Frame<'a> {
                     Plot::Band(band.with_opacity(INTERVAL_OPACITY))
                 })
                 .collect(),
-        }
+            Mark::Fields {
+                size: [width, height],
+                shown,
+            } => {
+                let field = |((x, y), (strength, _)): (&(f64, f64), &(f64, String))| {
+                    let (x, y) = (
+                        [x - 0.5 * width, x + 0.5 * width],
+                        [y - 0.5 * height, y + 0.5 * height],
+                    );
+                    let band = BandPlot::new(x, [y[0]; 2], [y[1]; 2]).with_color(style.colour);
+                    Plot::Band(band.with_opacity(*strength))
+                };
+                series.points.iter().zip(shown).map(field).collect()
+            }
+        });
+        plots
     }
 
-    fn dots(&self, style: &style::Style) -> ScatterPlot {
-        ScatterPlot::new()
-            .with_color(style.colour)
-            .with_marker(style.marker)
-            .with_size(3.6)
+    /// What stands in words upon the panel, whose cell has its upper left corner at `[x, y]` and this width: the fields of a
+    /// map, and in a figure that lies what is beyond its limits.
+    pub(super) fn words(&self, panel: &Panel, [x, y]: [f64; 2], width: f64) -> Vec<Primitive> {
+        let (left, right) = (x + self.left(), x + width - RIGHT);
+        let (top, bottom) = (y + self.above(), y + self.height - self.below());
+        let share = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low);
+        let mut words = Vec::new();
+        // What is beyond in a row stands side by side.
+        let mut beyond = vec![right - 4.0; self.figure.rows.len()];
+        for series in &panel.series {
+            if let Mark::Fields { shown, .. } = &series.mark {
+                words.extend(series.points.iter().zip(shown).map(|((x, y), (_, word))| {
+                    let x = left + share(*x, self.x_limits) * (right - left);
+                    let y = bottom - share(*y, self.y_limits) * (bottom - top);
+                    text(x, y, word, TICK_TEXT_SIZE, TextAnchor::Middle, "#000000")
+                }));
+            }
+            let far = series
+                .points
+                .iter()
+                .filter(|p| self.lies() && p.1 > self.y_limits.1);
+            for (x, value) in far {
+                let Some(end) = beyond.get_mut((x.round() as usize).wrapping_sub(1)) else {
+                    continue;
+                };
+                let word = format!("{value:.1} \u{2192}");
+                let y = top + share(*x, self.x_limits) * (bottom - top);
+                words.push(text(
+                    *end,
+                    y,
+                    &word,
+                    TICK_TEXT_SIZE,
+                    TextAnchor::End,
+                    style::of(series.style).colour,
+                ));
+                *end -= LETTER * (word.chars().count() + 1) as f64;
+            }
+        }
+        words
     }
 
     /// Finite points, as they lie on the page.
@@ -233,44 +288,125 @@ impl<'a> Frame<'a> {
             .collect()
     }
 
-    fn lines(&self, series: &Series) -> Vec<Plot> {
+    /// Dash and width of a series' line.
+    pub(super) fn look(&self, series: &Series) -> (&'static str, f64) {
         let style = style::of(series.style);
+        // All pieces of a series look alike.
+        let length: f64 = self
+            .on_page(series)
+            .iter()
+            .map(|piece| polyline::length(piece))
+            .sum();
+        if length > SCRIBBLE && !self.lies() {
+            ("", SCRIBBLE_WIDTH)
+        } else {
+            (style.dash, style.width)
+        }
+    }
+
+    /// Points of the page in a unit of each axis.
+    fn scales(&self) -> (f64, f64) {
         let scale = |(low, high): (f64, f64), length: f64| length / (high - low);
-        let (x_scale, y_scale) = (
+        (
             scale(self.x_limits, PAGE_WIDTH - LEFT - RIGHT),
             scale(self.y_limits, PANEL_HEIGHT),
-        );
-        let on_page = |piece| {
+        )
+    }
+
+    /// What of a line is drawn, in points of the page.
+    fn on_page(&self, series: &Series) -> Vec<Vec<(f64, f64)>> {
+        let (x_scale, y_scale) = self.scales();
+        let drawn = |piece| {
             let thinned = polyline::thin(piece, MOST_POINTS).into_iter();
             let scaled: Vec<_> = thinned.map(|(x, y)| (x * x_scale, y * y_scale)).collect();
             polyline::simplify(&scaled, TOLERANCE)
         };
-        let pieces: Vec<_> = polyline::in_view(&series.points, self.x_limits)
-            .into_iter()
-            .map(on_page)
-            .collect();
-        // All pieces of a series look alike.
-        let scribble = pieces.iter().map(|p| polyline::length(p)).sum::<f64>() > SCRIBBLE;
-        let (dash, width) = if scribble {
-            ("", SCRIBBLE_WIDTH)
-        } else {
-            (style.dash, style.width)
-        };
+        let pieces = polyline::in_view(&series.points, self.x_limits).into_iter();
+        pieces.map(drawn).collect()
+    }
+
+    fn lines(&self, series: &Series) -> Vec<Plot> {
+        let style = style::of(series.style);
+        let (dash, width) = self.look(series);
+        if self.lies() {
+            return vec![line(self.places(series), style, dash, width)];
+        }
+        let (x_scale, y_scale) = self.scales();
         let on_axes = |piece: Vec<(f64, f64)>| {
             let data = piece.into_iter().map(|(x, y)| (x / x_scale, y / y_scale));
             line(data.collect(), style, dash, width)
         };
-        pieces.into_iter().map(on_axes).collect()
+        self.on_page(series).into_iter().map(on_axes).collect()
     }
 }
 
-fn line(points: Vec<(f64, f64)>, style: &style::Style, dash: &str, width: f64) -> Plot {
+pub(super) fn line(points: Vec<(f64, f64)>, style: &Style, dash: &str, width: f64) -> Plot {
+    coloured(points, style.colour, dash, width)
+}
+
+/// The line at an instant or a place.
+pub(super) fn marker(points: Vec<(f64, f64)>) -> Plot {
+    coloured(points, style::MARKER, DOTTED, MARKER_WIDTH)
+}
+
+fn coloured(points: Vec<(f64, f64)>, colour: &str, dash: &str, width: f64) -> Plot {
     let line = LinePlot::new()
         .with_data(points)
-        .with_color(style.colour)
+        .with_color(colour)
         .with_stroke_width(width);
     Plot::Line(match dash {
         "" => line,
         dash => line.with_line_style(LineStyle::Custom(dash.into())),
     })
+}
+
+pub(super) fn dots(style: &Style) -> ScatterPlot {
+    ScatterPlot::new()
+        .with_color(style.colour)
+        .with_marker(style.marker)
+        .with_size(3.6)
+}
+
+/// Crosses where lines end.
+pub(super) fn ends(style: &Style) -> ScatterPlot {
+    dots(style).with_marker(MarkerShape::Cross).with_size(6.0)
+}
+
+/// Dots with arms to both sides.
+pub(super) fn whiskers(
+    style: &Style,
+    lies: bool,
+    places: &[(f64, f64)],
+    arms: impl IntoIterator<Item = (f64, f64)>,
+) -> Plot {
+    let dots = dots(style).with_data(places.to_vec());
+    if lies {
+        dots.with_x_err_asymmetric(arms)
+    } else {
+        dots.with_y_err_asymmetric(arms)
+    }
+    .into()
+}
+
+/// Dots, each with a stem to its foot.
+pub(super) fn stems(style: &Style, stems: &[[(f64, f64); 2]]) -> Vec<Plot> {
+    let dots = ScatterPlot::new().with_color(style.colour).with_size(STEM_DOT);
+    let stem = |ends: &[(f64, f64); 2]| line(ends.to_vec(), style, "", STEM_WIDTH);
+    stems
+        .iter()
+        .map(stem)
+        .chain([dots.with_data(stems.iter().map(|ends| ends[1])).into()])
+        .collect()
+}
+
+/// Dotted lines up to a stroke across, which reaches `half` to both sides.
+pub(super) fn bounds(style: &Style, bounds: &[[(f64, f64); 2]], half: f64) -> Vec<Plot> {
+    let bound = |ends: &[(f64, f64); 2]| {
+        let (x, y) = ends[1];
+        [
+            line(ends.to_vec(), style, DOTTED, STEM_WIDTH),
+            line(vec![(x, y - half), (x, y + half)], style, "", 2.0 * STEM_WIDTH),
+        ]
+    };
+    bounds.iter().flat_map(bound).collect()
 }

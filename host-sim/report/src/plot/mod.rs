@@ -8,13 +8,16 @@
 //!
 //! Terms: a *series* is a row of points with a [`Mark`] that says how they are drawn; a *band* is a shaded stretch
 //! of the shared axis; a *marker* is one place on it. A figure of *rows* has names in place of numbers on its
-//! shared axis, and lies on its side, so that long names can be read.
+//! shared axis, and lies on its side, so that long names can be read. What in it lies beyond given limits stands at the
+//! frame as a number with an arrow.
 //!
 //! The drawing itself is done by the crates `kuva` (SVG) and `resvg` (pixels). What to plot is decided by studies,
 //! and files are written by `document`, NOT here.
 
 mod draw;
 mod frame;
+mod legend;
+mod pages;
 mod polyline;
 mod raster;
 mod style;
@@ -49,19 +52,37 @@ pub struct Figure {
 #[derive(Debug, Clone, Default)]
 pub struct Axis {
     /// Quantity and unit.
-    pub label: String,
+    pub(crate) label: String,
     /// Lower and upper end; `None` takes them from the data.
     pub limits: Option<(f64, f64)>,
     /// Whether only whole numbers mean anything on it.
-    pub whole: bool,
+    pub(crate) whole: bool,
 }
 
 impl Axis {
-    /// An axis with limits from the data.
-    pub fn of(label: &str) -> Self {
+    /// An axis of a quantity with its unit, `-` if that is 1; limits from the data.
+    pub fn of(quantity: &str, unit: &str) -> Self {
         Self {
-            label: label.into(),
+            label: format!("{quantity} ({unit})"),
             ..Self::default()
+        }
+    }
+
+    /// An axis of things that are counted, such as participants: only whole numbers mean anything on it.
+    pub fn counting(things: &str) -> Self {
+        Self {
+            label: things.into(),
+            limits: None,
+            whole: true,
+        }
+    }
+
+    /// The same from one end to the other.
+    #[must_use]
+    pub fn within(self, low: f64, high: f64) -> Self {
+        Self {
+            limits: Some((low, high)),
+            ..self
         }
     }
 }
@@ -75,6 +96,16 @@ pub struct Panel {
     pub y: Axis,
     /// In drawing order: the last lies on top.
     pub series: Vec<Series>,
+}
+
+impl Panel {
+    /// Width and height of its fields, if it is a map.
+    fn fields(&self) -> Option<[f64; 2]> {
+        self.series.iter().find_map(|series| match series.mark {
+            Mark::Fields { size, .. } => Some(size),
+            _ => None,
+        })
+    }
 }
 
 /// How the points of a series are drawn.
@@ -91,6 +122,17 @@ pub enum Mark {
     Stems,
     /// A shaded area from the points up to these values.
     Interval(Vec<f64>),
+    /// Each by itself: the most that a value may be, of which nothing else is known.
+    Bounds,
+    /// Each by itself: where a line ends before its time. The label says why.
+    Ends,
+    /// Each a field of a map with its middle there.
+    Fields {
+        /// Width and height.
+        size: [f64; 2],
+        /// Of each how strong its colour is, from 0 to 1, and what is written in it.
+        shown: Vec<(f64, String)>,
+    },
 }
 
 /// Points of one meaning. Series of the same label share one legend entry, so give them the same style.
@@ -105,6 +147,8 @@ pub struct Series {
     pub mark: Mark,
     /// Place on the shared axis, and value.
     pub points: Vec<(f64, f64)>,
+    /// Whether a line joins points that are drawn each by itself.
+    pub joined: bool,
 }
 
 impl Series {
@@ -132,7 +176,14 @@ impl Series {
             style,
             mark,
             points,
+            joined: false,
         }
+    }
+
+    /// The same with its points joined by a line, which breaks where a value is not finite.
+    #[must_use]
+    pub fn joined(self) -> Self {
+        Self { joined: true, ..self }
     }
 
     /// Every value that is drawn between two places.
@@ -142,7 +193,9 @@ impl Series {
         let (uppers, whiskers): (&[f64], &[[f64; 2]]) = match &self.mark {
             Mark::Interval(upper) => (upper, &[]),
             Mark::Whiskers(ends) => (&[], ends),
-            Mark::Line | Mark::Dots | Mark::Stems => (&[], &[]),
+            Mark::Line | Mark::Dots | Mark::Stems | Mark::Bounds | Mark::Ends | Mark::Fields { .. } => {
+                (&[], &[])
+            }
         };
         let at = move |i: usize| inside(self.points.get(i).map_or(f64::NAN, |p| p.0));
         let upper = uppers
@@ -155,7 +208,7 @@ impl Series {
             .enumerate()
             .filter(move |(i, _)| at(*i))
             .flat_map(|(_, v)| *v);
-        let zero = (self.mark == Mark::Stems).then_some(0.0);
+        let zero = matches!(self.mark, Mark::Stems | Mark::Bounds).then_some(0.0);
         own.chain(upper).chain(ends).chain(zero)
     }
 }
@@ -218,6 +271,8 @@ impl std::error::Error for PlotError {}
 
 /// Room left between a series and the frame, as a share of the extent of the values.
 const ROOM: f64 = 0.05;
+/// The same behind a line that ends before its time.
+const ROOM_BEHIND: f64 = 0.02;
 
 impl Figure {
     /// The figure as an SVG document.
@@ -244,17 +299,37 @@ impl Figure {
         }
         let points = self.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.points);
         let of_data = || match extent(points.filter(|p| p.1.is_finite()).map(|p| p.0)) {
-            Some((low, high)) if low < high && self.has_lines() => (low, high),
+            Some((low, high)) if low < high && self.has_lines() => {
+                // A line that ends before its time ends within the frame.
+                (
+                    low,
+                    high + if self.has_ends() {
+                        ROOM_BEHIND * (high - low)
+                    } else {
+                        0.0
+                    },
+                )
+            }
             // A dot or a stem stands free of the frame.
-            Some((low, high)) => (low - 0.5, high + 0.5),
+            Some((low, high)) if self.x.whole || low == high => (low - 0.5, high + 0.5),
+            Some((low, high)) => (low - ROOM * (high - low), high + ROOM * (high - low)),
             None => (0.0, 1.0),
         };
         self.x.limits.unwrap_or_else(of_data)
     }
 
-    fn has_lines(&self) -> bool {
+    /// Whether any series has such a mark.
+    pub fn has(&self, such: impl Fn(&Mark) -> bool) -> bool {
         let mut series = self.panels.iter().flat_map(|p| &p.series);
-        series.all(|s| matches!(s.mark, Mark::Line | Mark::Interval(_)))
+        series.any(|s| such(&s.mark))
+    }
+
+    fn has_ends(&self) -> bool {
+        self.has(|mark| *mark == Mark::Ends)
+    }
+
+    fn has_lines(&self) -> bool {
+        !self.has(|mark| !matches!(mark, Mark::Line | Mark::Interval(_) | Mark::Ends))
     }
 
     /// Ends of each panel's values: as given, else of the data in view (of all panels if [`Figure::same_y`]), with
@@ -264,12 +339,10 @@ impl Figure {
         let visible = |panel: &Panel| extent(panel.series.iter().flat_map(|s| s.values_within(x)));
         let extents: Vec<_> = self.panels.iter().map(visible).collect();
         let of_all = extent(extents.iter().flatten().flat_map(|&(low, high)| [low, high]));
+        let stands = (self.has_lines() || !self.rows.is_empty()) && !self.has_ends();
         let limits = |(panel, own): (&Panel, &Option<(f64, f64)>)| {
             let data = if self.same_y { of_all } else { *own };
-            panel
-                .y
-                .limits
-                .unwrap_or_else(|| with_room(data, self.has_lines() || !self.rows.is_empty()))
+            panel.y.limits.unwrap_or_else(|| with_room(data, stands))
         };
         self.panels.iter().zip(&extents).map(limits).collect()
     }

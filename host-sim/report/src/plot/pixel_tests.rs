@@ -8,19 +8,11 @@ use super::*;
 fn alone(mark: Mark, points: Vec<(f64, f64)>) -> Figure {
     let panel = Panel {
         title: String::new(),
-        y: Axis {
-            label: "y".into(),
-            limits: Some((-1.0, 1.0)),
-            ..Axis::default()
-        },
+        y: Axis::of("y", "-").within(-1.0, 1.0),
         series: vec![Series::with_mark("", 1, mark, points)],
     };
     Figure {
-        x: Axis {
-            label: "x".into(),
-            limits: Some((0.0, 100.0)),
-            ..Axis::default()
-        },
+        x: Axis::of("x", "-").within(0.0, 100.0),
         panels: vec![panel],
         ..Figure::default()
     }
@@ -218,7 +210,7 @@ fn equal_figures_are_equal_files() {
 fn the_png_is_twice_as_wide_as_the_page_and_holds_letters() {
     let mut figure = alone(Mark::Line, vec![(0.0, 0.0), (100.0, 0.5)]);
     let plain = raster::pixels(&figure.to_svg().unwrap()).unwrap();
-    figure.x.label = "Mwww \u{b1} \u{3b1}".into();
+    figure.x = Axis::of("Mwww \u{b1} \u{3b1}", "-").within(0.0, 100.0);
     let lettered = raster::pixels(&figure.to_svg().unwrap()).unwrap();
     assert_eq!(plain.width(), lettered.width());
     assert!((1800..1850).contains(&plain.width()), "{}", plain.width());

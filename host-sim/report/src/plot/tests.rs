@@ -5,7 +5,7 @@ use super::*;
 fn panel(title: &str, series: Vec<Series>) -> Panel {
     Panel {
         title: title.into(),
-        y: Axis::of("Lateral error (m)"),
+        y: Axis::of("Lateral error", "m"),
         series,
     }
 }
@@ -14,11 +14,7 @@ fn two_panels() -> Figure {
     let first = vec![(0.0, 0.0), (50.0, 0.13), (100.0, 0.0), (150.0, 9.0)];
     Figure {
         title: "Two drivers".into(),
-        x: Axis {
-            label: "Distance (m)".into(),
-            limits: Some((0.0, 100.0)),
-            ..Axis::default()
-        },
+        x: Axis::of("Distance", "m").within(0.0, 100.0),
         same_y: true,
         panels: vec![
             panel("A", vec![Series::line("manual", 0, first)]),
@@ -150,4 +146,154 @@ fn nothing_but_nan_still_gives_a_figure() {
     );
     assert!(!figure.to_svg().unwrap().contains("NaN"));
     assert!(!Figure::default().to_svg().unwrap().contains("NaN"));
+}
+
+#[test]
+fn a_legend_shows_dashes_and_dots_as_the_panel_does() {
+    let points = vec![(0.0, 0.0), (50.0, 0.3), (100.0, 0.2)];
+    let series = Series::dots("dashed", 3, points).joined();
+    let figure = Figure {
+        panels: vec![panel("", vec![series])],
+        ..Figure::default()
+    };
+    let svg = figure.to_svg().unwrap();
+    assert_eq!(
+        svg.matches("stroke-dasharray=\"4 3\"").count(),
+        2,
+        "one line, one in the legend"
+    );
+    let diamonds = svg.matches("fill=\"#d55e00\"").count();
+    assert_eq!(diamonds, 3 + 1, "three points, one in the legend");
+}
+
+/// Without a view box a narrow page shows a part of the drawing, and paper another one.
+#[test]
+fn a_drawing_fits_the_width_that_it_is_given() {
+    let svg = two_panels().to_svg().unwrap();
+    let of = |name: &str| {
+        let value = &svg[svg.find(&format!(" {name}=\"")).unwrap() + name.len() + 3..];
+        value[..value.find('"').unwrap()].to_owned()
+    };
+    let numbers = |text: String| {
+        text.split(' ')
+            .map(|n| n.parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let size = numbers(format!("0 0 {} {}", of("width"), of("height")));
+    // The drawing library rounds to hundredths.
+    let off = numbers(of("viewBox"))
+        .into_iter()
+        .zip(size)
+        .map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 0.01);
+}
+
+#[test]
+fn what_lies_beyond_a_row_is_a_number_with_an_arrow() {
+    let mut one = panel(
+        "A",
+        vec![Series::dots("", 1, vec![(1.0, 0.5), (2.0, 19.26), (3.0, 3.6)])],
+    );
+    one.y.limits = Some((0.0, 3.6));
+    let figure = Figure {
+        rows: ["first", "second", "third"].map(String::from).to_vec(),
+        panels: vec![one],
+        ..Figure::default()
+    };
+    let svg = figure.to_svg().unwrap();
+    assert_eq!(svg.matches('\u{2192}').count(), 1);
+    assert!(svg.contains(">19.3 \u{2192}</text>"));
+}
+
+#[test]
+fn a_line_that_ends_early_ends_within_the_frame_with_its_reason() {
+    let line = Series::line("", 1, vec![(0.0, 0.0), (50.0, -2.0)]);
+    let end = Series::with_mark("ends: left the road", 1, Mark::Ends, vec![(50.0, -2.0)]);
+    let figure = Figure {
+        panels: vec![panel("", vec![line, end])],
+        ..Figure::default()
+    };
+    assert_eq!(figure.x_limits(), (0.0, 51.0));
+    assert!(figure.y_limits()[0].0 < -2.0 && figure.y_limits()[0].1 > 0.0);
+    assert!(figure.to_svg().unwrap().contains(">ends: left the road</text>"));
+}
+
+#[test]
+fn a_map_has_a_word_in_each_field_and_a_tick_at_each() {
+    let field = |x: f64, y: f64, label: &str, style| {
+        let shown = vec![(0.5, format!("{x} at {y}"))];
+        let mark = Mark::Fields {
+            size: [10.0, 0.1],
+            shown,
+        };
+        Series::with_mark(label, style, mark, vec![(x, y)])
+    };
+    let series = vec![
+        field(20.0, 0.1, "stable", 1),
+        field(30.0, 0.1, "stable", 1),
+        field(40.0, 0.1, "unstable", 3),
+    ];
+    let figure = Figure {
+        x: Axis::of("Speed", "km/h").within(15.0, 45.0),
+        panels: vec![Panel {
+            title: String::new(),
+            y: Axis::of("t_p", "s").within(0.05, 0.15),
+            series,
+        }],
+        ..Figure::default()
+    };
+    let svg = figure.to_svg().unwrap();
+    for word in [
+        "20 at 0.1",
+        "30 at 0.1",
+        "40 at 0.1",
+        "stable",
+        "unstable",
+        "20",
+        "30",
+        "40",
+    ] {
+        assert_eq!(svg.matches(&format!(">{word}</text>")).count(), 1, "{word}");
+    }
+}
+
+/// A4 has room for 267 mm, letter for 249, of which a caption takes some: at 180 mm of width 1160 points are 229 mm.
+#[test]
+fn pages_hold_all_of_a_figure_on_the_same_axes() {
+    let names: Vec<String> = (1..=130).map(|i| format!("row {i}")).collect();
+    let points = (1..=130).map(|i| (f64::from(i), f64::from(i))).collect();
+    let long = Figure {
+        rows: names.clone(),
+        panels: vec![panel("A", vec![Series::dots("dots", 1, points)])],
+        ..Figure::default()
+    };
+    let mut high = two_panels();
+    high.panels = (0..6).map(|i| high.panels[i % 2].clone()).collect();
+    for figure in [long, high] {
+        let pages = figure.pages();
+        let drawn: Vec<String> = pages.iter().map(|page| page.to_svg().unwrap()).collect();
+        for (page, svg) in pages.iter().zip(&drawn) {
+            assert_eq!(page.y_limits()[0], figure.y_limits()[0]);
+            assert!(figure.rows.len() > 1 || page.x_limits() == figure.x_limits());
+            let height = &svg[svg.find(" height=\"").unwrap() + 9..];
+            let height: f64 = height[..height.find('"').unwrap()].parse().unwrap();
+            assert!(height < 1160.0, "{height}");
+        }
+        let panels: usize = pages.iter().map(|page| page.panels.len()).sum();
+        assert!(figure.rows.len() > 1 || panels == figure.panels.len());
+        let rows: Vec<&String> = pages.iter().flat_map(|page| &page.rows).collect();
+        assert_eq!(rows, figure.rows.iter().collect::<Vec<_>>());
+        assert!((2..=3).contains(&pages.len()), "{}", pages.len());
+    }
+    // A row's dot goes with its name: on the third page the row 100 is the twelfth.
+    let third = Figure {
+        rows: names,
+        panels: vec![panel("A", vec![Series::dots("", 1, vec![(100.0, 7.0)])])],
+        ..Figure::default()
+    }
+    .pages()
+    .remove(2);
+    let place = third.rows.iter().position(|row| row == "row 100").unwrap() + 1;
+    assert_eq!(third.panels[0].series[0].points, [(place as f64, 7.0)]);
+    assert_eq!(two_panels().pages().len(), 1);
 }

@@ -12,7 +12,8 @@ use serde::Serialize;
 
 /// What the study is about.
 pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
-                           The interval is the exact one of a Poisson rate; it is at most the bound, with 95 % confidence. Every drive is driven a second time \
+                           The interval is the exact one of a Poisson rate; where nothing was declared there is only a \
+                           bound. Every drive is driven a second time \
                            by hand; one that leaves the road then too is lost by hand, and counted there alone.";
 
 /// What is given up for what: false declarations, and faults noticed in the same world.
@@ -93,16 +94,13 @@ fn detection_figure(faults: &Detection) -> Figure {
         rows: faults.shown().map(|row| row.name.into()).collect(),
         panels: vec![
             Panel {
-                title: "Runs in which the ECU left".into(),
-                y: Axis {
-                    limits: Some((0.0, 105.0)),
-                    ..Axis::of("%")
-                },
+                title: "The ECU left".into(),
+                y: Axis::of("Share of the runs", "%").within(0.0, 105.0),
                 series: vec![Series::with_mark("", 2, Mark::Stems, left)],
             },
             Panel {
-                title: "From the onset".into(),
-                y: Axis::of("s"),
+                title: "How soon".into(),
+                y: Axis::of("Time from the onset", "s"),
                 series: vec![
                     Series::with_mark("longest", 3, Mark::Stems, after(1)),
                     Series::dots("median", 1, after(0)),
@@ -126,8 +124,9 @@ pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
     let (results, faults) = (&results.availability, &results.detection);
     let figure = figure(results);
     write_figure(directory, "availability", &figure)?;
-    let caption = "False declarations in an hour with their exact 95 % interval, and the time without guidance: two seconds \
-                   of handover and five until the driver asks again."
+    let caption = "False declarations in an hour with their exact 95 % interval; where there was none, the rate that is not \
+                   exceeded with 95 % confidence, which is large where little was driven. Beside them the time without guidance: two \
+                   seconds of handover and five until the driver asks again."
         .into();
     let blocks = vec![
         Block::Figure { figure, caption },
@@ -170,8 +169,22 @@ pub fn stamped(results: &Balance) -> Stamped<'_, Balance> {
     Provenance::of(None).stamp(results)
 }
 
-fn interval(rate: &Rate) -> Cell {
-    Cell::Text(format!("{:.2} to {:.2}", rate.interval[0], rate.interval[1]))
+/// What is known of a rate after so many hours.
+fn finding(rate: &Rate, hours: f64) -> String {
+    match (rate.count, hours > 0.0) {
+        (_, false) => "nothing is known".into(),
+        (0, true) => {
+            let decimals = if rate.upper_95 < 1.0 { 4 } else { 1 };
+            format!(
+                "no event in {hours:.2} h: at most {:.decimals$} an hour",
+                rate.upper_95
+            )
+        }
+        _ => format!(
+            "{:.2} an hour ({:.2} to {:.2})",
+            rate.per_hour, rate.interval[0], rate.interval[1]
+        ),
+    }
 }
 
 /// Every world on every road; the roads of a judged one together.
@@ -182,8 +195,7 @@ pub fn table(results: &Availability) -> Table {
             Cell::Text(row.road.into()),
             Cell::number(row.hours, 2),
             Cell::number(row.declarations.count as f64, 0),
-            Cell::number(row.declarations.per_hour, 2),
-            interval(&row.declarations),
+            Cell::Text(finding(&row.declarations, row.hours)),
             Cell::number(row.declarations.upper_95, 4),
             Cell::Text(format!("{} of {}", row.cars_with, row.cars)),
             Cell::number(100.0 * (1.0 - row.available), 2),
@@ -201,9 +213,8 @@ pub fn table(results: &Availability) -> Table {
             "Road",
             "Hours",
             "False declarations",
-            "Per hour",
-            "95 % interval",
-            "At most, 95 %",
+            "Rate, 95 % confidence",
+            "At most (1/h)",
             "Cars with one",
             "Time without guidance (%)",
             "Latched",
@@ -227,23 +238,15 @@ pub fn causes(results: &Availability) -> Table {
                 Cell::Text(row.road.into()),
                 Cell::Text(cause.faults.clone()),
                 Cell::number(cause.rate.count as f64, 0),
-                Cell::number(cause.rate.per_hour, 2),
-                interval(&cause.rate),
+                Cell::Text(finding(&cause.rate, row.hours)),
             ]
         })
     });
     Table {
         caption: "By what the ECU named".into(),
-        columns: [
-            "World",
-            "Road",
-            "Faults",
-            "Declarations",
-            "Per hour",
-            "95 % interval",
-        ]
-        .map(String::from)
-        .to_vec(),
+        columns: ["World", "Road", "Faults", "Declarations", "Rate, 95 % confidence"]
+            .map(String::from)
+            .to_vec(),
         rows: rows.collect(),
     }
 }
@@ -311,40 +314,115 @@ fn figure(results: &Availability) -> Figure {
             .enumerate()
             .map(|(i, row)| (i as f64 + 1.0, row))
     };
-    let rates = places().map(|(x, row)| (x, row.declarations.per_hour)).collect();
-    // A whisker of a figure that lies on its side: a line of its own for each row.
-    let ends = places().map(|(x, row)| {
-        let [low, high] = row.declarations.interval;
-        Series::line("95 % interval", 0, vec![(x, low), (x, high)])
-    });
-    let mut rate: Vec<Series> = ends.collect();
-    rate.push(Series::dots("declarations", 1, rates));
+    let seen = || places().filter(|(_, row)| row.declarations.count > 0);
+    let rates = seen().map(|(x, row)| (x, row.declarations.per_hour)).collect();
+    let intervals = seen().map(|(_, row)| row.declarations.interval).collect();
+    let none = places().filter(|(_, row)| row.declarations.count == 0);
+    let bounds: Vec<_> = none.map(|(x, row)| (x, row.declarations.upper_95)).collect();
     let away = places()
         .map(|(x, row)| (x, 100.0 * (1.0 - row.available)))
         .collect();
-    let from_zero = |label: &str, most: f64| Axis {
-        limits: Some((0.0, 1.05 * most.max(0.1))),
-        ..Axis::of(label)
-    };
-    let most = |of: fn(&Row) -> f64| results.cells.iter().map(of).fold(0.0, f64::max);
+    // From zero; what was seen is not made small by how little the rest was driven.
+    let most =
+        |values: &mut dyn Iterator<Item = f64>| 1.05 * values.filter(|v| v.is_finite()).fold(0.1, f64::max);
+    let most_seen = most(&mut seen().map(|(_, row)| row.declarations.interval[1]));
+    let least_bound = bounds.iter().map(|bound| bound.1).fold(f64::INFINITY, f64::min);
+    let most_rate = most(&mut [most_seen, 1.1 * least_bound].into_iter());
     Figure {
         rows: results
             .cells
             .iter()
-            .map(|row| format!("{}, {}", row.world, row.road))
+            .map(|row| {
+                let lost = if row.hours > 0.0 { "" } else { " (lost by hand)" };
+                format!("{}, {}{lost}", row.world, row.road)
+            })
             .collect(),
         panels: vec![
             Panel {
                 title: "False declarations".into(),
-                y: from_zero("1/h", most(|row| row.declarations.interval[1])),
-                series: rate,
+                y: Axis::of("Rate", "1/h").within(0.0, most_rate),
+                series: vec![
+                    Series::with_mark(
+                        "seen, with the 95 % interval",
+                        1,
+                        Mark::Whiskers(intervals),
+                        rates,
+                    ),
+                    Series::with_mark("none seen: at most (95 %)", 0, Mark::Bounds, bounds),
+                ],
             },
             Panel {
-                title: "Time without guidance".into(),
-                y: from_zero("%", most(|row| 100.0 * (1.0 - row.available))),
+                title: "Without guidance".into(),
+                y: Axis::of("Share of the time", "%").within(
+                    0.0,
+                    most(&mut results.cells.iter().map(|row| 100.0 * (1.0 - row.available))),
+                ),
                 series: vec![Series::with_mark("", 2, Mark::Stems, away)],
             },
         ],
         ..Figure::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptic_batch::availability::Lost;
+
+    fn cell(count: u64, hours: f64) -> Row {
+        Row {
+            world: "w",
+            road: "r",
+            judged: true,
+            hours,
+            available: 1.0,
+            declarations: Rate::of(count, hours),
+            causes: Vec::new(),
+            cars: 1,
+            cars_with: 0,
+            latched: 0,
+            diverged: 0,
+            lost_by_hand: Lost {
+                legs: 0,
+                hours: 0.0,
+                declarations: 0,
+            },
+            sdlp_m: 0.1,
+            largest_error_m: 0.3,
+        }
+    }
+
+    /// No event in five minutes: the rate that is not exceeded with 95 % confidence is -ln(0.05) / (1/12 h) = 35.95 an hour.
+    #[test]
+    fn where_nothing_happened_there_is_a_bound_and_no_finding() {
+        let results = Availability {
+            seed: 1,
+            hours: 0.1,
+            cells: vec![cell(0, 1.0 / 12.0), cell(3, 2.0), cell(0, 0.0)],
+            together: Vec::new(),
+            legs: Vec::new(),
+        };
+        let figure = figure(&results);
+        let [seen, none] = &figure.panels[0].series[..] else {
+            panic!("{:?}", figure.panels[0].series)
+        };
+        assert!(matches!(seen.mark, Mark::Whiskers(_)) && none.mark == Mark::Bounds);
+        assert_eq!(seen.points, [(2.0, 1.5)]);
+        assert_eq!(none.points[0].0, 1.0);
+        assert!(
+            (none.points[0].1 - -(0.05_f64.ln()) * 12.0).abs() < 1e-6,
+            "{:?}",
+            none.points
+        );
+        let text = table(&results).to_text();
+        assert!(
+            text.contains("no event in 0.08 h: at most 35.9 an hour"),
+            "{text}"
+        );
+        assert!(
+            text.contains("1.50 an hour (0.31 to 4.38)") && text.contains("nothing is known"),
+            "{text}"
+        );
+        assert!(!text.contains("0.00 to"), "{text}");
     }
 }

@@ -82,11 +82,8 @@ impl Load {
         let points = points
             .map(|(i, row)| (i as f64 + 1.0, 100.0 * row.load))
             .collect();
-        let mut y = Axis::of("Worst-case share of the bus (%)");
-        y.limits = Some((
-            0.0,
-            100.0 * self.messages.iter().map(|m| m.load).fold(0.0, f64::max) * 1.08,
-        ));
+        let most = self.messages.iter().map(|m| m.load).fold(0.0, f64::max);
+        let y = Axis::of("Worst-case share of the bus", "%").within(0.0, 108.0 * most);
         Figure {
             rows: self.messages.iter().map(|row| row.message.into()).collect(),
             panels: vec![Panel {

@@ -78,19 +78,13 @@ fn plan(survey: &Survey) -> Figure {
     };
     let ((left, right), (low, high)) = (extent(|p| p.0), extent(|p| p.1));
     let height = 1.1 * (high - low).max((right - left) / PANEL_ASPECT).max(1.0);
-    let around = |from: f64, to: f64, size: f64| Some((0.5 * (from + to - size), 0.5 * (from + to + size)));
+    let around = |axis: Axis, from: f64, to: f64, size: f64| {
+        axis.within(0.5 * (from + to - size), 0.5 * (from + to + size))
+    };
     Figure {
-        x: Axis {
-            label: "x (m)".into(),
-            limits: around(left, right, height * PANEL_ASPECT),
-            ..Axis::default()
-        },
+        x: around(Axis::of("x", "m"), left, right, height * PANEL_ASPECT),
         panels: vec![Panel {
-            y: Axis {
-                label: "y (m)".into(),
-                limits: around(low, high, height),
-                ..Axis::default()
-            },
+            y: around(Axis::of("y", "m"), low, high, height),
             series: vec![Series::line("", 1, points)],
             ..Panel::default()
         }],
@@ -99,9 +93,9 @@ fn plan(survey: &Survey) -> Figure {
 }
 
 fn along(survey: &Survey, course: &Course) -> Figure {
-    let panel = |label: &str, value: fn(&Sample) -> f64| Panel {
+    let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| Panel {
         title: String::new(),
-        y: Axis::of(label),
+        y: Axis::of(quantity, unit),
         series: vec![Series::line(
             "",
             1,
@@ -109,12 +103,12 @@ fn along(survey: &Survey, course: &Course) -> Figure {
         )],
     };
     Figure {
-        x: Axis::of("Distance along the lane's centre (m)"),
+        x: Axis::of("Distance along the lane's centre", "m"),
         panels: vec![
-            panel("Curvature (1/km)", |s| 1e3 * s.curvature_1pm),
-            panel("Bank (%), left up", |s| 100.0 * s.bank_rad.tan()),
-            panel("Grade (%)", |s| 100.0 * s.grade),
-            panel("Lane width (m)", |s| s.width_m),
+            panel("Curvature", "1/km", |s| 1e3 * s.curvature_1pm),
+            panel("Bank, left up", "%", |s| 100.0 * s.bank_rad.tan()),
+            panel("Grade", "%", |s| 100.0 * s.grade),
+            panel("Lane width", "m", |s| s.width_m),
         ],
         bands: curves::bands(course),
         ..Figure::default()

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::OutputError;
 use super::files::{write_figure, write_report};
+use super::{OutputError, ended};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::identify::INFORMED;
@@ -20,8 +20,7 @@ pub fn write(answer: &Answer, directory: &Path) -> Result<(), OutputError> {
     let mut blocks: Vec<Block> = sentences(answer).into_iter().map(Block::Text).collect();
     blocks.push(Block::Figure {
         figure,
-        caption: "How long they have to drive, over the frequency of the probe. The level is the length without a probe."
-            .into(),
+        caption: "How long they have to drive, over the frequency of the probe.".into(),
     });
     blocks.push(Block::Table(table(answer)));
     let report = Report {
@@ -135,39 +134,43 @@ fn figure(answer: &Answer) -> Figure {
     let mut courses: Vec<&str> = answer.designs.iter().map(|d| d.course.as_str()).collect();
     courses.dedup();
     let minutes = |d: &Design| d.needed_s.map_or(f64::NAN, |s| s / 60.0);
+    let all = answer
+        .designs
+        .iter()
+        .flat_map(|d| d.frequencies_hz.iter().copied());
+    let quickest_hz = all.fold(0.0, f64::max);
     let panels = courses.into_iter().map(|course| {
         let here = || answer.designs.iter().filter(move |d| d.course == course);
-        let single = || here().filter(|d| d.frequencies_hz.len() == 1);
-        let mut amplitudes: Vec<f64> = single().map(|d| d.amplitude_nm).collect();
+        let with = |sines: usize, amplitude_nm: f64| {
+            let same =
+                here().filter(move |d| d.frequencies_hz.len() == sines && d.amplitude_nm == amplitude_nm);
+            let middle = |d: &Design| d.frequencies_hz.iter().sum::<f64>() / sines as f64;
+            same.map(|d| (middle(d), minutes(d))).collect::<Vec<_>>()
+        };
+        let mut amplitudes: Vec<f64> = here().map(|d| d.amplitude_nm).filter(|a| *a > 0.0).collect();
+        amplitudes.sort_by(f64::total_cmp);
         amplitudes.dedup();
-        let mut series: Vec<Series> = amplitudes
-            .into_iter()
-            .enumerate()
-            .map(|(i, a)| {
-                let points = single().filter(|d| d.amplitude_nm == a);
-                let points = points.map(|d| (d.frequencies_hz[0], minutes(d))).collect();
-                Series::line(&format!("{a} N.m"), i + 1, points)
-            })
-            .collect();
-        let halves: Vec<(f64, f64)> = here()
-            .filter(|d| d.frequencies_hz.len() == 2)
-            .map(|d| (0.5 * (d.frequencies_hz[0] + d.frequencies_hz[1]), minutes(d)))
-            .collect();
-        if !halves.is_empty() {
-            series.push(Series::dots("two sines, at their middle", 6, halves));
-        }
+        let series = amplitudes.iter().enumerate().flat_map(|(i, &amplitude_nm)| {
+            let one = with(1, amplitude_nm);
+            let refused = one.last().is_some_and(|p| p.0 < quickest_hz);
+            let line = Series::dots(&format!("{amplitude_nm} N.m"), i + 1, one).joined();
+            let label = format!("{amplitude_nm} N.m, two sines, at their middle");
+            let two = Series::dots(&label, i + 4, with(2, amplitude_nm));
+            ended(line, refused.then_some("ends: quicker, the ECU refuses it")).chain([two])
+        });
+        let without = here().find(|d| d.amplitude_nm == 0.0);
+        let without = without.map(|d| match d.needed_s {
+            Some(s) => format!(", {:.1} min without a probe", s / 60.0),
+            None => ", no drive is long enough without a probe".into(),
+        });
         Panel {
-            title: course.to_owned(),
-            y: Axis {
-                label: "Minutes needed".into(),
-                limits: None,
-                ..Axis::default()
-            },
-            series,
+            title: format!("{course}{}", without.unwrap_or_default()),
+            y: Axis::of("Drive needed", "min"),
+            series: series.collect(),
         }
     });
     Figure {
-        x: Axis::of("Frequency of the probe (Hz)"),
+        x: Axis::of("Frequency of the probe", "Hz"),
         panels: panels.collect(),
         ..Figure::default()
     }

@@ -22,7 +22,8 @@ pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
     write_json(&directory.join("results.json"), &stamped(found))?;
     let mut blocks = vec![Block::Figure {
         figure,
-        caption: "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval."
+        caption: "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. A driver \
+                  without a dot: the drive does not identify the parameter."
             .into(),
     }];
     blocks.extend(tables(found).into_iter().map(Block::Table));
@@ -162,10 +163,12 @@ fn figure(found: &Drivers) -> Figure {
                 &[p.mean_interval_95; 2],
             ));
         }
-        let (mut points, mut intervals) = (Vec::new(), Vec::new());
+        let (mut points, mut intervals, mut unit) = (Vec::new(), Vec::new(), "-");
         for (i, (_, fit)) in found.drivers.iter().enumerate() {
             let list = fit.parameters.list();
-            let p = list.iter().find(|l| l.0 == wanted).map(|l| l.2);
+            let named = list.iter().find(|l| l.0 == wanted);
+            unit = named.map_or(unit, |l| l.1);
+            let p = named.map(|l| l.2);
             if let Some((x, interval)) = p.and_then(|p| Some((p.estimate?, p.interval_95?))) {
                 points.push(((i + 1) as f64, x));
                 intervals.push(interval);
@@ -178,17 +181,13 @@ fn figure(found: &Drivers) -> Figure {
             points,
         ));
         Panel {
-            title: wanted.to_owned(),
-            y: Axis::of(wanted),
+            title: String::new(),
+            y: Axis::of(wanted, unit),
             series,
         }
     });
     Figure {
-        x: Axis {
-            label: "Driver".into(),
-            limits: Some((0.5, count as f64 + 0.5)),
-            whole: true,
-        },
+        x: Axis::counting("Driver, as the table lists them").within(ends[0], ends[1]),
         panels: panels.collect(),
         ..Figure::default()
     }

@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use super::files::{write_figure, write_report};
-use super::{OutputError, curves, notes};
+use super::{LEFT_THE_ROAD, OutputError, curves, ended, notes};
 use crate::document::{
     Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, metrics_table,
     write_json, write_trace,
 };
 use crate::plot::{Axis, Band, Figure, Marker, Panel, Series, Shade};
-use haptic_analysis::metrics::Definition;
+use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::RunRecord;
 use haptic_batch::evaluate::{DRIVERS_T_P, Evaluation, EvaluationResults};
 use haptic_sim::models::road::PAPER_COURSE;
@@ -157,9 +157,12 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
             };
             panels.push(Panel {
                 title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
-                y: Axis::of("Lateral error (m)"),
+                y: Axis::of("Lateral error", "m"),
                 series: runs
-                    .map(|(s, run)| Series::line(label(s.condition()), style(s.condition()), path(run)))
+                    .flat_map(|(s, run)| {
+                        let line = Series::line(label(s.condition()), style(s.condition()), path(run));
+                        ended(line, run.diverged().then_some(LEFT_THE_ROAD))
+                    })
                     .collect(),
             });
         }
@@ -170,11 +173,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
     let bands = bands.chain(absences);
     Figure {
         title: title.into(),
-        x: Axis {
-            label: "Distance along the road (m)".into(),
-            limits: Some((from, to)),
-            ..Axis::default()
-        },
+        x: Axis::of("Distance along the road", "m").within(from, to),
         same_y: true,
         panels,
         bands: bands.filter(|band| band.from < to && band.to > from).collect(),
@@ -269,12 +268,15 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
         heading: "Results".into(),
         blocks: vec![Block::Table(table(results))],
     });
+    // So many at a time that paper can hold the table.
+    let some = |metrics: &[Definition]| {
+        let shown = |d: &Definition| metrics.iter().any(|of| of.name == d.name);
+        Block::Table(table_of(results, "", shown))
+    };
+    let all = DEFINITIONS.chunks(9).map(some);
     sections.push(Section {
         heading: "All metrics".into(),
-        blocks: vec![
-            Block::Table(table_of(results, "", |_| true)),
-            Block::Table(definitions_table()),
-        ],
+        blocks: all.chain([Block::Table(definitions_table())]).collect(),
     });
     Report {
         title: "Evaluation of shared steering control".into(),

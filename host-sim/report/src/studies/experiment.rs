@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use super::OutputError;
 use super::files::{write_figure, write_report};
+use super::{LEFT_THE_ROAD, OutputError, ended};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
@@ -61,17 +61,22 @@ fn typical(experiment: &Experiment) -> Option<&Drive> {
 }
 
 fn paths(drive: &Drive) -> Figure {
+    let again = |label: &str, style, found: &Finding| {
+        // Without an error there is no whole path to take it from.
+        let left = found.trajectory_error_m.is_none().then_some(LEFT_THE_ROAD);
+        ended(Series::line(label, style, found.path.clone()), left)
+    };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Distance along the road (m)"),
+        x: Axis::of("Distance along the road", "m"),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("Lateral error (m)"),
-            series: vec![
-                Series::line("measured", 0, drive.path.clone()),
-                Series::line("identified driver", 1, drive.noise_model.path.clone()),
-                Series::line("identified driver, published method", 3, drive.paper.path.clone()),
-            ],
+            y: Axis::of("Lateral error", "m"),
+            series: [Series::line("measured", 0, drive.path.clone())]
+                .into_iter()
+                .chain(again("identified driver", 1, &drive.noise_model))
+                .chain(again("identified driver, published method", 3, &drive.paper))
+                .collect(),
         }],
         ..Figure::default()
     }
@@ -88,10 +93,10 @@ fn torque(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Time (s)"),
+        x: Axis::of("Time", "s"),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("Driver torque (N.m)"),
+            y: Axis::of("Driver torque", "N.m"),
             series: vec![
                 line("measured", 0, &t.measured_nm),
                 line("simulated", 3, &t.simulated_nm),
@@ -131,16 +136,12 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         series.push(dots("published method", 3, ASIDE, guided, |d| &d.paper));
         Panel {
             title: title.into(),
-            y: Axis::of("Trajectory error (m)"),
+            y: Axis::of("Trajectory error", "m"),
             series,
         }
     });
     Figure {
-        x: Axis {
-            label: "Participant".into(),
-            limits: Some((ends[0], ends[1])),
-            whole: true,
-        },
+        x: Axis::counting("Participant").within(ends[0], ends[1]),
         panels: panels.to_vec(),
         same_y: true,
         ..Figure::default()
@@ -161,13 +162,10 @@ fn estimates(experiment: &Experiment) -> Figure {
         Some((f64::from(d.participant) + ASIDE, k_hg.optimum?))
     });
     Figure {
-        x: Axis {
-            whole: true,
-            ..Axis::of("Participant")
-        },
+        x: Axis::counting("Participant"),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("K_hg"),
+            y: Axis::of("K_hg", "-"),
             series: vec![
                 Series::dots("truth", 0, truth.collect()),
                 Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),

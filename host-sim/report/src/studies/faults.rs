@@ -6,6 +6,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_campaign::OFF_ROAD_M;
 use haptic_campaign::campaign::{Campaign, CaseResult};
 use haptic_campaign::document;
 use haptic_campaign::drivers::Drivers;
@@ -20,12 +21,13 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
     write_json(&directory.join("faults.json"), &stamped(campaign))?;
     let faults = document::table_of_faults();
     write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
-    let caption = "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
+    let caption = format!(
+        "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
                    they must keep. A fault without a mark on the left has no deadline. The deviation is that from the \
                    fault-free run, beside what it is if the torque is dropped in the step in which the ECU leaves. Off road: runs \
-                   that go more than 3.6 m aside with the torque dropped as well, or that are so far aside without the fault \
-                   too when the ECU leaves; their excess is not judged."
-        .into();
+                   that go more than {OFF_ROAD_M} m aside with the torque dropped as well, or that are so far aside without the fault \
+                   too when the ECU leaves; their excess is not judged. A number with an arrow stands for what is beyond the axis."
+    );
     let mut blocks = vec![Block::Figure { figure, caption }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
     blocks.push(Block::Table(table(campaign)));
@@ -157,9 +159,9 @@ fn figure(campaign: &Campaign) -> Figure {
     });
     let names = 1.0..=campaign.rows.len() as f64;
     let bound = vec![(names.start() - 0.5, 100.0), (names.end() + 0.5, 100.0)];
-    let panel = |title: &str, label: &str, series: Vec<Series>| Panel {
+    let panel = |title: &str, y: Axis, series: Vec<Series>| Panel {
         title: title.into(),
-        y: Axis::of(label),
+        y,
         series,
     };
     Figure {
@@ -167,23 +169,24 @@ fn figure(campaign: &Campaign) -> Figure {
         panels: vec![
             panel(
                 "Worst reaction",
-                "Share of the deadline (%)",
+                Axis::of("Share of the deadline", "%"),
                 vec![
-                    Series::line("limit", 3, bound),
+                    Series::line("deadline", 3, bound),
                     Series::with_mark("worst seen", 1, Mark::Stems, reaction),
                 ],
             ),
             panel(
                 "Largest torque",
-                "Torque (N.m)",
+                Axis::of("Torque", "N.m"),
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.peak_torque_nm))),
-                    Series::dots("limit", 3, of(&|row| Some(row.torque_bound_nm))),
+                    Series::dots("bound of the torque", 3, of(&|row| Some(row.torque_bound_nm))),
                 ],
             ),
             panel(
                 "Largest deviation",
-                "Deviation (m)",
+                // What goes further is off the road.
+                Axis::of("Deviation", "m").within(0.0, OFF_ROAD_M),
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.deviation_m))),
                     Series::dots("torque dropped", 4, of(&|row| row.dropped_m)),

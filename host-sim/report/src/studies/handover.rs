@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::OutputError;
 use super::files::{write_figure, write_report};
+use super::{OutputError, ended};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::evaluate::DRIVERS_T_P;
@@ -13,6 +13,9 @@ use haptic_sim::scenario::Condition;
 /// What of the study a page or a terminal says before the table.
 pub const SUMMARY: &str = "Peak lateral error in the first curve of paper-course, stretched to the speed (0.93 m/s2), \
                            failure in the arc. Ratio: over the larger of the no-failure and the manual peak.";
+
+/// Why a line ends: a driver who is not stable alone is not judged.
+const UNSTABLE: &str = "ends: unstable by hand";
 
 /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
 ///
@@ -122,39 +125,29 @@ fn figure(results: &HandoverResults) -> Figure {
                     .iter()
                     .filter(move |r| r.t_p == t_p && r.condition == condition)
             };
-            // A driver who is not stable alone is not judged, and breaks the line.
             let points = |ratio: fn(&HandoverRow) -> Option<f64>| {
                 let value = move |r: &HandoverRow| if r.is_judged() { ratio(r) } else { None };
                 rows()
                     .map(move |r| (r.speed_kmh, value(r).unwrap_or(f64::NAN)))
                     .collect::<Vec<_>>()
             };
-            let (handover, loss) = (points(|r| r.handover_ratio), points(|r| r.loss_ratio));
-            series.push(Series::line("", style, handover.clone()));
-            series.push(Series::dots(
-                &format!("handover, {condition} reliance"),
-                style,
-                handover,
-            ));
-            series.push(Series::line("", style + 2, loss.clone()));
-            series.push(Series::dots(
-                &format!("sudden loss, {condition} reliance"),
-                style + 2,
-                loss,
-            ));
+            for (what, style, points) in [
+                ("handover", style, points(|r| r.handover_ratio)),
+                ("sudden loss", style + 2, points(|r| r.loss_ratio)),
+            ] {
+                let to_the_end = points.last().is_some_and(|p| p.1.is_finite());
+                let line = Series::dots(&format!("{what}, {condition} reliance"), style, points).joined();
+                series.extend(ended(line, (!to_the_end).then_some(UNSTABLE)));
+            }
         }
         Panel {
             title: format!("Driver with t_p {t_p} s"),
-            y: Axis::of("Ratio"),
+            y: Axis::of("Ratio", "-"),
             series,
         }
     };
     Figure {
-        x: Axis {
-            label: "Speed (km/h)".into(),
-            limits: Some((SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0)),
-            ..Axis::default()
-        },
+        x: Axis::of("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),
         same_y: true,
         panels: DRIVERS_T_P.map(panel).to_vec(),
         ..Figure::default()

@@ -52,10 +52,10 @@ fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
     Series::line(label, style, x.iter().copied().zip(y.iter().copied()).collect())
 }
 
-fn panel(title: &str, y: &str, series: Vec<Series>) -> Panel {
+fn panel(quantity: &str, unit: &str, series: Vec<Series>) -> Panel {
     Panel {
-        title: title.into(),
-        y: Axis::of(y),
+        title: String::new(),
+        y: Axis::of(quantity, unit),
         series,
     }
 }
@@ -109,9 +109,9 @@ fn delay_profile(found: &Identification) -> Option<Figure> {
     }
     series.push(line("profile", 0, &x, &y));
     series.push(line("level of 95 %", 1, &ends, &[3.84, 3.84]));
-    let mut panel = panel("", "-2 log L above optimum", series);
+    let mut panel = panel("-2 log L above optimum", "-", series);
     panel.y.limits = Some((0.0, HIGHEST));
-    Some(over("t_p (s)", vec![panel]))
+    Some(over(Axis::of("t_p", "s"), vec![panel]))
 }
 
 /// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed; none if there
@@ -159,14 +159,14 @@ fn intervals(found: &Identification) -> Option<Figure> {
     }
     Some(Figure {
         rows: list.iter().map(|l| l.0.to_owned()).collect(),
-        panels: vec![panel("", "Share of the estimate", series)],
+        panels: vec![panel("Share of the estimate", "-", series)],
         ..Figure::default()
     })
 }
 
-fn over(x: &str, panels: Vec<Panel>) -> Figure {
+fn over(x: Axis, panels: Vec<Panel>) -> Figure {
     Figure {
-        x: Axis::of(x),
+        x,
         panels,
         ..Figure::default()
     }
@@ -182,7 +182,7 @@ fn torque(found: &Identification) -> Figure {
     if !left_out_bands(found).is_empty() {
         series.push(broken_line("measured, left out", 4, &t.unused_s, &t.unused_nm));
     }
-    let mut figure = over("Time (s)", vec![panel("", "Driver torque (N.m)", series)]);
+    let mut figure = over(Axis::of("Time", "s"), vec![panel("Driver torque", "N.m", series)]);
     figure.bands = left_out_bands(found);
     figure
 }
@@ -209,11 +209,11 @@ fn residuals(found: &Identification) -> Figure {
     let t = &found.traces;
     let both = t.measured_nm.iter().zip(&t.simulated_nm);
     let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
-    let panel = |title: &str, y: &[f64]| panel(title, "(N.m)", vec![broken_line("", 1, &t.time_s, y)]);
+    let panel = |what: &str, y: &[f64]| panel(what, "N.m", vec![broken_line("", 1, &t.time_s, y)]);
     let mut figure = over(
-        "Time (s)",
+        Axis::of("Time", "s"),
         vec![
-            panel("Measured minus simulated", &unexplained),
+            panel("Measured - simulated", &unexplained),
             panel("Residual of the loss", &t.residual_nm),
         ],
     );
@@ -230,12 +230,15 @@ fn correlogram(found: &Identification) -> Figure {
         Series::interval("95 % if white", 5, &[0.5, last + 0.5], &[[-bound, bound]; 2]),
         Series::with_mark("", 0, Mark::Stems, stems),
     ];
-    over("Lag (samples)", vec![panel("", "Autocorrelation", series)])
+    over(
+        Axis::counting("Lag (samples)"),
+        vec![panel("Autocorrelation", "-", series)],
+    )
 }
 
 fn over_time(drive: &IdentifiedDrive) -> Figure {
     let t = &drive.tracking;
-    let panel = |title: &str, unit: &str, h: &History| {
+    let panel = |name: &str, unit: &str, h: &History| {
         let both = h.estimate.iter().zip(&h.standard_deviation);
         let ends: Vec<[f64; 2]> = both.map(|(e, s)| [e - 2.0 * s, e + 2.0 * s]).collect();
         let (x, ends) = broken(&t.time_s, &ends, [f64::NAN; 2]);
@@ -243,16 +246,16 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
             Series::interval("two standard deviations", 5, &x, &ends),
             broken_line("estimate", 1, &t.time_s, &h.estimate),
         ];
-        panel(title, unit, series)
+        panel(name, unit, series)
     };
     let mut figure = over(
-        "Time (s)",
+        Axis::of("Time", "s"),
         vec![
-            panel("K_hg", "(-)", &t.k_hg),
-            panel("gain_1", "(N.m/m)", &t.gain[0]),
-            panel("gain_2", "(N.m/(m.s))", &t.gain[1]),
-            panel("gain_3", "(N.m/rad)", &t.gain[2]),
-            panel("t_p", "(s)", &t.t_p),
+            panel("K_hg", "-", &t.k_hg),
+            panel("gain_1", "N.m/m", &t.gain[0]),
+            panel("gain_2", "N.m/(m.s)", &t.gain[1]),
+            panel("gain_3", "N.m/rad", &t.gain[2]),
+            panel("t_p", "s", &t.t_p),
         ],
     );
     figure.bands = left_out_bands(&drive.results.identification);

@@ -21,13 +21,25 @@ pub mod sweep;
 pub mod validation;
 
 use crate::document::WriteError;
-use crate::plot::PlotError;
+use crate::plot::{Mark, PlotError, Series};
 
 pub use crate::document::SeriesFormat;
 
 /// Notes as the end of a report's summary.
 fn notes(notes: &[String]) -> String {
     notes.iter().map(|note| format!("Note: {note}. ")).collect()
+}
+
+/// Why a line ends when the vehicle did not stay on the road.
+const LEFT_THE_ROAD: &str = "ends: left the road";
+
+/// A line, and if it ends before its time a cross there, with the reason.
+fn ended(line: Series, why: Option<&str>) -> impl Iterator<Item = Series> + use<> {
+    let last = line.points.iter().rfind(|p| p.0.is_finite() && p.1.is_finite());
+    let cross = why
+        .zip(last)
+        .map(|(why, last)| Series::with_mark(why, line.style, Mark::Ends, vec![*last]));
+    [line].into_iter().chain(cross)
 }
 
 /// Why the files of a study could not be made.

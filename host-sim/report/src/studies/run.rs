@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::files::{write_figure, write_report};
 use super::reliance::panel as reliance_panel;
-use super::{OutputError, curves, notes};
+use super::{LEFT_THE_ROAD, OutputError, curves, ended, notes};
 use crate::document::{
     Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, write_file,
     write_json, write_trace,
@@ -49,7 +49,7 @@ fn provenance(single: &SingleRun) -> Provenance {
 }
 
 /// How the run ended, and when and why the guidance did, if it did before.
-pub fn ended(single: &SingleRun) -> String {
+pub fn how_it_ended(single: &SingleRun) -> String {
     let record = &single.results.record;
     let ended = if record.diverged {
         format!("DIVERGED at {:.0} m", record.end_m)
@@ -90,14 +90,14 @@ pub fn table(results: &SingleResults) -> Table {
 
 fn figure(single: &SingleRun) -> Figure {
     let samples = &single.run.trace.samples;
-    let panel = |label: &str, value: fn(&Sample) -> f64| Panel {
-        title: String::new(),
-        y: Axis::of(label),
-        series: vec![Series::line(
-            "",
-            1,
-            samples.iter().map(|s| (s.s_m, value(s))).collect(),
-        )],
+    let diverged = single.run.diverged().then_some(LEFT_THE_ROAD);
+    let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| {
+        let points = samples.iter().map(|s| (s.s_m, value(s))).collect();
+        Panel {
+            title: String::new(),
+            y: Axis::of(quantity, unit),
+            series: ended(Series::line("", 1, points), diverged).collect(),
+        }
     };
     let failed = single
         .scenario
@@ -106,13 +106,13 @@ fn figure(single: &SingleRun) -> Figure {
         .and_then(|t| samples.iter().find(|s| s.time_s >= t));
     // Each torque for itself: the probe would hide the driver's.
     let mut panels = vec![
-        panel("Lateral error (m)", |s| s.lateral_error_m),
-        panel("Wheel angle (deg)", |s| s.wheel_angle_rad.to_degrees()),
-        panel("Driver torque (N.m)", |s| s.driver_torque_nm),
-        panel("Guidance torque (N.m)", |s| s.guidance_torque_nm),
+        panel("Lateral error", "m", |s| s.lateral_error_m),
+        panel("Wheel angle", "deg", |s| s.wheel_angle_rad.to_degrees()),
+        panel("Driver torque", "N.m", |s| s.driver_torque_nm),
+        panel("Guidance torque", "N.m", |s| s.guidance_torque_nm),
     ];
     if single.scenario.changes_speed() {
-        panels.push(panel("Speed (km/h)", |s| 3.6 * s.speed_m_per_s));
+        panels.push(panel("Speed", "km/h", |s| 3.6 * s.speed_m_per_s));
     }
     if single.scenario.guidance().probe {
         let place = |time_s: f64| {
@@ -131,7 +131,7 @@ fn figure(single: &SingleRun) -> Figure {
         ));
     }
     Figure {
-        x: Axis::of("Distance along the road (m)"),
+        x: Axis::of("Distance along the road", "m"),
         panels,
         markers: failed
             .map(|s| Marker {
@@ -176,7 +176,7 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
             scenario.gains().k_d,
             scenario.gains().k_hg,
             scenario.condition(),
-            ended(single),
+            how_it_ended(single),
             notes(&single.results.notes),
         ),
         sections: vec![
@@ -241,4 +241,43 @@ fn events(single: &SingleRun) -> Vec<Event> {
     events.push(Event { time_s: end_s, what });
     events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     events
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::Mark;
+    use haptic_sim::models::driver::DriverParameters;
+    use haptic_sim::scenario::{Condition, Scenario};
+
+    fn ends(speed_kmh: f64) -> (SingleRun, Vec<Vec<(f64, f64)>>) {
+        let driver = DriverParameters {
+            t_p: 0.5,
+            ..DriverParameters::default()
+        };
+        let scenario = Scenario::builder()
+            .speed_kmh(speed_kmh)
+            .condition(Condition::Manual)
+            .driver(driver);
+        let single = haptic_batch::run::run(scenario.build().unwrap(), false).unwrap();
+        let figure = figure(&single);
+        let crosses = figure
+            .panels
+            .iter()
+            .flat_map(|p| &p.series)
+            .filter(|s| s.mark == Mark::Ends);
+        let places = crosses.map(|s| s.points.clone()).collect();
+        (single, places)
+    }
+
+    /// By hand a driver with half a second of delay is unstable at 130 km/h (the map of `host-sim stability`).
+    #[test]
+    fn a_run_that_leaves_the_road_says_so_where_its_lines_end() {
+        let (single, crosses) = ends(130.0);
+        let last = single.run.trace.samples.last().unwrap();
+        assert!(last.lateral_error_m.abs() > 9.0, "{}", last.lateral_error_m);
+        assert_eq!(crosses.len(), 4, "one a panel");
+        assert_eq!(crosses[0], [(last.s_m, last.lateral_error_m)]);
+        assert!(ends(60.0).1.is_empty());
+    }
 }

@@ -1,11 +1,11 @@
-//! What is shown of the map over speed and delay: a table, figures, and the files with both.
+//! What is shown of the map over speed and delay: tables, maps, and the files with both.
 
 use std::path::Path;
 
 use super::OutputError;
 use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
-use crate::plot::{Axis, Figure, Panel, Series};
+use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, signed, write_json};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::left_by_themselves;
 use haptic_batch::stability::{DELAYS_S, Drive, Place, SHARES, SPEEDS_KMH, Shares};
 use haptic_sim::scenario::Condition;
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 /// What the map is about.
 pub const SUMMARY: &str = "Growth: the largest real part of the loop's eigenvalues on a straight; below zero an error dies \
-                           down. Peak: the largest lateral error through a curve of 0.93 m/s2, simulated with the shipping ECU.";
+                           down, above it grows. Peak: the largest lateral error through a curve of 0.93 m/s2, simulated with the shipping ECU.";
 
 /// The results as JSON holds them.
 #[derive(Debug, Serialize)]
@@ -29,23 +29,23 @@ pub struct Map {
 /// # Errors
 /// What could not be written or drawn.
 pub fn write(map: &Map, directory: &Path) -> Result<(), OutputError> {
-    let growth = figure(map, "Growth (1/s)", |drive| drive.growth_per_s);
-    let peak = figure(map, "Peak lateral error (m)", |drive| {
-        drive.peak_m.unwrap_or(f64::NAN)
-    });
+    let (growth, peak) = (growth_figure(map), peak_figure(map));
     write_figure(directory, "stability", &growth)?;
     write_figure(directory, "peaks", &peak)?;
     write_json(&directory.join("results.json"), &stamped(map))?;
     let blocks = vec![
         Block::Figure {
             figure: growth,
-            caption: "A loop above zero is unstable.".into(),
+            caption: "Growth (1/s) by speed and delay, by hand and with guidance. The stronger the colour, the faster an error \
+                      dies down or grows."
+                .into(),
         },
         Block::Figure {
             figure: peak,
-            caption: "A line that ends: the vehicle left the road.".into(),
+            caption: "Peak lateral error (m) in the curve by speed and delay.".into(),
         },
-        Block::Table(table(map)),
+        Block::Table(growth_table(map)),
+        Block::Table(peak_table(map)),
         Block::Table(shares(map)),
     ];
     write_report(
@@ -108,39 +108,57 @@ pub fn judgement(map: &Map) -> String {
     text
 }
 
-/// Every place of the map.
-pub fn table(map: &Map) -> Table {
-    let row = |place: &Place| {
-        let mut cells = vec![Cell::number(place.speed_kmh, 0), Cell::number(place.t_p, 1)];
-        cells.extend(
-            place
-                .drives
-                .iter()
-                .map(|drive| Cell::number(drive.growth_per_s, 2)),
-        );
-        cells.extend(place.drives.iter().map(|drive| Cell::Number {
+/// The map of growths, a row for each way to drive and each delay.
+pub fn growth_table(map: &Map) -> Table {
+    let caption = "Growth (1/s): with - an error dies down, with + the loop is unstable";
+    rows(map, caption, |drive| Cell::Signed(drive.growth_per_s))
+}
+
+/// The map of peaks.
+pub fn peak_table(map: &Map) -> Table {
+    rows(
+        map,
+        "Peak lateral error (m); a dash: the vehicle leaves the road",
+        |drive| Cell::Number {
             value: drive.peak_m,
             decimals: 3,
-        }));
-        cells.push(Cell::Text(
-            if place.broken().next().is_some() {
-                "WORSE THAN MANUAL"
-            } else {
-                ""
-            }
-            .into(),
-        ));
-        cells
+        },
+    )
+}
+
+fn rows(map: &Map, caption: &str, cell: fn(&Drive) -> Cell) -> Table {
+    let row = |condition: Condition, t_p: f64| {
+        let head = [Cell::Text(name(condition)), Cell::number(t_p, 1)];
+        let drives = of(map, condition).filter(|(place, _)| place.t_p == t_p);
+        head.into_iter()
+            .chain(drives.map(|(_, drive)| cell(drive)))
+            .collect()
     };
-    let of = |what: &str, unit: &str| Condition::ALL.map(|condition| format!("{what} {condition} ({unit})"));
-    let mut columns = vec!["Speed (km/h)".into(), "t_p (s)".into()];
-    columns.extend(of("Growth", "1/s"));
-    columns.extend(of("Peak", "m"));
-    columns.push(String::new());
+    let rows = Condition::ALL
+        .into_iter()
+        .flat_map(|condition| DELAYS_S.map(|t_p| row(condition, t_p)));
     Table {
-        caption: String::new(),
-        columns,
-        rows: map.places.iter().map(row).collect(),
+        caption: caption.into(),
+        columns: ["Drive".into(), "t_p (s)".into()]
+            .into_iter()
+            .chain(SPEEDS_KMH.map(|kmh| format!("{kmh} km/h")))
+            .collect(),
+        rows: rows.collect(),
+    }
+}
+
+/// Every place with the drive of one kind there.
+fn of(map: &Map, condition: Condition) -> impl Iterator<Item = (&Place, &Drive)> {
+    map.places.iter().filter_map(move |place| {
+        let drive = place.drives.iter().find(|drive| drive.condition == condition)?;
+        Some((place, drive))
+    })
+}
+
+fn name(condition: Condition) -> String {
+    match condition {
+        Condition::Manual => "manual".into(),
+        guided => format!("{guided} reliance"),
     }
 }
 
@@ -168,38 +186,124 @@ pub fn shares(map: &Map) -> Table {
     }
 }
 
-/// A panel for each delay: one value over the speed, a line for each way to drive.
-fn figure(map: &Map, label: &str, value: fn(&Drive) -> f64) -> Figure {
-    let panel = |t_p: f64| {
-        let line = |(style, condition): (usize, Condition)| {
-            let places = map.places.iter().filter(|place| place.t_p == t_p);
-            let of = |place: &Place| {
-                place
-                    .drives
-                    .iter()
-                    .find(|drive| drive.condition == condition)
-                    .map(value)
-            };
-            let points = places.map(|place| (place.speed_kmh, of(place).unwrap_or(f64::NAN)));
-            let name = match condition {
-                Condition::Manual => "manual".into(),
-                guided => format!("{guided} reliance"),
-            };
-            Series::line(&name, style, points.collect())
+/// A growth of this size has the strongest colour, 1/s.
+const STRONG_PER_S: f64 = 0.4;
+/// A peak of this size, m: where a vehicle of 1.7 m begins to leave a lane of 3.6 m.
+const LARGE_M: f64 = 0.95;
+
+fn growth_figure(map: &Map) -> Figure {
+    figure(map, |place, drive| {
+        let (kind, style) = if drive.is_stable() {
+            ("stable: an error dies down", 1)
+        } else if place.broken().any(|broken| broken == drive) {
+            ("unstable where manual is stable", 4)
+        } else {
+            ("unstable: an error grows", 3)
         };
-        Panel {
-            title: format!("t_p {t_p} s"),
-            y: Axis::of(label),
-            series: Condition::ALL.into_iter().enumerate().map(line).collect(),
-        }
+        (
+            kind,
+            style,
+            drive.growth_per_s.abs() / STRONG_PER_S,
+            signed(drive.growth_per_s),
+        )
+    })
+}
+
+fn peak_figure(map: &Map) -> Figure {
+    figure(map, |_, drive| match drive.peak_m {
+        Some(peak_m) if peak_m <= LARGE_M => ("within the lane", 1, peak_m / LARGE_M, format!("{peak_m:.3}")),
+        Some(peak_m) => ("out of the lane", 6, 0.3, format!("{peak_m:.3}")),
+        None => ("left the road", 3, 1.0, "off".into()),
+    })
+}
+
+/// What a place of the map is called, its style, how strong its colour is, and what is written there.
+type Shown = (&'static str, usize, f64, String);
+
+/// A map for each way to drive, on the same axes.
+fn figure(map: &Map, show: fn(&Place, &Drive) -> Shown) -> Figure {
+    let size = [SPEEDS_KMH[1] - SPEEDS_KMH[0], DELAYS_S[1] - DELAYS_S[0]];
+    let around = |axis: Axis, all: &[f64], size: f64| {
+        axis.within(all[0] - 0.5 * size, all[all.len() - 1] + 0.5 * size)
+    };
+    // A legend names each kind once.
+    let series = |(place, drive): (&Place, &Drive)| {
+        let (label, style, strength, word) = show(place, drive);
+        let shown = vec![(0.15 + 0.6 * strength.min(1.0), word)];
+        Series::with_mark(
+            label,
+            style,
+            Mark::Fields { size, shown },
+            vec![(place.speed_kmh, place.t_p)],
+        )
+    };
+    let panel = |condition: Condition| Panel {
+        title: name(condition),
+        y: around(Axis::of("t_p", "s"), &DELAYS_S, size[1]),
+        series: of(map, condition).map(series).collect(),
     };
     Figure {
-        x: Axis {
-            label: "Speed (km/h)".into(),
-            limits: Some((SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0)),
-            ..Axis::default()
-        },
-        panels: DELAYS_S.map(panel).to_vec(),
+        x: around(Axis::of("Speed", "km/h"), &SPEEDS_KMH, size[0]),
+        panels: Condition::ALL.map(panel).to_vec(),
         ..Figure::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two places with growths so small that two digits would not tell them apart.
+    #[test]
+    fn a_map_shows_each_verdict_in_colour_and_sign() {
+        let drives = |manual, low| {
+            let drive = |(condition, growth_per_s)| Drive {
+                condition,
+                growth_per_s,
+                peak_m: None,
+                away: Default::default(),
+            };
+            [(Condition::Manual, manual), (Condition::Low, low)]
+                .map(drive)
+                .to_vec()
+        };
+        let place = |speed_kmh, manual, low| Place {
+            speed_kmh,
+            t_p: 0.1,
+            drives: drives(manual, low),
+        };
+        let map = Map {
+            places: vec![place(20.0, -0.0004, 0.0003), place(30.0, 0.0004, 0.2)],
+            shares: Vec::new(),
+        };
+        let figure = growth_figure(&map);
+        let shown = |panel: usize| -> Vec<(&str, &str, (f64, f64))> {
+            let words = figure.panels[panel]
+                .series
+                .iter()
+                .map(|series| match &series.mark {
+                    Mark::Fields { shown, .. } => {
+                        (series.label.as_str(), shown[0].1.as_str(), series.points[0])
+                    }
+                    other => panic!("{other:?}"),
+                });
+            words.collect()
+        };
+        let (stable, grows) = ("stable: an error dies down", "unstable: an error grows");
+        assert_eq!(
+            shown(0),
+            [(stable, "-0.0004", (20.0, 0.1)), (grows, "+0.0004", (30.0, 0.1))]
+        );
+        let worse = "unstable where manual is stable";
+        assert_eq!(
+            shown(3),
+            [(worse, "+0.0003", (20.0, 0.1)), (grows, "+0.200", (30.0, 0.1))]
+        );
+        assert_eq!(figure.panels[0].title, "manual");
+        let text = growth_table(&map).to_text();
+        assert!(
+            text.contains("-0.0004  +0.0004") && text.contains("+0.0003   +0.200"),
+            "{text}"
+        );
     }
 }

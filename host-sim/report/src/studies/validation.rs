@@ -158,7 +158,7 @@ fn coverage_figure(result: &Repetitions) -> Figure {
     Figure {
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("95 % intervals that hold the truth (%)"),
+            y: Axis::of("95 % intervals that hold the truth", "%"),
             series,
         }],
         rows: rows.into_iter().map(String::from).collect(),
@@ -208,7 +208,7 @@ fn methods_figure(lines: &[MethodLine]) -> Figure {
     let panel = |noise: &&str| Panel {
         title: noise.trim_start_matches("lane noise ").into(),
         y: Axis {
-            label: "RMS error / bound".into(),
+            label: "RMS error / bound (-)".into(),
             limits: Some((0.0, SHOWN)),
             ..Axis::default()
         },

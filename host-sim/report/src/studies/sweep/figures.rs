@@ -1,65 +1,40 @@
 //! The figures of a sweep.
 
-use super::words::{by_weight, heading, label};
-use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_batch::sweep::{Effect, Summary};
+use super::words::{OWN_UNIT, by_weight, label, lower, metric};
+use crate::plot::{Axis, Figure, Mark, Marker, Panel, Series};
+use haptic_batch::sweep::{Compared, Drives, Effect, Summary};
 
 /// Fields that are drawn: of more, those that matter most.
 const DRAWN: usize = 6;
 
-pub(super) fn caption(name: &str, summary: &Summary) -> String {
-    match name {
-        "distribution" => "Share of the drives at or below each value.".into(),
-        "influence" if summary.sobol.is_empty() => {
-            format!(
-                "Share of the variance of {} that each field explains by itself.",
-                label(summary.judge)
-            )
-        }
-        "influence" => format!(
-            "Sobol indices of {} with their standard errors.",
-            label(summary.judge)
-        ),
-        _ => {
-            let what = if summary.limit.is_some() {
-                "Share of bad drives"
-            } else {
-                "Mean"
-            };
-            let apart = summary
-                .compare
-                .as_ref()
-                .map_or(String::new(), |field| format!(", by {field}"));
-            format!("{what} by value of each field, of a distribution by its sixteenths{apart}.")
-        }
-    }
-}
+/// A figure with the name of its file and its caption.
+pub(super) type Named = (String, String, Figure);
 
 /// Share of the drives over the value of the metric that judges.
-pub(super) fn distribution(summary: &Summary) -> Figure {
+pub(super) fn distribution(summary: &Summary) -> Named {
+    let (name, unit) = metric(summary.judge);
     let of = summary.distributions.iter().find(|of| of.metric == summary.judge);
     let points = of.map(|of| of.cumulative.clone()).unwrap_or_default();
-    let markers = summary.limit.map(|x| crate::plot::Marker {
+    let markers = summary.limit.map(|x| Marker {
         label: "limit".into(),
         x,
     });
-    Figure {
-        x: Axis::of(&heading(summary.judge)),
+    let figure = Figure {
+        x: Axis::of(&name, unit),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis {
-                limits: Some((0.0, 1.0)),
-                ..Axis::of("Share of the drives")
-            },
+            y: Axis::of("Share of the drives", "-").within(0.0, 1.0),
             series: vec![Series::line("", 0, points)],
         }],
         markers: markers.into_iter().collect(),
         ..Figure::default()
-    }
+    };
+    let caption = "Share of the drives at or below each value.";
+    ("distribution".into(), caption.into(), figure)
 }
 
 /// A row for each field.
-pub(super) fn influence(summary: &Summary) -> Option<Figure> {
+pub(super) fn influence(summary: &Summary) -> Option<Named> {
     let at = |i: usize| (i + 1) as f64;
     let (rows, series): (Vec<String>, Vec<Series>) = if summary.sobol.is_empty() {
         let share = |effect: &Effect| {
@@ -97,7 +72,7 @@ pub(super) fn influence(summary: &Summary) -> Option<Figure> {
                 .map(|index| value(index))
                 .map(|[x, se]| [x - 1.96 * se, x + 1.96 * se])
                 .collect();
-            Series::with_mark(label, style, crate::plot::Mark::Whiskers(ends), points)
+            Series::with_mark(label, style, Mark::Whiskers(ends), points)
         };
         let rows = own.iter().map(|index| index.field.clone()).collect();
         (
@@ -108,95 +83,142 @@ pub(super) fn influence(summary: &Summary) -> Option<Figure> {
             ],
         )
     };
-    (!rows.is_empty()).then(|| Figure {
-        x: Axis::of("Field"),
-        rows,
+    let judge = label(summary.judge);
+    let caption = if summary.sobol.is_empty() {
+        format!("Share of the variance of {judge} that each field explains by itself.")
+    } else {
+        format!("Sobol indices of {judge} with their standard errors.")
+    };
+    let figure = Figure {
         panels: vec![Panel {
             title: String::new(),
-            y: Axis {
-                limits: Some((-0.03, 1.03)),
-                ..Axis::of("Share of the variance")
-            },
+            y: Axis::of("Share of the variance", "-").within(-0.03, 1.03),
             series,
         }],
+        rows,
         ..Figure::default()
-    })
+    };
+    (!figure.rows.is_empty()).then(|| ("influence".into(), caption, figure))
 }
 
-/// A panel for each field with numbers, those that matter most first; each over the range of its own field, as a
-/// share of it, so that the panels can stand over one axis.
-pub(super) fn response(summary: &Summary) -> Option<Figure> {
+/// The metric that judges along each field in which a level is told apart, those that matter most first.
+pub(super) fn responses(summary: &Summary) -> Vec<Named> {
     let mut fields = by_weight(summary);
-    fields.retain(|effect| effect.levels.len() > 1 && effect.levels.iter().all(|l| l.x.is_some()));
+    fields.retain(|effect| effect.levels.len() > 1 && (!effect.best.is_empty() || has_compared(effect)));
     fields.truncate(DRAWN);
-    let panel = |effect: &&Effect| {
-        let mut levels: Vec<(f64, &haptic_batch::sweep::Level)> = effect
-            .levels
-            .iter()
-            .filter_map(|level| Some((level.x?, level)))
-            .collect();
-        levels.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let [low, high] = [levels.first(), levels.last()].map(|end| end.map_or(0.0, |end| end.0));
-        let place = |x: f64| 100.0 * (x - low) / (high - low);
-        let is_share = summary.limit.is_some();
-        let value = |mean: Option<f64>, beyond: Option<f64>| {
-            let value = if is_share { beyond.map(|b| 100.0 * b) } else { mean };
-            value.unwrap_or(f64::NAN)
-        };
-        // Of all drives, or of those with each value of the field that is compared.
-        let parts = levels.iter().map(|(_, level)| level.compared.len()).max();
-        let series = match parts.unwrap_or(0) {
-            0 => {
-                let points = levels
-                    .iter()
-                    .map(|(x, level)| (place(*x), value(level.mean, level.beyond)));
-                joined("", 1, points.collect())
-            }
-            parts => {
-                let part = |i: usize| {
-                    let own = levels
-                        .iter()
-                        .filter_map(|(x, level)| Some((*x, level.compared.get(i)?)));
-                    let label = own.clone().next().map_or("", |(_, own)| own.label.as_str());
-                    let points = own
-                        .clone()
-                        .map(|(x, own)| (place(x), value(own.mean, own.beyond)));
-                    joined(label, i + 1, points.collect())
-                };
-                (0..parts).flat_map(part).collect()
-            }
-        };
-        Panel {
-            title: format!(
-                "{}, {} to {}",
-                effect.field,
-                short_number(low),
-                short_number(high)
-            ),
-            y: Axis::of(if is_share { "Bad (%)" } else { "Mean" }),
-            series,
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() || "._-".contains(c) {
+            c
+        } else {
+            '_'
         }
     };
-    (!fields.is_empty()).then(|| Figure {
-        x: Axis {
-            limits: Some((-2.0, 102.0)),
-            ..Axis::of("Share of the field's range (%)")
-        },
-        same_y: true,
-        panels: fields.iter().map(panel).collect(),
-        ..Figure::default()
-    })
+    let named = |effect: &Effect| {
+        let name = effect.field.chars().map(plain).collect::<String>();
+        let by = if effect.sliced {
+            ", by sixteenths of its distribution"
+        } else {
+            ""
+        };
+        let caption = format!("Along {}{by}.", effect.field);
+        (format!("response-{name}"), caption, response(summary, effect))
+    };
+    fields.into_iter().map(named).collect()
 }
 
-/// Dots that a line joins; one entry in the legend.
-fn joined(label: &str, style: usize, points: Vec<(f64, f64)>) -> Vec<Series> {
+fn response(summary: &Summary, effect: &Effect) -> Figure {
+    let numbers = effect.levels.iter().all(|level| level.x.is_some());
+    let places: Vec<f64> = if numbers {
+        effect.levels.iter().filter_map(|level| level.x).collect()
+    } else {
+        (1..=effect.levels.len()).map(|i| i as f64).collect()
+    };
+    let (name, unit) = metric(summary.judge);
+    let mut panels = vec![Panel {
+        title: String::new(),
+        y: Axis::of(&format!("Mean {}", lower(&name)), unit),
+        series: series(summary, effect, &places, numbers, |drives| {
+            (drives.mean, drives.interval)
+        }),
+    }];
+    if summary.limit.is_some() {
+        panels.push(Panel {
+            title: String::new(),
+            y: Axis::of("Bad drives", "%"),
+            series: series(summary, effect, &places, numbers, |drives| {
+                let ends = drives.beyond_interval.map(|ends| ends.map(|share| 100.0 * share));
+                (drives.beyond.map(|share| 100.0 * share), ends)
+            }),
+        });
+    }
+    let diverged = effect
+        .levels
+        .iter()
+        .zip(&places)
+        .filter(|(level, _)| numbers && level.drives.diverged > 0);
+    let markers = diverged.map(|(_, x)| Marker {
+        label: "drives diverged: their metrics end early".into(),
+        x: *x,
+    });
+    Figure {
+        x: Axis::of(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
+        rows: if numbers {
+            Vec::new()
+        } else {
+            effect.levels.iter().map(|level| level.label.clone()).collect()
+        },
+        panels,
+        markers: markers.collect(),
+        ..Figure::default()
+    }
+}
+
+/// A value and its interval.
+type Known = fn(&Drives) -> (Option<f64>, Option<[f64; 2]>);
+
+/// Of all drives, or of those with each value of the field that is compared; and the best levels.
+fn series(summary: &Summary, effect: &Effect, places: &[f64], joined: bool, known: Known) -> Vec<Series> {
+    let line = |label: &str, style: usize, values: Vec<(f64, Option<&Drives>)>| {
+        let known = |(x, drives): (f64, Option<&Drives>)| {
+            let (value, interval) = known(drives?);
+            let value = value?;
+            Some(((x, value), interval.unwrap_or([value; 2])))
+        };
+        let (points, ends): (Vec<_>, Vec<_>) = values.into_iter().filter_map(known).unzip();
+        let line = Series::with_mark(label, style, Mark::Whiskers(ends), points);
+        if joined { line.joined() } else { line }
+    };
+    let levels = || places.iter().copied().zip(&effect.levels);
+    if let Some(compare) = summary.compare.as_ref().filter(|_| has_compared(effect)) {
+        let longest = effect
+            .levels
+            .iter()
+            .map(|level| &level.compared)
+            .max_by_key(|parts| parts.len());
+        let part = |(i, own): (usize, &Compared)| {
+            let values = levels().map(|(x, level)| {
+                let same = level.compared.iter().find(|other| other.label == own.label);
+                (x, same.map(|own| &own.drives))
+            });
+            line(&format!("{compare} {}", own.label), i + 1, values.collect())
+        };
+        return longest.into_iter().flatten().enumerate().map(part).collect();
+    }
+    let all = line(
+        "mean, with its 95 % interval",
+        1,
+        levels().map(|(x, level)| (x, Some(&level.drives))).collect(),
+    );
+    let best = levels().filter(|(_, level)| effect.best.contains(&level.label));
+    let best = best
+        .filter_map(|(x, level)| Some((x, known(&level.drives).0?)))
+        .collect();
     vec![
-        Series::line(label, style, points.clone()),
-        Series::dots("", style, points),
+        all,
+        Series::dots("best, with what is not told apart from it", 3, best),
     ]
 }
 
-fn short_number(x: f64) -> String {
-    let text = format!("{x:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').into()
+fn has_compared(effect: &Effect) -> bool {
+    effect.levels.iter().any(|level| !level.compared.is_empty())
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitions_table, write_json};
-use figures::{caption, distribution, influence, response};
+use figures::{distribution, influence, responses};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::Away;
 use haptic_batch::sweep::{Driven, Point, Summary, Sweep};
@@ -25,27 +25,19 @@ const FIRST_ROWS: u64 = 5;
 /// What could not be written or drawn.
 pub fn write(sweep: &Sweep, summary: &Summary, file: &str, directory: &Path) -> Result<(), OutputError> {
     let mut sections = Vec::new();
-    let figures = [
-        (
-            "distribution",
-            "How the drives are spread",
-            Some(distribution(summary)),
-        ),
-        ("influence", "What matters most", influence(summary)),
-        ("response", "Along each field", response(summary)),
+    // With each the number of tables that belong to it.
+    let parts = [
+        ("How the drives are spread", vec![distribution(summary)], 1),
+        ("What matters most", influence(summary).into_iter().collect(), 2),
+        ("Which value is best", responses(summary), 2),
     ];
     let mut tables = tables(sweep, summary, file).into_iter();
-    for (name, heading, figure) in figures {
+    for (heading, figures, own) in parts {
         let mut blocks = Vec::new();
-        if let Some(figure) = figure {
-            write_figure(directory, name, &figure)?;
-            blocks.push(Block::Figure {
-                figure,
-                caption: caption(name, summary),
-            });
+        for (name, caption, figure) in figures {
+            write_figure(directory, &name, &figure)?;
+            blocks.push(Block::Figure { figure, caption });
         }
-        // The tables that belong to it.
-        let own = if name == "distribution" { 1 } else { 2 };
         let filled = tables.by_ref().take(own).filter(|table| !table.rows.is_empty());
         blocks.extend(filled.map(Block::Table));
         if !blocks.is_empty() {

@@ -1,10 +1,10 @@
 //! The tables of a sweep.
 
-use super::words::{by_weight, decimals, heading, label};
+use super::words::{OWN_UNIT, by_weight, decimals, heading, label, lower, metric};
 use crate::document::{Cell, Table};
 use haptic_batch::sweep::{Effect, Summary, Sweep};
 
-/// Of what is compared a terminal shows the fields that matter most.
+/// Of distributions and of what is compared a terminal shows the fields that matter most.
 const SHOWN: usize = 2;
 
 /// Distributions, shares of the variance, Sobol indices, levels, what is compared, the worst drives: in this order, some
@@ -14,13 +14,14 @@ pub fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
         distributions(summary),
         shares(summary),
         indices(summary),
-        levels(summary),
+        levels(summary, |_| true),
         compared(summary, usize::MAX),
         worst(sweep, summary, file),
     ]
 }
 
-/// What a terminal shows: of what matters only the metric that judges, and levels only of what is compared.
+/// What a terminal shows: of what matters only the metric that judges; levels where they differ, of distributions those of the
+/// fields that matter most.
 pub fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
     let judge = summary.judge;
     let own = Summary {
@@ -44,10 +45,15 @@ pub fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> 
             .collect(),
         ..summary.clone()
     };
+    let sliced = by_weight(summary).into_iter().filter(|effect| effect.sliced);
+    let most: Vec<&str> = sliced.take(SHOWN).map(|effect| effect.field.as_str()).collect();
     vec![
         distributions(summary),
         shares(&own),
         indices(&own),
+        levels(summary, |effect| {
+            !effect.best.is_empty() && (!effect.sliced || most.contains(&effect.field.as_str()))
+        }),
         compared(summary, SHOWN),
         worst(sweep, summary, file),
     ]
@@ -119,36 +125,64 @@ fn indices(summary: &Summary) -> Table {
     }
 }
 
-fn levels(summary: &Summary) -> Table {
-    let mut columns = vec![
-        "Field".into(),
-        "Value".into(),
-        "Drives".into(),
-        format!("Mean {}", label(summary.judge)),
-    ];
+/// The metric that judges along each field; which level is best is said where one is told apart from another.
+fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
+    let (name, unit) = metric(summary.judge);
+    let mut columns = ["Field", "Value", "Unit", "Drives", "Diverged"]
+        .map(String::from)
+        .to_vec();
+    columns.extend([
+        format!("Mean {} ({unit})", lower(&name)),
+        "95 % from".into(),
+        "to".into(),
+    ]);
     if summary.limit.is_some() {
-        columns.push("Bad (%)".into());
+        columns.extend(["Bad (%)", "95 % from", "to"].map(String::from));
     }
+    columns.push(String::new());
     let digits = decimals(summary.judge);
     let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
-        let mut cells = vec![
-            Cell::Text(effect.field.clone()),
-            Cell::Text(level.label.clone()),
-            Cell::number(level.drives as f64, 0),
-            Cell::Number {
-                value: level.mean,
-                decimals: digits,
-            },
-        ];
-        cells.extend(level.beyond.map(|share| Cell::number(100.0 * share, 2)));
+        let drives = &level.drives;
+        let unit = effect.unit.as_deref().unwrap_or(OWN_UNIT);
+        let mut cells = [&effect.field, &level.label, unit]
+            .map(|text| Cell::Text(text.into()))
+            .to_vec();
+        cells.extend([drives.count, drives.diverged].map(|count| Cell::number(count as f64, 0)));
+        let mut known = |value: Option<f64>, interval: Option<[f64; 2]>, decimals| {
+            let ends = interval.map_or([None; 2], |ends| ends.map(Some));
+            cells.extend([value, ends[0], ends[1]].map(|value| Cell::Number { value, decimals }));
+        };
+        known(drives.mean, drives.interval, digits);
+        if summary.limit.is_some() {
+            let percent = |share: f64| 100.0 * share;
+            known(
+                drives.beyond.map(percent),
+                drives.beyond_interval.map(|ends| ends.map(percent)),
+                2,
+            );
+        }
+        let verdict = match effect.best.contains(&level.label) {
+            true if effect.best.len() > 1 => "among the best",
+            true => "best",
+            false => "",
+        };
+        cells.push(Cell::Text(verdict.into()));
         cells
     };
-    let rows = summary
-        .effects
+    let effects = by_weight(summary);
+    let rows = effects.iter().filter(|effect| shown(effect));
+    let rows = rows.flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
+    let alike: Vec<&str> = effects
         .iter()
-        .flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
+        .filter(|e| e.best.is_empty())
+        .map(|e| e.field.as_str())
+        .collect();
+    let alike = match alike[..] {
+        [] => String::new(),
+        _ => format!("; nothing is told apart along {}", alike.join(", ")),
+    };
     Table {
-        caption: "By value of each field (of a distribution: by sixteenths)".into(),
+        caption: format!("By value of each field (of a distribution: by sixteenths){alike}"),
         columns,
         rows: rows.collect(),
     }
@@ -177,7 +211,7 @@ fn compared(summary: &Summary, most: usize) -> Table {
     let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
         let value = |label: &String| {
             let own = level.compared.iter().find(|own| own.label == *label);
-            let value = own.and_then(|own| own.beyond.map(|share| 100.0 * share).or(own.mean));
+            let value = own.and_then(|own| own.drives.beyond.map(|share| 100.0 * share).or(own.drives.mean));
             Cell::Number {
                 value,
                 decimals: digits,
@@ -186,7 +220,7 @@ fn compared(summary: &Summary, most: usize) -> Table {
         let mut cells = vec![
             Cell::Text(effect.field.clone()),
             Cell::Text(level.label.clone()),
-            Cell::number(level.drives as f64, 0),
+            Cell::number(level.drives.count as f64, 0),
         ];
         cells.extend(labels.iter().map(value));
         cells

@@ -18,6 +18,26 @@ pub(super) fn heading(metric: &str) -> String {
     }
 }
 
+/// Label and unit, `-` if that is 1.
+pub(super) fn metric(metric: &str) -> (String, &'static str) {
+    let unit = definition(metric).map_or("-", |d| d.unit);
+    (label(metric), if unit == "1" { "-" } else { unit })
+}
+
+/// As it stands behind other words: abbreviations keep their capitals.
+pub(super) fn lower(name: &str) -> String {
+    let mut letters = name.chars();
+    match (letters.next(), letters.clone().next()) {
+        (Some(first), Some(second)) if second.is_lowercase() => {
+            format!("{}{}", first.to_lowercase(), letters.as_str())
+        }
+        _ => name.into(),
+    }
+}
+
+/// What stands for the unit of a field that has a name or a factor of the sweep's own.
+pub(super) const OWN_UNIT: &str = "as in the sweep";
+
 /// The varied fields, that which explains most of the metric that judges first.
 pub(super) fn by_weight(summary: &Summary) -> Vec<&Effect> {
     let share = |effect: &Effect| {
