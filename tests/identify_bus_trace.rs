@@ -100,6 +100,69 @@ fn the_driver_is_found_from_the_bus() {
     assert_found(&log);
 }
 
+/// A logger that gets the date after 60 s: before, its clock counts from when it was switched on.
+#[test]
+fn a_clock_that_was_set_during_a_trace_is_refused_or_cut_at_its_line() {
+    let (text, _) = &*DRIVE;
+    let begin_s = 1_700_000_000.0;
+    let mut set_at = 0;
+    let jumped: Vec<String> = (1..)
+        .zip(text.lines())
+        .map(|(line, content)| {
+            let (time, frame) = content[1..].split_once(')').unwrap();
+            let since_s = time.parse::<f64>().unwrap() - begin_s;
+            if since_s >= 60.0 {
+                set_at = if set_at == 0 { line } else { set_at };
+                return content.to_owned();
+            }
+            format!("({since_s:.6}){frame}")
+        })
+        .collect();
+    let jumped = jumped.join("\n");
+    let error = open(&jumped, None).unwrap_err();
+    let line: usize = error
+        .split("line ")
+        .nth(1)
+        .unwrap()
+        .split(':')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    // The first of the frames that are needed is among the first of the new clock.
+    assert!((set_at..set_at + 5).contains(&line), "{error} {set_at}");
+    assert!(
+        error.contains("the time goes from 59.99") && error.contains("to 1700000060"),
+        "{error}"
+    );
+
+    let directory = tempfile::tempdir().unwrap();
+    let trace = directory.path().join("trace.log");
+    std::fs::write(&trace, &jumped).unwrap();
+    let (whole, _) = open(text, None).unwrap();
+    let within = |from_s: f64, to_s: f64| {
+        let stretches = &[(from_s, to_s)];
+        let how = Recording {
+            stretches,
+            ..Recording::default()
+        };
+        open_recording_with(&trace, &how).unwrap().0
+    };
+    let before = within(f64::NEG_INFINITY, 50.0);
+    assert!(
+        (59.0..60.0).contains(&(before.len() as f64 * before.dt_s)),
+        "{}",
+        before.len()
+    );
+    // Stamps of candump are rounded to a microsecond.
+    let torques = before.driver_torque_nm.iter().zip(&whole.driver_torque_nm);
+    assert!(torques.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-3);
+    let after = within(begin_s, f64::INFINITY);
+    assert!((after.start_s - begin_s - 60.0).abs() < 0.1, "{}", after.start_s);
+    let lost = (whole.len() - after.len()) as f64 * whole.dt_s;
+    assert!((lost - 60.0).abs() < 0.1, "{lost}");
+}
+
 /// Between 45 and 85 km/h, by up to 3 m/s2, in the curves too: the driver's model has no speed in it, and the far point is
 /// computed with the speed of each instant.
 #[test]

@@ -4,6 +4,7 @@ mod cli;
 mod course;
 mod documents;
 mod file_fields;
+mod recordings;
 mod study;
 mod sweep;
 mod unguided;

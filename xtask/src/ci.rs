@@ -422,7 +422,17 @@ fn documentation() -> Result<()> {
 fn fuzz() -> Result<()> {
     run(cargo()
         .args(["test", "--release", "-p", "haptic-core", "fuzz::"])
-        .env("HAPTIC_FUZZ_BYTES", "1000000000"))
+        .env("HAPTIC_FUZZ_BYTES", "1000000000"))?;
+    run(cargo()
+        .args([
+            "test",
+            "--release",
+            "-p",
+            "haptic-guidance",
+            "--test",
+            "fuzz_readers",
+        ])
+        .env("HAPTIC_FUZZ_INPUTS", "1000000"))
 }
 
 fn campaign() -> Result<()> {

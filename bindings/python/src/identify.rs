@@ -1,11 +1,8 @@
 //! Identification of a recorded drive.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{
-    COLUMNS, DriveLog, FixError, Mapping, Options, Recording, SPEED_COLUMN, open_mapped,
-};
+use haptic_analysis::identify::{DriveLog, FixError, Mapping, Options, Recording, of_table, open_mapped};
 use haptic_batch::identify::{Method, identify as one, identify_several as several, single_track};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -56,11 +53,12 @@ impl How<'_> {
     }
 
     /// The log of a drive, and what a reader of the results has to know of it.
-    fn open(&self, py: Python<'_>, drive: &Drive<'_>) -> PyResult<(DriveLog, Vec<String>)> {
-        let path = match drive {
-            Drive::File(path) => path,
-            Drive::Columns(columns) => return Ok((log_of(py, columns, self.manual)?, Vec::new())),
-        };
+    fn open(
+        &self,
+        py: Python<'_>,
+        drive: &Drive<'_>,
+        options: &Options,
+    ) -> PyResult<(DriveLog, Vec<String>)> {
         let maps = self.maps.iter().map(|map| map.parse());
         let maps = maps.collect::<Result<Vec<Mapping>, _>>();
         let maps = maps.map_err(|error| errors::input(py, error))?;
@@ -71,8 +69,13 @@ impl How<'_> {
                 .as_ref()
                 .map(|scenario| single_track(&scenario.get().inner)),
             manual: self.manual,
+            stretches: &options.stretches,
         };
-        open_mapped(path, &maps, &how).map_err(|error| errors::input(py, error))
+        match drive {
+            Drive::File(path) => open_mapped(path, &maps, &how).map_err(|error| errors::input(py, error)),
+            Drive::Columns(columns) => of_table(table_of(py, columns)?, &maps, &how)
+                .map_err(|error| errors::input(py, format!("columns: {error}"))),
+        }
     }
 }
 
@@ -84,7 +87,7 @@ pub(crate) fn identify<'py>(
     how: How<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let options = how.options(py)?;
-    let opened = drives.iter().map(|drive| how.open(py, drive));
+    let opened = drives.iter().map(|drive| how.open(py, drive, &options));
     let (mut logs, mut notes): (Vec<_>, Vec<_>) = opened.collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
     let method = if how.as_published {
         Method::Paper
@@ -119,37 +122,18 @@ pub(crate) fn identify<'py>(
     Ok(made)
 }
 
-/// The log of named arrays. They pass through the reader of log files, which checks them; numbers are written so that
-/// they are read back bit for bit.
-fn log_of(py: Python<'_>, columns: &Bound<'_, PyDict>, manual: bool) -> PyResult<DriveLog> {
-    let mut given = Vec::new();
+/// Named arrays.
+fn table_of(py: Python<'_>, columns: &Bound<'_, PyDict>) -> PyResult<Vec<(String, Vec<f64>)>> {
+    let mut table = Vec::new();
     for (name, values) in columns {
         let name: String = name.extract()?;
-        if COLUMNS.contains(&name.as_str()) || name == SPEED_COLUMN {
-            let values: PyReadonlyArray1<'_, f64> = values.extract().map_err(|_| {
-                errors::input(
-                    py,
-                    format!("{name}: a one-dimensional array of float64 is wanted"),
-                )
-            })?;
-            given.push((name, values));
-        }
+        let values: PyReadonlyArray1<'_, f64> = values.extract().map_err(|_| {
+            errors::input(
+                py,
+                format!("{name}: a one-dimensional array of float64 is wanted"),
+            )
+        })?;
+        table.push((name, values.as_array().to_vec()));
     }
-    let rows = given.first().map_or(0, |(_, values)| values.as_array().len());
-    if let Some((name, values)) = given.iter().find(|(_, values)| values.as_array().len() != rows) {
-        let found = values.as_array().len();
-        let message = format!("{name}: {found} rows where {} has {rows}", given[0].0);
-        return Err(errors::input(py, message));
-    }
-    let names: Vec<_> = given.iter().map(|(name, _)| name.as_str()).collect();
-    let mut text = names.join(",") + "\n";
-    for row in 0..rows {
-        for (i, (_, values)) in given.iter().enumerate() {
-            let comma = if i == 0 { "" } else { "," };
-            // Writing to a string does not fail.
-            let _ = write!(text, "{comma}{}", values.as_array()[row]);
-        }
-        text.push('\n');
-    }
-    DriveLog::read(text.as_bytes(), manual).map_err(|error| errors::input(py, format!("columns: {error}")))
+    Ok(table)
 }

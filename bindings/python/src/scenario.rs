@@ -22,7 +22,7 @@ use crate::errors;
 /// ----------
 /// course : str, path or mapping, optional
 ///     ``"paper-course"``, a course file, or its content: ``{"lane_width": 3.6, "segment": [{"length": 100.0}]}``.
-///     An OpenDRIVE file (.xodr) is one too; ``road`` and ``lane`` choose from it.
+///     An OpenDRIVE file (.xodr) is one too; ``road``, ``lane`` and ``turn`` choose from it.
 /// speed : float or mapping, optional
 ///     Constant speed, km/h, 20 to 250; or one that changes through points by time (s) or by place (m):
 ///     ``{"time": [0, 10, 15], "kmh": [60, 60, 40]}``, ``{"place": [0, 200, 300], "kmh": [80, 80, 50]}``.
@@ -212,8 +212,9 @@ impl Scenario {
         if let Some(course @ Value::Table(_)) = whole.get("course") {
             fields.insert("course".into(), course.clone());
             // These chose it from its file.
-            fields.remove("road");
-            fields.remove("lane");
+            for field in ["road", "lane", "turn"] {
+                fields.remove(field);
+            }
         }
         dict(py, &fields)
     }

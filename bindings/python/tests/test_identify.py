@@ -75,7 +75,8 @@ def test_a_simulated_run_is_a_drive():
         (lambda t: t.update(e_y_m=t["e_y_m"][:-1]), "rows"),
         (lambda t: t.update(e_y_m=np.zeros((2, 2))), "dimensions"),
         (lambda t: t.update(wheel_angle_rad=np.degrees(t["wheel_angle_rad"])), "degrees"),
-        (lambda t: t["time_s"].__setitem__(7, 0.0), "line"),
+        (lambda t: t["time_s"].__setitem__(7, 0.0), "row 8"),
+        (lambda t: t["time_s"].__setitem__(slice(900, None), t["time_s"][900:] + 1.7e9), "row 901: the time goes from"),
     ],
 )
 def test_columns_that_are_no_drive_are_refused(change, says):
@@ -158,6 +159,8 @@ def foreign():
         "SteeringAngle": np.degrees(columns["wheel_angle_rad"]),
         "Motor": 1e3 * columns["guidance_torque_nm"],
         "TorsionBar": -columns["driver_torque_nm"],
+        "Speed [km/h]": np.linspace(50.0, 60.0, len(columns["time_s"])),
+        "T_d (Nm)": columns["driver_torque_nm"],
         "Comment": ["a"] * len(columns["time_s"]),
     }
 
@@ -173,6 +176,11 @@ def test_columns_and_files_of_other_names_and_units_are_mapped(tmp_path):
         fit = hg.identify(drive, map=FOREIGN)
         for name in ("t_p", "gain_3", "k_hg"):
             assert fit[name].estimate == pytest.approx(expected[name].estimate, rel=1e-4), name
+    columns["angle [deg]"] = columns["SteeringAngle"]
+    named = dict(FOREIGN, speed_m_per_s="Speed [km/h]", driver_torque_nm="T_d (Nm)", wheel_angle_rad="angle")
+    fit = hg.identify(columns, map=named)
+    assert fit["k_hg"].estimate == pytest.approx(expected["k_hg"].estimate, rel=1e-4)
+    assert ["speed", "13.9 to 16.7 m/s"] in [found[:2] for found in fit.results["preflight"]["reading"]]
     pandas = pytest.importorskip("pandas")
     assert hg.identify(pandas.DataFrame(columns), map=FOREIGN)["t_p"].identified
 
@@ -196,9 +204,9 @@ def test_a_recording_of_the_bus_takes_another_vehicle_and_another_bus(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (dict(map={"e_y": "t"}), "'e_y' is none of time_s"),
-        (dict(map={"e_y_m": "Offset"}), "e_y_m = 'Offset': there is no such column"),
-        (dict(map={"e_y_m": "Comment"}), "e_y_m = 'Comment': there is no such column of numbers"),
+        (dict(map={"e_y": "t"}), 'e_y=t: "e_y" is none of time_s'),
+        (dict(map={"e_y_m": "Offset"}), "there is no channel Offset"),
+        (dict(map={"e_y_m": "Comment"}), "there is no channel Comment"),
         (dict(map={"e_y_m": "t*0"}), "the scale is no number other than 0"),
         (dict(map={"e_y_m": "t*inf"}), "the scale is no number other than 0"),
         (dict(map={"e_y_m": "t*wide"}), "the scale is no number other than 0"),

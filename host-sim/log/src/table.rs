@@ -1,7 +1,7 @@
 //! Tables of text fields under a heading row: CSV as people and programs write it.
 //!
-//! Written: RFC 4180 with a comma, a point as decimal sign and LF. Read: the same, with CR LF, a byte order mark,
-//! blanks around fields, empty lines and lines that begin with `#` passed over. Every row knows the line that it
+//! Written: RFC 4180 with a comma, a point as decimal sign and LF. Read: the same, with semicolons or tabs where the heading
+//! has no comma, with CR LF, a byte order mark, blanks around fields, empty lines and lines that begin with `#` passed over. Every row knows the line that it
 //! stands on. Not here: what the columns mean.
 
 use std::fmt;
@@ -54,7 +54,15 @@ impl fmt::Display for TableError {
             } => write!(f, "line {line}: {found} fields where the header has {expected}"),
             Self::MissingColumn(name) => write!(f, "there is no column {name}"),
             Self::NotANumber { line, column, text } => {
-                write!(f, "line {line}: {column} is {text:?}, which is not a number")
+                let hint = if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
+                    ": the decimal sign is a point"
+                } else {
+                    ""
+                };
+                write!(
+                    f,
+                    "line {line}: {column} is {text:?}, which is not a number{hint}"
+                )
             }
         }
     }
@@ -104,7 +112,10 @@ impl TableReader {
             .filter(|(_, line)| !line.starts_with('#') && !line.trim().is_empty())
             .unzip();
         let mut lines = lines.into_iter();
+        let heading = kept.first().copied().unwrap_or_default();
+        let separator = |c: &char| !heading.contains(',') && heading.contains(*c);
         let mut reader = csv::ReaderBuilder::new()
+            .delimiter([';', '\t'].into_iter().find(separator).map_or(b',', |c| c as u8))
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(Cursor::new(kept.join("\n")));
@@ -184,6 +195,16 @@ impl<W: Write> TableWriter<W> {
     }
 }
 
+/// What loggers write where there is no value.
+const NOTHING: [&str; 6] = ["", "-", "na", "n/a", "nan", "null"];
+
+/// A field as a number: NaN where it says that there is none, nothing where it is a text.
+#[must_use]
+pub fn number(field: &str) -> Option<f64> {
+    let nothing = || NOTHING.contains(&field.trim().to_ascii_lowercase().as_str());
+    field.parse().ok().or_else(|| nothing().then_some(f64::NAN))
+}
+
 /// A number with so many digits after the point. A zero has no sign.
 #[must_use]
 pub fn fixed(value: f64, decimals: usize) -> String {
@@ -218,6 +239,20 @@ mod tests {
         let mut table = TableReader::new(&b"a,b\n1,2\n\n3\n"[..]).unwrap();
         let error = table.rows().nth(1).unwrap().unwrap_err();
         assert_eq!(error.to_string(), "line 4: 1 fields where the header has 2");
+    }
+
+    #[test]
+    fn semicolons_and_tabs_separate_where_the_heading_has_no_comma() {
+        for text in ["a;b\n1;2,5", "a\tb\n1\t2,5", "a,b\n1,\"2,5\""] {
+            let mut table = TableReader::new(text.as_bytes()).unwrap();
+            assert_eq!(table.header(), ["a", "b"]);
+            let row = table.rows().next().unwrap().unwrap();
+            assert_eq!((number(row.field(0)), row.field(1)), (Some(1.0), "2,5"));
+            let text = row.field(1).to_owned();
+            let (line, column) = (row.line, "b".into());
+            let says = "line 2: b is \"2,5\", which is not a number: the decimal sign is a point";
+            assert_eq!(TableError::NotANumber { line, column, text }.to_string(), says);
+        }
     }
 
     #[test]

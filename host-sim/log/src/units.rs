@@ -85,6 +85,22 @@ pub fn factor(from: &str, to: &str) -> Option<f64> {
     (quantity == wanted).then_some(from / to)
 }
 
+/// Whether a unit is one of those that are converted.
+#[must_use]
+pub fn is_known(unit: &str) -> bool {
+    found(unit).is_some()
+}
+
+/// A name and the unit in brackets behind it: `Speed [km/h]`, `T_d (Nm)`.
+#[must_use]
+pub fn in_brackets(text: &str) -> Option<(&str, &str)> {
+    let split = |open: char, close: char| -> Option<(&str, &str)> {
+        let (name, unit) = text.trim().strip_suffix(close)?.rsplit_once(open)?;
+        (!name.trim().is_empty()).then_some((name.trim(), unit.trim()))
+    };
+    split('[', ']').or_else(|| split('(', ')'))
+}
+
 /// The unit that a name ends with, if it does.
 #[must_use]
 pub fn of_name(name: &str) -> Option<&'static str> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_analysis::identify::{Options, open_recording};
+use haptic_analysis::identify::{Options, Recording, open_mapped};
 use haptic_batch::identify::{Drivers, compare_drivers};
 use haptic_report::studies::drivers as files;
 
@@ -12,8 +12,7 @@ use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recorded drives, one of each driver: CSV or candump -L, as for identify. Two are compared; three or more are a
-    /// population too
+    /// Recorded drives, one of each driver, as for identify. Two are compared; three or more are a population too
     #[arg(value_name = "LOG", num_args = 2.., required = true)]
     logs: Vec<PathBuf>,
     /// Drives without guidance: there is no K_hg
@@ -41,7 +40,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     options.check()?;
     let mut logs = Vec::new();
     for path in &arguments.logs {
-        let (log, _) = open_recording(path, None, arguments.manual)?;
+        let how = Recording {
+            manual: arguments.manual,
+            ..Recording::default()
+        };
+        let (log, _) = open_mapped(path, &[], &how)?;
         logs.push((path.display().to_string(), log));
     }
     let output = arguments

@@ -88,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     };
     let course = arguments.course.open()?;
     let output = Output::begin(&arguments.out, "identify")?;
-    let (log, converted) = arguments.recording.open(arguments.manual)?;
+    let (log, converted) = arguments.recording.open(arguments.manual, &options.stretches)?;
     let name = arguments.recording.log.display().to_string();
     let mut drive = if arguments.also.is_empty() {
         identify(&name, &log, &options, method)?
@@ -98,7 +98,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         let mut logs = vec![log];
         for path in &arguments.also {
-            logs.push(arguments.recording.open_other(path, arguments.manual)?.0);
+            logs.push(
+                arguments
+                    .recording
+                    .open_other(path, arguments.manual, &options.stretches)?
+                    .0,
+            );
         }
         identify_several(
             &format!("{name} and {} more", arguments.also.len()),

@@ -29,18 +29,28 @@ pub(super) struct RecordingArguments {
 }
 
 impl RecordingArguments {
-    /// The log, and what a reader of the results has to know of it.
-    pub(super) fn open(&self, manual: bool) -> Result<(DriveLog, Vec<String>), BadInput> {
-        self.open_other(&self.log, manual)
+    /// The log, of which these stretches will be used, and what a reader of the results has to know of it.
+    pub(super) fn open(
+        &self,
+        manual: bool,
+        stretches: &[(f64, f64)],
+    ) -> Result<(DriveLog, Vec<String>), BadInput> {
+        self.open_other(&self.log, manual, stretches)
     }
 
     /// The same of another file, understood in the same way.
-    pub(super) fn open_other(&self, path: &Path, manual: bool) -> Result<(DriveLog, Vec<String>), BadInput> {
+    pub(super) fn open_other(
+        &self,
+        path: &Path,
+        manual: bool,
+        stretches: &[(f64, f64)],
+    ) -> Result<(DriveLog, Vec<String>), BadInput> {
         let maps = self
             .map
             .iter()
             .map(|map| map.parse())
-            .collect::<Result<Vec<Mapping>, _>>()?;
+            .collect::<Result<Vec<Mapping>, _>>()
+            .map_err(|e| format!("--{e}"))?;
         let recording = Recording {
             dbc: self.dbc.as_deref(),
             vehicle: self
@@ -49,6 +59,7 @@ impl RecordingArguments {
                 .map(|path| load_scenario(path).map(|scenario| single_track(&scenario)))
                 .transpose()?,
             manual,
+            stretches,
         };
         Ok(open_mapped(path, &maps, &recording)?)
     }

@@ -24,6 +24,10 @@ pub(super) struct LaneArguments {
     /// the direction of travel
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     lane: Option<i32>,
+    /// Where a junction leads on to several roads, the one to take, by the id of the road through the junction or of the one
+    /// behind it; may be repeated. Without it the way ends at such a junction
+    #[arg(long, value_name = "ID")]
+    turn: Vec<String>,
 }
 
 impl LaneArguments {
@@ -31,6 +35,7 @@ impl LaneArguments {
         LaneChoice {
             road: self.road.clone(),
             lane: self.lane,
+            turns: self.turn.clone(),
         }
     }
 }
@@ -46,7 +51,7 @@ impl CourseArguments {
             }
             None if choice == LaneChoice::default() => Ok(None),
             None => Err(InputError::new(
-                "--road and --lane",
+                "--road, --lane and --turn",
                 "they need --course FILE.xodr",
             )),
         }

@@ -123,8 +123,8 @@ def identify(
     Parameters
     ----------
     drive : path, mapping or Run
-        A CSV, MAT or MDF 4 file, a recording of the bus (candump, ASC, BLF); columns by name (a DataFrame is a mapping
-        too); or a run.
+        A CSV, Parquet, MAT or MDF 4 file, a recording of the bus (candump, ASC, BLF); columns by name (a DataFrame is a
+        mapping too); or a run.
         Needed are ``time_s``, ``e_y_m``, ``e_theta_rad``, ``wheel_angle_rad``, ``guidance_torque_nm`` and
         ``driver_torque_nm``. Where the speed changes, ``speed_m_per_s`` says so.
     also : sequence of drives, optional
@@ -146,8 +146,8 @@ def identify(
     lane_smoothing : bool, optional
         False takes the lane signals as they are: no camera noise is estimated and removed.
     map : mapping of str to str, optional
-        Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}``. Without a scale the unit
-        is converted if a file says it.
+        Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}`` or
+        ``{"speed_m_per_s": "Speed [km/h]"}``. Without a scale the unit is converted if the file or the name says it.
     dbc : path, optional
         What the frames of a recording of the bus mean, if it is not the product's own bus.
     vehicle : Scenario, optional
@@ -188,7 +188,7 @@ def identify(
         dbc=None if dbc is None else os.fspath(dbc),
         vehicle=vehicle,
     )
-    given = [os.fspath(each) if file else _columns(each, maps) for each, file in zip(drives, files)]
+    given = [os.fspath(each) if file else _columns(each) for each, file in zip(drives, files)]
     made = _native.identify(given, how)
     parameters = {}
     for name, unit in made["units"].items():
@@ -200,13 +200,11 @@ def identify(
     return Fit(parameters, made["results"], made["traces"])
 
 
-def _columns(drive: Any, maps: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """The columns of a run or of a mapping, those that are mapped beside them."""
+def _columns(drive: Any) -> dict[str, np.ndarray]:
+    """The columns of a run or of a mapping."""
     table = drive.columns if isinstance(drive, Run) else drive
     columns = {str(name): _column(name, table[name]) for name in table.keys()}
-    columns = {name: column for name, column in columns.items() if column is not None}
-    columns.update({name: _mapped(name, channel, columns) for name, channel in maps.items()})
-    return columns
+    return {name: column for name, column in columns.items() if column is not None}
 
 
 def _column(name: Any, values: Any) -> Optional[np.ndarray]:
@@ -219,21 +217,3 @@ def _column(name: Any, values: Any) -> Optional[np.ndarray]:
         raise InputError(f"{name}: {column.ndim} dimensions, one is wanted")
     return column
 
-
-_NEEDED = ("time_s", "e_y_m", "e_theta_rad", "wheel_angle_rad", "guidance_torque_nm", "driver_torque_nm")
-
-
-def _mapped(name: str, given: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """A column of another name, times its scale, as ``--map`` of the command line has it."""
-    if name not in _NEEDED:
-        raise InputError(f"map: {name!r} is none of {', '.join(_NEEDED)}")
-    channel, star, factor = given.rpartition("*") if "*" in given else (given, "", "1")
-    try:
-        scale = float(factor)
-    except ValueError:
-        scale = 0.0
-    if scale == 0.0 or not np.isfinite(scale):
-        raise InputError(f"map: {name} = {given!r}: the scale is no number other than 0")
-    if channel.strip() not in columns:
-        raise InputError(f"map: {name} = {given!r}: there is no such column of numbers; there are {', '.join(columns)}")
-    return columns[channel.strip()] * scale

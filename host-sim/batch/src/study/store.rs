@@ -144,6 +144,21 @@ fn check(session: &Session, trace: &Trace) -> Result<(), String> {
             return Err(format!("row {}: a value is missing", row + 1));
         }
     }
+    let steps = || {
+        trace
+            .samples
+            .windows(2)
+            .map(|pair| pair[1].time_s - pair[0].time_s)
+    };
+    let usual_s = steps().next().unwrap_or_default();
+    if let Some(row) = steps().position(|step| (step - usual_s).abs() > 0.5 * usual_s) {
+        let [before, after] = [row, row + 1].map(|row| trace.samples[row].time_s);
+        return Err(format!(
+            "row {}: the time goes from {before} to {after} s, where others are {usual_s:.4} s apart: a drive is recorded in one \
+             piece",
+            row + 2
+        ));
+    }
     let lasts_s = last.time_s - first.time_s;
     if lasts_s < LEAST_S {
         return Err(format!(

@@ -143,6 +143,14 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
     let short = out.path().join("short.csv");
     let text = fs::read_to_string(&guided).unwrap();
     fs::write(&short, text.lines().take(200).collect::<Vec<_>>().join("\n")).unwrap();
+    let jumped = out.path().join("jumped.csv");
+    let set = |(row, line): (usize, &str)| match line.split_once(',') {
+        Some((time_s, rest)) if row > 3000 => {
+            format!("{},{rest}\n", time_s.parse::<f64>().unwrap() + 86_400.0)
+        }
+        _ => format!("{line}\n"),
+    };
+    fs::write(&jumped, text.lines().enumerate().map(set).collect::<String>()).unwrap();
     let foreign = out.path().join("foreign.csv");
     fs::write(&foreign, "a,b\n1,2\n").unwrap();
     for (what, path, says) in [
@@ -157,6 +165,11 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
             "driven with guidance, and condition manual is without guidance",
         ),
         ("P03/guided", &short, "it lasts 1.0 s"),
+        (
+            "P03/guided",
+            &jumped,
+            "row 3001: the time goes from 14.995 to 86415 s",
+        ),
         ("P03/guided", &foreign, "time_s"),
         ("P03/guided", &out.path().join("none.csv"), "none.csv"),
         ("P02/guided", &guided, "this participant is simulated"),

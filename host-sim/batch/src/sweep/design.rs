@@ -6,6 +6,9 @@ use haptic_sim::seeds::{self, Stream};
 use super::file::Design;
 use super::sobol::{DIMENSIONS, Dimension};
 
+/// Most slices of a Latin hypercube: they are kept in memory.
+const MOST_SLICES: u64 = 20_000_000;
+
 /// The places of all samples.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
@@ -34,6 +37,13 @@ impl Places {
             return Err(format!(
                 "design = \"{design}\" takes at most {} sampled fields",
                 DIMENSIONS / each
+            ));
+        }
+        if design == Design::LatinHypercube && samples.saturating_mul(names.len() as u64) > MOST_SLICES {
+            return Err(format!(
+                "samples: {samples} of {} fields are more slices than a latin-hypercube keeps, {MOST_SLICES}; sobol and \
+                 random keep none",
+                names.len()
             ));
         }
         let field = |(i, name): (usize, &String)| {

@@ -179,7 +179,7 @@ impl SweepFile {
             return Err(InputError::new(name, format!("{} is varied twice", twice[0])));
         }
         for path in paths {
-            if ["road", "lane"].contains(&path.as_str()) {
+            if ["road", "lane", "turn"].contains(&path.as_str()) {
                 let cure = "vary `course` over files that hold the lanes (`host-sim course FILE --out DIR` writes them)";
                 return Err(InputError::new(
                     name,

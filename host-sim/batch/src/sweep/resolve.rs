@@ -59,6 +59,10 @@ pub(super) fn resolve(name: &str, text: &str, folder: &Path) -> Result<String, I
             .remove("lane")
             .and_then(|lane| lane.as_integer())
             .and_then(|lane| i32::try_from(lane).ok()),
+        turns: scenario
+            .remove("turn")
+            .and_then(|turns| turns.try_into().ok())
+            .unwrap_or_default(),
     };
     for course in courses_of(name, &file, &scenario)? {
         if course != PAPER_COURSE && !courses.contains_key(&course) {

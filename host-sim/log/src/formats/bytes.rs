@@ -1,5 +1,7 @@
 //! Little-endian numbers at places that a file names, and that may not be there.
 
+use miniz_oxide::inflate::TINFLStatus;
+
 use crate::recording::RecordingError;
 
 /// Bytes of a file.
@@ -48,11 +50,47 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// What a file's compressed bytes may grow to: 1 GiB.
-const LARGEST: usize = 1 << 30;
+/// What the bytes of a file may grow to: so much however small it is, and so many times its size.
+const USUAL: usize = 64 << 20;
+const TIMES: usize = 64;
+/// Most values, in the same way.
+const USUAL_VALUES: usize = 20_000_000;
 
-/// Undoes zlib, up to a size that no recording needs.
-pub(super) fn inflated(compressed: &[u8]) -> Result<Vec<u8>, RecordingError> {
-    miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(compressed, LARGEST)
-        .map_err(|e| RecordingError(format!("the compressed bytes are damaged ({})", e)))
+/// What a file may still grow to when it is read. A few bytes can stand for any number of zeros.
+pub(super) struct Room {
+    bytes: usize,
+    values: usize,
+}
+
+impl Room {
+    pub(super) fn of(file: &[u8]) -> Self {
+        let more = file.len().saturating_mul(TIMES);
+        Self {
+            bytes: USUAL.saturating_add(more),
+            values: USUAL_VALUES.saturating_add(more),
+        }
+    }
+
+    /// Undoes zlib.
+    pub(super) fn inflated(&mut self, compressed: &[u8]) -> Result<Vec<u8>, RecordingError> {
+        let inflated = miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(compressed, self.bytes);
+        let inflated = inflated.map_err(|e| match e.status {
+            TINFLStatus::HasMoreOutput => too_large(),
+            _ => RecordingError(format!("the compressed bytes are damaged ({e})")),
+        })?;
+        self.bytes -= inflated.len();
+        Ok(inflated)
+    }
+
+    /// Takes so many values.
+    pub(super) fn take(&mut self, values: usize) -> Result<(), RecordingError> {
+        self.values = self.values.checked_sub(values).ok_or_else(too_large)?;
+        Ok(())
+    }
+}
+
+fn too_large() -> RecordingError {
+    RecordingError(
+        "it holds more than a file of its size can: it is damaged, or made to fill a memory".into(),
+    )
 }

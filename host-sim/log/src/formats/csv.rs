@@ -1,7 +1,9 @@
 //! CSV: a heading with units in the names or in brackets behind them, and numbers that are read back bit for bit.
 
+use std::collections::HashMap;
+
 use crate::recording::{Group, RecordingError, Series};
-use crate::table::{TableReader, TableWriter};
+use crate::table::{TableError, TableReader, TableWriter, number};
 use crate::units;
 
 fn refuse(e: impl std::fmt::Display) -> RecordingError {
@@ -11,56 +13,48 @@ fn refuse(e: impl std::fmt::Display) -> RecordingError {
 /// Columns of numbers; an empty field is NaN. A column that holds no number at all is passed over, as text is.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Series>, RecordingError> {
     let mut table = TableReader::new(bytes).map_err(refuse)?;
-    let mut columns: Vec<Series> = table.header().iter().map(|name| heading(name)).collect();
-    let mut is_text = vec![None; columns.len()];
+    let mut columns = headings(table.header());
+    let (mut is_text, mut has_numbers) = (vec![false; columns.len()], vec![false; columns.len()]);
     for row in table.rows() {
         let row = row.map_err(refuse)?;
         for (c, column) in columns.iter_mut().enumerate() {
-            let text = row.field(c);
-            let value = match text.parse() {
-                Ok(value) => value,
-                Err(_) if text.is_empty() => f64::NAN,
-                // Text from the first row on is a column of text; later it is a mistake.
-                Err(_) if row_count(column) == 0 || is_text[c] == Some(true) => {
-                    is_text[c] = Some(true);
-                    f64::NAN
-                }
-                Err(_) => {
-                    let name = &column.name;
-                    return Err(refuse(format!(
-                        "line {}: {name} is {text:?}, which is not a number",
-                        row.line
-                    )));
-                }
-            };
-            column.values.push(value);
+            let value = number(row.field(c));
+            // Text before any number is a column of text; later it is a mistake.
+            if value.is_none() && has_numbers[c] {
+                return Err(refuse(TableError::NotANumber {
+                    line: row.line,
+                    column: column.name.clone(),
+                    text: row.field(c).into(),
+                }));
+            }
+            is_text[c] |= value.is_none();
+            has_numbers[c] |= value.is_some_and(|value| !value.is_nan()) && !is_text[c];
+            column.values.push(value.unwrap_or(f64::NAN));
         }
     }
-    let kept = columns
-        .into_iter()
-        .zip(is_text)
-        .filter(|(_, is_text)| *is_text != Some(true));
+    let kept = columns.into_iter().zip(is_text).filter(|(_, is_text)| !is_text);
     Ok(kept.map(|(column, _)| column).collect())
 }
 
-fn row_count(column: &Series) -> usize {
-    column.values.len()
-}
-
-/// `name [unit]`, `name (unit)` or `name`.
-fn heading(text: &str) -> Series {
-    let split = |open: char, close: char| -> Option<(&str, &str)> {
-        let (name, unit) = text.trim().strip_suffix(close)?.rsplit_once(open)?;
-        (!name.trim().is_empty()).then_some((name.trim(), unit.trim()))
-    };
-    let (name, unit) = split('[', ']')
-        .or_else(|| split('(', ')'))
-        .unwrap_or((text.trim(), ""));
-    Series {
-        name: name.into(),
-        unit: unit.into(),
-        ..Series::default()
+/// Columns by their headings, without the units in brackets unless those alone tell two of them apart.
+pub(super) fn headings(texts: &[String]) -> Vec<Series> {
+    fn split(text: &str) -> (&str, &str) {
+        units::in_brackets(text).unwrap_or((text.trim(), ""))
     }
+    let mut count: HashMap<&str, usize> = HashMap::new();
+    for text in texts {
+        *count.entry(split(text).0).or_default() += 1;
+    }
+    let series = |text: &String| {
+        let (name, unit) = split(text);
+        let alone = count[name] == 1;
+        Series {
+            name: if alone { name } else { text.trim() }.into(),
+            unit: unit.into(),
+            ..Series::default()
+        }
+    };
+    texts.iter().map(series).collect()
 }
 
 pub(super) fn write(group: &Group) -> Result<Vec<u8>, RecordingError> {

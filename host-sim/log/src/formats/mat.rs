@@ -3,7 +3,7 @@
 //! Read are real vectors of any class, plain or compressed. The crate matfile is not used: it reads numbers alone, so the
 //! units would be lost.
 
-use super::bytes::{Bytes, inflated};
+use super::bytes::{Bytes, Room};
 use crate::recording::{Group, RecordingError, Series};
 
 const MATRIX: u32 = 14;
@@ -138,6 +138,7 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
         }
     }
     let (mut columns, mut units, mut sources) = (Vec::new(), Vec::new(), Vec::new());
+    let mut room = Room::of(file);
     let mut at = 128;
     while at + 8 <= file.len() as u64 {
         let (kind, contents, next) = element(b, at)?;
@@ -146,7 +147,7 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
         let contents = match kind {
             MATRIX => contents,
             COMPRESSED => {
-                unpacked = inflated(contents.0)?;
+                unpacked = room.inflated(contents.0)?;
                 match element(Bytes(&unpacked), 0)? {
                     (MATRIX, contents, _) => contents,
                     _ => continue,
@@ -155,11 +156,14 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
             _ => continue,
         };
         match matrix(contents, 0)? {
-            (name, Value::Numbers(values)) => columns.push(Series {
-                name,
-                values,
-                ..Series::default()
-            }),
+            (name, Value::Numbers(values)) => {
+                room.take(values.len())?;
+                columns.push(Series {
+                    name,
+                    values,
+                    ..Series::default()
+                });
+            }
             (name, Value::Fields(fields)) if name == "units" => units = fields,
             (name, Value::Fields(fields)) if name == "sources" => sources = fields,
             _ => {}

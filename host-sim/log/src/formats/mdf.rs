@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 
 use mdf4_rs::{DataType, DecodedValue, MdfWriter};
 
-use super::bytes::{Bytes, inflated};
+use super::bytes::{Bytes, Room};
 use crate::recording::{Group, Recording, RecordingError, Series};
 
 const HEAD: u64 = 24;
@@ -24,6 +24,7 @@ struct Block<'a> {
 
 impl<'a> Block<'a> {
     fn at(bytes: Bytes<'a>, at: u64) -> Result<Self, RecordingError> {
+        bytes.slice(at, HEAD)?;
         let (length, links) = (bytes.u64(at + 8)?, bytes.u64(at + 16)?);
         let end = at.checked_add(length).filter(|end| *end <= bytes.0.len() as u64);
         let fits = |end: &u64| links.checked_mul(8).is_some_and(|l| at + HEAD + l <= *end);
@@ -102,51 +103,62 @@ fn text(bytes: Bytes<'_>, at: u64) -> Result<String, RecordingError> {
     Ok(inside.map_or(String::new(), |(inside, _)| inside.trim().to_owned()))
 }
 
-/// The records of a data group: its blocks, put together.
-fn records(
-    bytes: Bytes<'_>,
-    at: u64,
-    seen: &mut HashSet<u64>,
-    out: &mut Vec<u8>,
-) -> Result<(), RecordingError> {
-    if at == 0 {
-        return Ok(());
-    }
-    if !seen.insert(at) {
-        return Err(format!("byte {at}: the data blocks form a circle").into());
-    }
-    let block = Block::at(bytes, at)?;
-    match block.kind() {
-        b"##DT" | b"##DV" => out.extend_from_slice(block.contents()?),
-        b"##DZ" => out.extend(unzipped(&block)?),
-        b"##HL" => records(bytes, block.link(0), seen, out)?,
-        b"##DL" => {
-            let mut list = Some(block);
-            while let Some(block) = list {
-                for i in 1..block.links {
-                    records(bytes, block.link(i), seen, out)?;
-                }
-                let next = block.link(0);
-                if next != 0 && !seen.insert(next) {
-                    return Err(format!("byte {next}: the data lists form a circle").into());
-                }
-                list = (next != 0)
-                    .then(|| Block::at(bytes, next)?.expect("##DL"))
-                    .transpose()?;
-            }
-        }
-        other => {
-            let kind = String::from_utf8_lossy(other);
-            return Err(format!("byte {at}: data in a block {kind} are not read").into());
-        }
-    }
-    Ok(())
+/// The data blocks of a file, of which none is used twice.
+struct Data<'a> {
+    bytes: Bytes<'a>,
+    seen: HashSet<u64>,
+    room: Room,
 }
 
-fn unzipped(block: &Block<'_>) -> Result<Vec<u8>, RecordingError> {
+/// A list of lists of blocks is as deep as data are.
+const DEEPEST: u32 = 4;
+
+impl Data<'_> {
+    /// Appends the records of a data group: its blocks, put together.
+    fn records(&mut self, at: u64, depth: u32, out: &mut Vec<u8>) -> Result<(), RecordingError> {
+        if at == 0 {
+            return Ok(());
+        }
+        let refuse = |what: &str| Err(RecordingError(format!("byte {at}: {what}")));
+        if depth > DEEPEST {
+            return refuse("the data blocks are nested too deep");
+        }
+        if !self.seen.insert(at) {
+            return refuse("the data block is used twice");
+        }
+        let block = Block::at(self.bytes, at)?;
+        match block.kind() {
+            b"##DT" | b"##DV" => out.extend_from_slice(block.contents()?),
+            b"##DZ" => out.extend(unzipped(&block, &mut self.room)?),
+            b"##HL" => self.records(block.link(0), depth + 1, out)?,
+            b"##DL" => {
+                let mut list = Some(block);
+                while let Some(block) = list {
+                    for i in 1..block.links {
+                        self.records(block.link(i), depth + 1, out)?;
+                    }
+                    let next = block.link(0);
+                    if next != 0 && !self.seen.insert(next) {
+                        return refuse("the data lists form a circle");
+                    }
+                    list = (next != 0)
+                        .then(|| Block::at(self.bytes, next)?.expect("##DL"))
+                        .transpose()?;
+                }
+            }
+            other => {
+                let kind = String::from_utf8_lossy(other);
+                return refuse(&format!("data in a block {kind} are not read"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unzipped(block: &Block<'_>, room: &mut Room) -> Result<Vec<u8>, RecordingError> {
     let (b, data) = (block.bytes, block.data());
     let (method, columns) = (b.u8(data + 2)?, b.u32(data + 4)? as usize);
-    let bytes = inflated(b.slice(data + 24, b.u64(data + 16)?)?)?;
+    let bytes = room.inflated(b.slice(data + 24, b.u64(data + 16)?)?)?;
     match method {
         0 => Ok(bytes),
         // Bytes of one place in all records stand together.
@@ -340,6 +352,11 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
     }
     let header = Block::at(bytes, 64)?.expect("##HD")?;
     let mut groups = Vec::new();
+    let mut blocks = Data {
+        bytes,
+        seen: HashSet::new(),
+        room: Room::of(file),
+    };
     for data_group in chain(bytes, header.link(0), "##DG")? {
         let id_size = u64::from(bytes.u8(data_group.data())?);
         let mut open = HashMap::new();
@@ -365,8 +382,8 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
             );
         }
         let mut data = Vec::new();
-        records(bytes, data_group.link(2), &mut HashSet::new(), &mut data)?;
-        sort(Bytes(&data), id_size, &mut open)?;
+        blocks.records(data_group.link(2), 0, &mut data)?;
+        sort(Bytes(&data), id_size, &mut open, &mut blocks.room)?;
         let mut made: Vec<(u64, Open)> = open.into_iter().collect();
         made.sort_by_key(|(id, _)| *id);
         groups.extend(made.into_iter().filter_map(|(_, open)| finished(open)));
@@ -378,7 +395,12 @@ pub(super) fn read(file: &[u8]) -> Result<Recording, RecordingError> {
 }
 
 /// Every record to its group.
-fn sort(data: Bytes<'_>, id_size: u64, open: &mut HashMap<u64, Open>) -> Result<(), RecordingError> {
+fn sort(
+    data: Bytes<'_>,
+    id_size: u64,
+    open: &mut HashMap<u64, Open>,
+    room: &mut Room,
+) -> Result<(), RecordingError> {
     let only = open.keys().next().copied().unwrap_or_default();
     let mut at = 0;
     while at + id_size < data.0.len() as u64 {
@@ -402,6 +424,7 @@ fn sort(data: Bytes<'_>, id_size: u64, open: &mut HashMap<u64, Open>) -> Result<
             return Err(format!("group {:?}: its records have no bytes", group.name).into());
         }
         let record = data.slice(at, group.size)?;
+        room.take(group.places.len())?;
         for place in &mut group.places {
             let value = place.value(record, group.rows);
             place.series.values.push(value);

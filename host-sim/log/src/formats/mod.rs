@@ -11,7 +11,7 @@
 //! | `.asc`, `.blf` | Vector's logs | frames | frames |
 //!
 //! What holds frames needs a DBC file to become channels. A file that is damaged is refused in one sentence: nothing here
-//! indexes or allocates by what a file says without a look at how much there is.
+//! indexes or allocates by what a file says without a look at how much there is. `tests/fuzz_readers/` holds that.
 
 pub mod asc;
 pub mod blf;
@@ -167,7 +167,21 @@ fn contents(bytes: Vec<u8>, format: Format, time: Option<&TimeColumn>) -> Result
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => return Err(NO_PARQUET.to_owned().into()),
     };
-    Ok(Contents::Channels(with_time(table, time)?.described()))
+    Ok(Contents::Channels(with_time(table, time)?))
+}
+
+/// A recording of columns in memory, by their names with or without units in brackets; the time is among them.
+///
+/// # Errors
+/// No time; columns of different lengths.
+pub fn table(
+    columns: Vec<(String, Vec<f64>)>,
+    time: Option<&TimeColumn>,
+) -> Result<Recording, RecordingError> {
+    let (names, values): (Vec<String>, Vec<Vec<f64>>) = columns.into_iter().unzip();
+    let columns = csv::headings(&names).into_iter().zip(values);
+    let columns = columns.map(|(heading, values)| Series { values, ..heading });
+    with_time(columns.collect(), time)
 }
 
 #[cfg(not(feature = "parquet"))]
@@ -176,7 +190,14 @@ const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the
 /// Columns of a table, the time among them, as a recording.
 fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Recording, RecordingError> {
     let (wanted, scale) = time.map_or(("time_s", None), |t| (t.name.as_str(), t.scale));
-    let Some(place) = columns.iter().position(|c| c.name.eq_ignore_ascii_case(wanted)) else {
+    let bare = |text: &str| {
+        units::in_brackets(text)
+            .map_or(text, |(name, _)| name)
+            .to_lowercase()
+    };
+    let exact = columns.iter().position(|c| c.name.eq_ignore_ascii_case(wanted));
+    let place = exact.or_else(|| columns.iter().position(|c| bare(&c.name) == bare(wanted)));
+    let Some(place) = place else {
         let names: Vec<&str> = columns.iter().take(8).map(|c| c.name.as_str()).collect();
         return Err(format!(
             "there is no channel {wanted}; if another one is the time, --map time_s=NAME says so (there are {})",
@@ -185,10 +206,10 @@ fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Reco
         .into());
     };
     let time = columns.remove(place);
-    let unit = if time.unit.is_empty() {
-        units::of_name(&time.name).unwrap_or("s")
-    } else {
-        &time.unit
+    let unit = match (time.unit.as_str(), units::in_brackets(&time.name)) {
+        ("", Some((_, unit))) => unit,
+        ("", None) => units::of_name(&time.name).unwrap_or("s"),
+        (unit, _) => unit,
     };
     let factor = scale.or_else(|| units::factor(unit, "s")).ok_or_else(|| {
         RecordingError(format!(
@@ -199,20 +220,21 @@ fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Reco
     if let Some(other) = columns.iter().find(|c| c.values.len() != time.values.len()) {
         let (found, rows) = (other.values.len(), time.values.len());
         return Err(format!(
-            "channel {}: {found} values where {} has {rows}",
+            "channel {}: {found} rows where {} has {rows}",
             other.name, time.name
         )
         .into());
     }
     // 1.0 changes no bit.
     let time_s = time.values.iter().map(|t| t * factor).collect();
-    Ok(Recording {
+    let recording = Recording {
         groups: vec![Group {
             name: String::new(),
             time_s,
             channels: columns,
         }],
-    })
+    };
+    Ok(recording.described())
 }
 
 /// Writes channels into the file at `path`.

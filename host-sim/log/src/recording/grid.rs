@@ -2,6 +2,11 @@
 
 use super::{Group, Recording, RecordingError, Series};
 
+/// Most values of a table on an even grid.
+const MOST_VALUES: f64 = 3e7;
+/// Most rows between two values of a channel.
+const MOST_BRIDGED: f64 = 1e6;
+
 impl Recording {
     /// All channels over one list of instants: those of every group. Where a channel has no value of its own it is NaN.
     ///
@@ -75,7 +80,7 @@ impl Recording {
     /// on the line between their neighbours.
     ///
     /// # Errors
-    /// No time that all channels cover, instants that do not grow, more than 100 million values.
+    /// No time that all channels cover, instants that do not grow, a clock that was set, more than 30 million values.
     pub fn resampled(&self, rate_hz: f64) -> Result<Group, RecordingError> {
         let whole = |name: &str| {
             let mut all = self
@@ -93,7 +98,6 @@ impl Recording {
     /// # Errors
     /// As there.
     fn on_grid(&self, rate_hz: f64, held: impl Fn(&str) -> bool) -> Result<Group, RecordingError> {
-        const MOST_VALUES: f64 = 1e8;
         self.check_names()?;
         let channels: Vec<(&Group, &Series)> = self
             .groups
@@ -115,6 +119,18 @@ impl Recording {
                 return Err(format!("channel {name}: row {}: the time does not grow", k + 2).into());
             }
             let (time_s, values) = with_values(group, channel);
+            let longest = (1..time_s.len()).max_by(|a, b| {
+                let gap = |k: usize| time_s[k] - time_s[k - 1];
+                gap(*a).total_cmp(&gap(*b))
+            });
+            if let Some(k) = longest.filter(|&k| (time_s[k] - time_s[k - 1]) * rate_hz > MOST_BRIDGED) {
+                let (name, before, after) = (&channel.name, time_s[k - 1], time_s[k]);
+                return Err(format!(
+                    "channel {name}: its time goes from {before} to {after} s: a clock that was set, or a logger that slept; \
+                     cut the file there, or leave the instants as they are (no --rate)"
+                )
+                .into());
+            }
             if !time_s.is_empty() {
                 courses.push((channel, time_s, values));
             }
@@ -132,7 +148,13 @@ impl Recording {
             return Err("the channels have no time in common".to_owned().into());
         }
         if rows * courses.len() as f64 > MOST_VALUES {
-            return Err(format!("{rows_f} rows at {rate_hz} Hz are too many", rows_f = rows as u64).into());
+            let (span_s, count) = (to - from, courses.len());
+            return Err(format!(
+                "{count} channels over {span_s:.0} s at {rate_hz} Hz are {:.1e} values, and {MOST_VALUES:.0e} are the most: \
+                 give a lower --rate",
+                rows * count as f64
+            )
+            .into());
         }
         let time_s: Vec<f64> = (0..rows as usize).map(|k| from + k as f64 / rate_hz).collect();
         let channels = courses

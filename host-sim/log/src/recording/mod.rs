@@ -134,7 +134,7 @@ impl Recording {
         lines.collect()
     }
 
-    /// The channel of a name, or of a group's name, a point and a name.
+    /// The channel of a name, or of a group's name, a point and a name; with or without its unit in brackets behind it.
     ///
     /// # Errors
     /// There is none, with the names that come near; there are several.
@@ -147,9 +147,26 @@ impl Recording {
             all.filter(|(g, c)| c.name == wanted || format!("{}.{}", g.name, c.name) == wanted)
                 .collect()
         };
-        match named(name)[..] {
+        let bare = |text: &str| units::in_brackets(text).map_or(text, |(name, _)| name).to_owned();
+        let mut found = named(name);
+        if found.is_empty() {
+            found = named(&bare(name));
+        }
+        if found.is_empty() {
+            let all = self
+                .groups
+                .iter()
+                .flat_map(|g| g.channels.iter().map(move |c| (g, c)));
+            found = all.filter(|(_, c)| bare(&c.name) == name).collect();
+        }
+        match found[..] {
             [found] => Ok(found),
             [] => Err(format!("there is no channel {name}{}", self.near(name)).into()),
+            [(first, a), (second, b), ..] if std::ptr::eq(first, second) => Err(format!(
+                "channel {name} is there twice, as {} and as {}: say which",
+                a.name, b.name
+            )
+            .into()),
             [(first, _), (second, _), ..] => Err(format!(
                 "channel {name} is there in groups {:?} and {:?}: say which, as GROUP.{name}",
                 first.name, second.name
@@ -188,7 +205,13 @@ impl Recording {
                     channel.source = own.source.to_string();
                 }
             } else if channel.unit.is_empty() {
-                channel.unit = units::of_name(&channel.name).unwrap_or_default().to_owned();
+                let in_brackets = units::in_brackets(&channel.name)
+                    .map(|(_, unit)| unit)
+                    .filter(|unit| units::is_known(unit));
+                let unit = in_brackets
+                    .or_else(|| units::of_name(&channel.name))
+                    .unwrap_or_default();
+                channel.unit = unit.to_owned();
             }
         }
         self

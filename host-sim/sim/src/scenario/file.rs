@@ -30,6 +30,7 @@ pub(super) fn parse(
     let choice = LaneChoice {
         road: file.road.clone(),
         lane: file.lane,
+        turns: file.turn.clone(),
     };
     let course = match &file.course {
         CourseField::Named(path) if path != PAPER_COURSE => course(path, &choice)?,
@@ -114,6 +115,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         },
         road: None,
         lane: None,
+        turn: Vec::new(),
         speed: speed.clone(),
         condition: match scenario.condition() {
             // The gains say the rest.
@@ -254,6 +256,8 @@ struct ScenarioFile {
     road: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     lane: Option<i32>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    turn: Vec<String>,
     speed: Speed,
     condition: Condition,
     sensors: Sensors,
@@ -277,6 +281,7 @@ impl Default for ScenarioFile {
             course: CourseField::Named(PAPER_COURSE.into()),
             road: None,
             lane: None,
+            turn: Vec::new(),
             speed: Speed::Constant(DEFAULT_SPEED_KMH),
             condition: Condition::Mid,
             sensors: Sensors::default(),

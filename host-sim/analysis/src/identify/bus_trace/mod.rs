@@ -13,10 +13,12 @@
 mod far_point;
 mod protection;
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use can_dbc::Dbc;
 
+use super::log::jumps::jump;
 use super::log::{DriveLog, LogError};
 pub use far_point::SingleTrack;
 use haptic_log::candump::{self, CandumpFrame};
@@ -32,6 +34,8 @@ const RATE_HZ: f64 = 120.0;
 const LONGEST_PAUSE_S: f64 = 0.03;
 /// Below it the vehicle model's equations, which divide by the speed, are not used, m/s.
 const TOO_SLOW_M_PER_S: f64 = 2.5;
+/// Faster than any car, m/s: a signal that says so is wrong.
+const TOO_FAST_M_PER_S: f64 = 200.0;
 /// Slowest mean speed, m/s, at which the guidance works.
 const SLOWEST_M_PER_S: f64 = 5.0;
 
@@ -53,6 +57,9 @@ pub struct Recording<'a> {
     pub vehicle: Option<SingleTrack>,
     /// Without guidance.
     pub manual: bool,
+    /// The stretches that will be used, s of the log's time; all of it if there is none. They choose a side where the clock
+    /// was set.
+    pub stretches: &'a [(f64, f64)],
 }
 
 /// Reads the log at `path`, a CSV file or a trace of `candump`; `dbc` says what the trace's frames mean, if it is not
@@ -65,8 +72,12 @@ pub fn open_recording(
     dbc: Option<&Path>,
     manual: bool,
 ) -> Result<(DriveLog, Option<&'static str>), LogError> {
-    let vehicle = None;
-    open_recording_with(path, &Recording { dbc, vehicle, manual })
+    let how = Recording {
+        dbc,
+        manual,
+        ..Recording::default()
+    };
+    open_recording_with(path, &how)
 }
 
 /// The same of a vehicle that is not that of table 9.
@@ -79,17 +90,22 @@ pub fn open_recording_with(
 ) -> Result<(DriveLog, Option<&'static str>), LogError> {
     let named = |e: String| LogError::new(format!("{}: {e}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| named(e.to_string()))?;
-    let text = std::str::from_utf8(&bytes)
+    of_text(&bytes, recording).map_err(named)
+}
+
+/// A log of the text of either kind, and the sentence about it.
+pub(super) fn of_text(
+    bytes: &[u8],
+    recording: &Recording<'_>,
+) -> Result<(DriveLog, Option<&'static str>), String> {
+    let text = std::str::from_utf8(bytes)
         .ok()
         .filter(|t| candump::looks_like_one(t));
     let Some(text) = text else {
-        return Ok((
-            DriveLog::read(&bytes[..], recording.manual).map_err(|e| named(e.to_string()))?,
-            None,
-        ));
+        let log = DriveLog::read_within(bytes, recording.manual, recording.stretches);
+        return Ok((log.map_err(|e| e.to_string())?, None));
     };
-    let records = candump::parse(text).map_err(named)?;
-    let (log, note) = of_frames(&records, recording).map_err(named)?;
+    let (log, note) = of_frames(&candump::parse(text)?, recording)?;
     Ok((log, Some(note)))
 }
 
@@ -99,8 +115,7 @@ pub(super) fn of_frames(
     recording: &Recording<'_>,
 ) -> Result<(DriveLog, &'static str), String> {
     let dbc = dbc_text(recording.dbc).map_err(|e| e.to_string())?;
-    let vehicle = recording.vehicle.unwrap_or(far_point::TABLE_9);
-    let log = read_trace(records, &dbc, &vehicle, recording.manual)?;
+    let log = read_trace(records, &dbc, recording)?;
     let note = if recording.vehicle.is_some() {
         NOTE_OF_OTHER
     } else {
@@ -125,12 +140,10 @@ struct Course {
     value: Vec<f64>,
 }
 
-fn read_trace(
-    records: &[CandumpFrame],
-    dbc: &str,
-    vehicle: &SingleTrack,
-    manual: bool,
-) -> Result<DriveLog, String> {
+/// Place of T_h among the signals that a log needs: behind e_y, e_theta, T_d and the wheel angle.
+const GUIDANCE: usize = 4;
+
+fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Result<DriveLog, String> {
     let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
     let mut audits: Vec<Audit> = Vec::new();
     let mut course = |name| Course::of(name, &dbc, records, &mut audits);
@@ -140,13 +153,12 @@ fn read_trace(
     let valid = course("LanePreview_Valid")?;
     let age = course("LanePreview_Age")?;
     let [torque, angle] = [course("Column_DriverTorque")?, course("Column_WheelAngle")?];
-    let guidance = if manual {
+    let guidance = if how.manual {
         None
     } else {
         Some(course("Guidance_Torque")?)
     };
     let speed = course("Vehicle_Speed1")?;
-    speed.guided()?;
     let mut findings: Vec<[String; 3]> = audits.iter().filter_map(Audit::finding).collect();
     let not_valid = valid.value.iter().filter(|&&v| v == 0.0).count();
     if not_valid > 0 {
@@ -158,58 +170,95 @@ fn read_trace(
     }
     [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age).only(&valid));
 
-    let needed: Vec<&Course> = [&e_y, &e_theta, &torque, &angle]
+    let mut needed: Vec<Course> = [e_y, e_theta, torque, angle]
         .into_iter()
-        .chain(guidance.as_ref())
+        .chain(guidance)
         .collect();
-    for c in &needed {
-        if c.time_s.len() < 2 {
-            return Err(format!("no frame of {} can be used", c.name));
-        }
-        findings.extend(c.pauses());
+    let begins_s = begin(&needed)?;
+    // The ECU's milliseconds are counted from one of its frames.
+    let zero_s = if how.manual {
+        begins_s
+    } else {
+        needed[GUIDANCE].time_s[0]
+    };
+    let used = used(&needed, zero_s, how.stretches)?;
+    for c in &mut needed {
+        c.cut(&used);
     }
-    let start_s = needed
-        .iter()
-        .map(|c| c.time_s[0])
-        .fold(f64::NEG_INFINITY, f64::max);
+    let start_s = begin(&needed)?;
+    let speed = speed.guided(&used)?;
+    findings.extend(needed.iter().filter_map(Course::pauses));
     let end_s = needed.iter().map(|c| c.last_s()).fold(f64::INFINITY, f64::min);
     let rows = ((end_s - start_s).max(0.0) * RATE_HZ) as usize;
     let dt_s = 1.0 / RATE_HZ;
     let at = |k: usize| start_s + k as f64 * dt_s;
-    let on_grid = |c: &Course| -> Vec<f64> { sampled(c, (0..rows).map(at), Hold::Line) };
-    let wheel_angle_rad = on_grid(&angle);
+    let on_grid = |c: usize, hold: Hold| -> Vec<f64> { sampled(&needed[c], (0..rows).map(at), hold) };
+    let wheel_angle_rad = on_grid(3, Hold::Line);
     let (speed_m_per_s, slow) = speed.on((0..rows).map(at));
     findings.extend(speed.slow(&slow));
-    let mut seen_rad = on_grid(&e_theta);
+    let mut seen_rad = on_grid(1, Hold::Line);
     for (seen, slow) in seen_rad.iter_mut().zip(&slow) {
         *seen = if *slow { f64::NAN } else { *seen };
     }
-    let e_theta_rad = far_point::driver_yaw_error(&seen_rad, &wheel_angle_rad, vehicle, &speed_m_per_s, dt_s);
+    let vehicle = how.vehicle.unwrap_or(far_point::TABLE_9);
+    let e_theta_rad =
+        far_point::driver_yaw_error(&seen_rad, &wheel_angle_rad, &vehicle, &speed_m_per_s, dt_s);
     let rows = e_theta_rad.len();
     let cut = |mut values: Vec<f64>| {
         values.truncate(rows);
         values
     };
-    // The ECU's milliseconds are counted from one of its frames.
-    let first_decided_s = guidance.as_ref().map_or(start_s, |g| g.time_s[0]);
+    let guidance_nm = match how.manual {
+        true => vec![0.0; rows],
+        false => cut(on_grid(GUIDANCE, Hold::Value)),
+    };
     let mut log = DriveLog::from_signals(
-        start_s - first_decided_s,
+        start_s - zero_s,
         dt_s,
         [
-            cut(on_grid(&e_y)),
+            cut(on_grid(0, Hold::Line)),
             e_theta_rad,
             cut(wheel_angle_rad),
-            guidance.map_or_else(
-                || vec![0.0; rows],
-                |g| sampled(&g, (0..rows).map(at), Hold::Value),
-            ),
-            cut(on_grid(&torque)),
+            guidance_nm,
+            cut(on_grid(2, Hold::Line)),
         ],
     )
     .map_err(|e| e.to_string())?;
     log.findings = findings;
     log.tell_speed(&speed.value);
     Ok(log)
+}
+
+/// When the last of the signals begins.
+fn begin(courses: &[Course]) -> Result<f64, String> {
+    if let Some(c) = courses.iter().find(|c| c.time_s.len() < 2) {
+        return Err(format!("no frame of {} can be used", c.name));
+    }
+    let starts_s = courses.iter().map(|c| c.time_s[0]);
+    Ok(starts_s.fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// From when to when the signals are used: to a jump of the clock, or from it on.
+fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<RangeInclusive<f64>, String> {
+    let of =
+        |c: &Course| -> Vec<(f64, usize)> { c.time_s.iter().copied().zip(c.line.iter().copied()).collect() };
+    let mut frames: Vec<(f64, usize)> = courses.iter().flat_map(of).collect();
+    frames.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut time_s, lines): (Vec<f64>, Vec<usize>) = frames.into_iter().unzip();
+    let mut first = 0;
+    while let Some(jump) = jump(&time_s[first..], 1.0 / RATE_HZ) {
+        let next = first + jump.row + 1;
+        let place = format!("line {}", lines[next]);
+        if jump
+            .use_after(&place, zero_s, stretches)
+            .map_err(|e| e.to_string())?
+        {
+            first = next;
+        } else {
+            time_s.truncate(next);
+        }
+    }
+    Ok(time_s[first]..=time_s[time_s.len() - 1])
 }
 
 impl Course {
@@ -305,6 +354,18 @@ impl Course {
         out
     }
 
+    /// Keeps what lies between two instants.
+    fn cut(&mut self, used: &RangeInclusive<f64>) {
+        let from = self.time_s.partition_point(|t| t < used.start());
+        let to = self.time_s.partition_point(|t| t <= used.end());
+        for values in [&mut self.time_s, &mut self.value] {
+            values.truncate(to);
+            values.drain(..from.min(to));
+        }
+        self.line.truncate(to);
+        self.line.drain(..from.min(to));
+    }
+
     /// How often the signal pauses, in words.
     fn pauses(&self) -> Option<[String; 3]> {
         let steps = self.time_s.windows(2).map(|w| w[1] - w[0]);
@@ -323,8 +384,12 @@ impl Course {
         ])
     }
 
-    /// Whether it is a speed at which there is guidance, in the mean.
-    fn guided(&self) -> Result<(), String> {
+    /// The part of it that is used, if it is a speed at which there is guidance, in the mean.
+    fn guided(mut self, used: &RangeInclusive<f64>) -> Result<Self, String> {
+        self.cut(used);
+        if self.value.is_empty() {
+            return Err(format!("no frame of {} can be used", self.name));
+        }
         let mean = self.value.iter().sum::<f64>() / self.value.len() as f64;
         if mean < SLOWEST_M_PER_S {
             return Err(format!(
@@ -332,7 +397,7 @@ impl Course {
                 self.name
             ));
         }
-        Ok(())
+        Ok(self)
     }
 
     /// A speed at these instants, the last one where it is missing, and whether each was too slow for the vehicle model.
@@ -341,7 +406,10 @@ impl Course {
         let mut last = self.value[0];
         let held = sampled(self, within, Hold::Line).into_iter().map(|v| {
             last = if v.is_finite() { v } else { last };
-            (last.max(TOO_SLOW_M_PER_S), last < TOO_SLOW_M_PER_S)
+            (
+                last.clamp(TOO_SLOW_M_PER_S, TOO_FAST_M_PER_S),
+                last < TOO_SLOW_M_PER_S,
+            )
         });
         held.unzip()
     }

@@ -109,13 +109,14 @@ fn lost(frames: &[&CandumpFrame]) -> usize {
     }
     let middle = steps.len() / 2;
     let (_, &mut period, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    frames
+    let sum: f64 = frames
         .windows(2)
         .map(|w| {
             let counted = f64::from((w[1].data[1].wrapping_sub(w[0].data[1])) & 15);
             let by_time = (w[1].time_s - w[0].time_s) / period.max(1e-6);
             let rounds = ((by_time - counted) / 16.0).round().max(0.0);
-            (counted + 16.0 * rounds - 1.0).max(0.0) as usize
+            (counted + 16.0 * rounds - 1.0).max(0.0)
         })
-        .sum()
+        .sum();
+    sum as usize
 }

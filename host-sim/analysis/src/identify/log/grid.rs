@@ -17,6 +17,9 @@ const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.05);
 /// Between uneven stamps that are farther apart than so many usual steps nothing is read off.
 const LONGEST_STEP: f64 = 3.5;
 
+/// Stamps that come in pairs, nearly at once, make no grid finer than this share of the usual step.
+const LEAST_STEP: f64 = 0.5;
+
 /// Values on the grid that are so many apart share no row.
 const SHARED_LAGS: usize = 8;
 
@@ -40,12 +43,11 @@ enum Place {
 }
 
 impl Grid {
-    /// The grid for rows at `time`, which stand on these lines.
+    /// The grid for rows at `time`, usually `usual` apart.
     ///
     /// # Errors
-    /// Time that does not grow, in another unit, or too short.
-    pub(super) fn of(time: &[f64], lines: &[u64]) -> Result<Self, LogError> {
-        let usual = usual_step(time, lines)?;
+    /// A time that is too short.
+    pub(super) fn of(time: &[f64], usual: f64) -> Result<Self, LogError> {
         let span = time[time.len() - 1] - time[0];
         if span < SHORTEST_S {
             return refuse(too_short(span));
@@ -70,7 +72,7 @@ impl Grid {
             .map(|w| w[1] - w[0])
             .filter(|&d| d <= 1.5 * usual)
             .collect();
-        let period = short.iter().sum::<f64>() / short.len().max(1) as f64;
+        let period = (short.iter().sum::<f64>() / short.len().max(1) as f64).max(LEAST_STEP * usual);
         let mut slots = vec![0];
         for w in time.windows(2) {
             let steps = ((w[1] - w[0]) / period).round().max(1.0) as usize;
@@ -101,7 +103,7 @@ impl Grid {
         }
         let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
         steps.retain(|&d| d <= LONGEST_STEP * usual);
-        let dt_s = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
+        let dt_s = (steps.iter().sum::<f64>() / steps.len().max(1) as f64).max(LEAST_STEP * usual);
         let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
         let gaps = time
             .windows(2)
@@ -246,7 +248,10 @@ impl Weights {
 }
 
 /// The median step of stamps that grow, in a range that can be.
-fn usual_step(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
+///
+/// # Errors
+/// Time that does not grow, in another unit, of too few rows.
+pub(super) fn usual_step(time: &[f64], lines: &[u64]) -> Result<f64, LogError> {
     if time.len() < 3 {
         return refuse(format!("the log has {} rows, which is too few", time.len()));
     }

@@ -9,6 +9,7 @@
 //! `guidance_torque_nm` (the torque really applied, probe included), `driver_torque_nm`. Others are ignored.
 
 mod grid;
+pub(super) mod jumps;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -18,9 +19,8 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use grid::Grid;
-use haptic_log::table::TableError;
-use haptic_log::table::TableReader;
+use grid::{Grid, usual_step};
+use haptic_log::table::{TableError, TableReader, number};
 
 /// Names of the columns that a log must have, in the order of the fields of [`DriveLog`].
 pub const COLUMNS: [&str; 6] = [
@@ -182,6 +182,15 @@ impl DriveLog {
     /// A missing or doubled column, a field that is neither a number nor empty, a value beyond its column's range, time
     /// stamps that run backwards or repeat, or a record that is too short.
     pub fn read(source: impl Read, manual: bool) -> Result<Self, LogError> {
+        Self::read_within(source, manual, &[])
+    }
+
+    /// The same where these stretches of the log's time, s, will be used: of a log whose clock was set, the side of the jump
+    /// that they lie on is read.
+    ///
+    /// # Errors
+    /// As [`DriveLog::read`].
+    pub fn read_within(source: impl Read, manual: bool, stretches: &[(f64, f64)]) -> Result<Self, LogError> {
         let mut table = TableReader::new(source)?;
         let index = find_columns(table.header(), table.header_line(), manual)?;
         let speed = table
@@ -207,7 +216,7 @@ impl DriveLog {
                 });
             }
         }
-        let mut log = Self::from_table(&lines, columns, manual)?;
+        let mut log = Self::from_table(&lines, columns, manual, stretches)?;
         log.tell_speed(&speeds);
         Ok(log)
     }
@@ -240,6 +249,14 @@ impl DriveLog {
     /// # Errors
     /// As [`DriveLog::read`]; columns of different lengths.
     pub fn from_columns(columns: [Vec<f64>; 6], manual: bool) -> Result<Self, LogError> {
+        Self::from_columns_within(columns, manual, &[])
+    }
+
+    fn from_columns_within(
+        columns: [Vec<f64>; 6],
+        manual: bool,
+        stretches: &[(f64, f64)],
+    ) -> Result<Self, LogError> {
         let rows = columns[0].len();
         if let Some(c) = (0..6).find(|&c| columns[c].len() != rows) {
             return refuse(format!(
@@ -254,7 +271,7 @@ impl DriveLog {
             }
         }
         let lines: Vec<u64> = (1..=rows as u64).collect();
-        Self::from_table(&lines, columns, manual)
+        Self::from_table(&lines, columns, manual, stretches)
     }
 
     /// A log of a table's columns in the order of [`COLUMNS`]; the first is not looked at. Of a `manual` drive the guidance
@@ -263,17 +280,29 @@ impl DriveLog {
         time_s: Vec<f64>,
         columns: [Option<Vec<f64>>; 6],
         manual: bool,
+        stretches: &[(f64, f64)],
     ) -> Result<Self, LogError> {
         let nothing = || vec![0.0; time_s.len()];
         let mut columns = columns.map(|column| column.unwrap_or_else(nothing));
         columns[0] = time_s;
-        Self::from_columns(columns, manual).map_err(LogError::in_a_row)
+        Self::from_columns_within(columns, manual, stretches).map_err(LogError::in_a_row)
     }
 
     /// Puts columns that are in their limits on an even grid.
-    fn from_table(lines: &[u64], columns: [Vec<f64>; 6], manual: bool) -> Result<Self, LogError> {
-        let [time, signals @ ..] = columns;
-        let grid = Grid::of(&time, lines)?;
+    fn from_table(
+        lines: &[u64],
+        columns: [Vec<f64>; 6],
+        manual: bool,
+        stretches: &[(f64, f64)],
+    ) -> Result<Self, LogError> {
+        let usual_s = usual_step(&columns[0], lines)?;
+        let used = jumps::usable(&columns[0], lines, usual_s, stretches)?;
+        let lines = &lines[used.clone()];
+        let [time, signals @ ..] = columns.map(|mut column| {
+            column.truncate(used.end);
+            column.split_off(used.start)
+        });
+        let grid = Grid::of(&time, usual_s)?;
         let mut c = 0;
         let mut signals = signals.map(|column| {
             c += 1;
@@ -327,13 +356,6 @@ fn check_sensor(driver_torque_nm: &[f64]) -> Result<(), LogError> {
 
 /// Where each of [`COLUMNS`] stands; all that are missing are named at once.
 fn find_columns(header: &[String], line: u64, manual: bool) -> Result<[Option<usize>; 6], LogError> {
-    if header.len() == 1
-        && let Some(separator) = header[0].chars().find(|c| [';', '\t'].contains(c))
-    {
-        return refuse(format!(
-            "line {line}: this file is separated by {separator:?}; commas are wanted"
-        ));
-    }
     let names: Vec<String> = header.iter().map(|name| name.to_ascii_lowercase()).collect();
     let mut index = [None; 6];
     let mut missing = Vec::new();
@@ -362,17 +384,13 @@ fn find_columns(header: &[String], line: u64, manual: bool) -> Result<[Option<us
     Ok(index)
 }
 
-/// What loggers write where there is no value.
-const NOTHING: [&str; 6] = ["", "-", "na", "n/a", "nan", "null"];
-
 fn field(text: &str, line: u64, c: usize) -> Result<f64, LogError> {
-    let name = COLUMNS[c];
-    let value = match text.parse::<f64>() {
-        Ok(value) => value,
-        Err(_) if NOTHING.contains(&text.trim().to_ascii_lowercase().as_str()) => f64::NAN,
-        Err(_) => return refuse(format!("line {line}: {name} is {text:?}, which is not a number")),
-    };
-    within_limits(value, line, c)
+    let value = number(text).ok_or_else(|| TableError::NotANumber {
+        line,
+        column: COLUMNS[c].into(),
+        text: text.into(),
+    });
+    within_limits(value?, line, c)
 }
 
 /// A value that its column can have; missing if it is not finite.

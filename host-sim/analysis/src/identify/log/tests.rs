@@ -265,12 +265,15 @@ fn comments_capitals_and_windows_line_ends_are_read_and_lines_counted_with_them(
 }
 
 #[test]
-fn another_separator_is_named() {
-    for (separator, name) in [(";", "';'"), ("\t", "'\\t'")] {
-        let e = error(&text(|_, _| {}).replace(',', separator));
-        assert_eq!(
-            e,
-            format!("line 1: this file is separated by {name}; commas are wanted")
+fn semicolons_and_tabs_are_read_and_a_decimal_comma_is_named() {
+    let plain = DriveLog::read(text(|_, _| {}).as_bytes(), false).unwrap();
+    for separator in [";", "\t"] {
+        let other = text(|_, _| {}).replace(',', separator);
+        assert_eq!(DriveLog::read(other.as_bytes(), false).unwrap(), plain);
+        let e = error(&other.replace("0.1", "0,1"));
+        assert!(
+            e.ends_with("\"0,1\", which is not a number: the decimal sign is a point"),
+            "{e}"
         );
     }
 }

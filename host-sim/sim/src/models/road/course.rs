@@ -23,7 +23,9 @@ pub const MAX_CURVATURE_1PM: f64 = 0.1;
 /// Shortest segment, m. Below it a curvature ramp has no meaning on a road.
 const MIN_SEGMENT_M: f64 = 0.01;
 /// Longest course, m: keeps the centreline's table below 20 MB on straights.
-const MAX_COURSE_M: f64 = 200_000.0;
+pub(super) const MAX_COURSE_M: f64 = 200_000.0;
+/// Most that a course may turn in all, rad, to and fro: keeps the table below 200 MB in curves.
+const MAX_TURN_RAD: f64 = 5000.0;
 /// Lane widths of roads, m. The lower end clears the vehicle's 1.7 m.
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=10.0;
 /// Width of a lane unless a course has its own, m: the paper's.
@@ -194,6 +196,9 @@ impl Course {
         let course = Self::of_segments(name, lane_width_m, segments);
         let length_m = course.length_m();
         in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(whole)?;
+        let sharpest = |s: &Segment| s.curvature_start_1pm.abs().max(s.curvature_end_1pm.abs());
+        let turn = course.segments.iter().map(|s| s.length_m * sharpest(s)).sum();
+        in_range("total turn", turn, 0.0..=MAX_TURN_RAD, "rad").map_err(whole)?;
         Ok(course)
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::network::{Leg, Network, Next};
+use super::network::{Leg, Network, Next, listed};
 use super::road::{Lane, Road};
 use crate::input::InputError;
 
@@ -26,6 +26,9 @@ pub struct LaneChoice {
     pub road: Option<String>,
     /// Id of the lane where the course begins; the rightmost driving lane in the direction of travel if not given.
     pub lane: Option<i32>,
+    /// Where a junction leads on to several roads, the one to take: by the id of the road through the junction, or of the one
+    /// behind it.
+    pub turns: Vec<String>,
 }
 
 impl LaneChoice {
@@ -39,7 +42,7 @@ impl LaneChoice {
         }
         Err(InputError::new(
             name,
-            "a road and a lane can only be chosen of an OpenDRIVE file (.xodr)",
+            "a road, a lane and turns can only be chosen of an OpenDRIVE file (.xodr)",
         ))
     }
 }
@@ -112,21 +115,29 @@ fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> Strin
         let more = if ids.len() > 12 { ", ..." } else { "" };
         format!("{}{more}", ids[..ids.len().min(12)].join(", "))
     };
-    if let Some(Next::Junction(junction, roads)) = stuck {
-        return format!(
-            "its roads are not one chain: junction {junction} leads on to {}; choose the road to begin on with \
-             --road",
-            if roads.is_empty() {
-                "no road".into()
-            } else {
-                format!("roads {}", list(roads))
-            }
-        );
+    let first = network.roads[chain[0].0].id;
+    match stuck {
+        Some(Next::Junction(junction, ways)) => {
+            let ways = match &ways[..] {
+                [] => "no road".into(),
+                ways => format!("roads {}", listed(ways)),
+            };
+            return format!(
+                "its roads are not one chain: junction {junction} leads on to {ways}; choose the road to begin on with \
+                 --road"
+            );
+        }
+        Some(Next::Outside(what)) => {
+            let last = network.roads[chain[chain.len() - 1].0].id;
+            return format!(
+                "its roads are not one chain: road {last}: {what}; choose the road to begin on with --road"
+            );
+        }
+        _ => {}
     }
     let outside = network.roads.iter().enumerate();
     let outside = outside.filter(|(i, road)| !road.in_junction && chain.iter().all(|(on, _)| on != i));
     let outside: Vec<&str> = outside.map(|(_, road)| road.id).collect();
-    let first = network.roads[chain[0].0].id;
     format!(
         "its {} roads are not one chain: road {first} has no link to roads {}; choose the road to begin on with \
          --road",

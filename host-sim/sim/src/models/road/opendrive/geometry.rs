@@ -7,6 +7,7 @@ use roxmltree::Node;
 
 use super::polynomial::Polynomial;
 use super::xml::{cubic, number, text};
+use crate::models::road::course::MAX_COURSE_M;
 use crate::models::road::piece::Pose;
 
 /// Elements that may stand beside a kind of geometry and mean nothing for it.
@@ -17,6 +18,8 @@ const LEAST_LENGTH_M: f64 = 1e-6;
 const GAP_ALONG_M: f64 = 0.01;
 /// Most that the end of an element may lie beside the start of the next, m.
 const GAP_M: f64 = 0.1;
+/// Most that an element may turn, rad: a spiral of a hundred and sixty circles.
+const MOST_TURN_RAD: f64 = 1000.0;
 
 /// A point of the reference line.
 #[derive(Debug, Clone, Copy)]
@@ -67,6 +70,11 @@ pub(super) fn read(road: &str, plan_view: Node) -> Result<Vec<Geometry>, String>
                 ("s", start_m)
             };
             return Err(format!("{place}: {what} = {value} m is negative"));
+        }
+        if start_m + length_m > MAX_COURSE_M {
+            return Err(format!(
+                "{place}: length = {length_m} m makes the road longer than {MAX_COURSE_M} m"
+            ));
         }
         if length_m < LEAST_LENGTH_M {
             continue;
@@ -126,14 +134,14 @@ fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, String> {
         ));
     };
     match shape.tag_name().name() {
-        "line" => Ok(clothoid([0.0; 2], length_m)),
-        "arc" => Ok(clothoid([number(shape, "curvature", place)?; 2], length_m)),
+        "line" => clothoid([0.0; 2], length_m, place),
+        "arc" => clothoid([number(shape, "curvature", place)?; 2], length_m, place),
         "spiral" => {
             let ends = [
                 number(shape, "curvStart", place)?,
                 number(shape, "curvEnd", place)?,
             ];
-            Ok(clothoid(ends, length_m))
+            clothoid(ends, length_m, place)
         }
         "poly3" => {
             let v = cubic(shape, "", place)?;
@@ -158,10 +166,15 @@ fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, String> {
     }
 }
 
-fn clothoid(curvature_1pm: [f64; 2], length_m: f64) -> Kind {
+fn clothoid(curvature_1pm: [f64; 2], length_m: f64, place: &str) -> Result<Kind, String> {
     let [start, end] = curvature_1pm;
     // Short enough for the quadrature: a twentieth of a radian a step.
     let turn = start.abs().max(end.abs()) * length_m;
+    if turn > MOST_TURN_RAD {
+        return Err(format!(
+            "{place}: with a curvature of {start} to {end} 1/m it turns by up to {turn:.0} rad, more than {MOST_TURN_RAD}"
+        ));
+    }
     let count = if start == end {
         1.0
     } else {
@@ -175,11 +188,11 @@ fn clothoid(curvature_1pm: [f64; 2], length_m: f64) -> Kind {
         let curvature = start + slope * (i as f64 * step_m);
         table.push(last.of_local(along(curvature, slope, step_m)));
     }
-    Kind::Clothoid {
+    Ok(Kind::Clothoid {
         curvature_1pm,
         step_m,
         table,
-    }
+    })
 }
 
 /// The end of a short clothoid that begins at the origin, along x; any arc exactly.

@@ -23,6 +23,10 @@ const ROUNDING_M: f64 = 0.01;
 const SAME_M: f64 = 1e-9;
 /// The lane's centre may not come nearer to the centre of curvature than this share of the radius.
 const LEAST_SHARE: f64 = 0.02;
+/// Most that a centre may turn in a block, rad.
+const MOST_TURN_RAD: f64 = 50.0;
+/// Most pieces of a course: 200 km have 400,000 where they are straight.
+pub(super) const MOST_PIECES: usize = 1_000_000;
 
 /// A lane's centre along s.
 #[derive(Debug, Default)]
@@ -213,8 +217,18 @@ impl Interval<'_> {
             let sharpest = points.iter().map(|p| p.curvature_1pm.abs()).fold(0.0, f64::max);
             let longest = points.iter().map(|p| p.speed).fold(0.0, f64::max) * block_m;
             let turns = longest * sharpest / MAX_TURN_RAD;
+            if longest * sharpest > MOST_TURN_RAD || longest > MOST_TURN_RAD * BLOCK_M {
+                return Err(format!(
+                    "cannot be followed at s = {start_m:.2} m: it turns as no road does"
+                ));
+            }
             let count = (longest / MAX_PIECE_M).max(turns).ceil().max(1.0);
             let step_m = block_m / count;
+            if pieces.len() as f64 + count > MOST_PIECES as f64 {
+                return Err(format!(
+                    "has more than {MOST_PIECES} pieces at s = {start_m:.2} m"
+                ));
+            }
             for i in 0..count as usize {
                 let at_m = start_m + i as f64 * step_m;
                 let next = self.at(at_m + step_m)?;

@@ -8,7 +8,8 @@
 //! Signs in a course are those of the direction of travel: traffic keeps to the right unless the road says `LHT`,
 //! so a lane with a positive id is driven against the road's s, its curvature and bank change sign. Followed are
 //! planView, laneOffset, lane widths, superelevation, crossfall, shape, elevation, links of roads and lanes, and
-//! junctions that leave one way only. Not followed: `<border>` in place of widths, the height of lanes, OpenCRG
+//! junctions that leave one way only, or one that is chosen. Where the lane or the file ends, the way ends, and a note says so.
+//! Not followed: `<border>` in place of widths, the height of lanes, OpenCRG
 //! surfaces, `<include>`.
 
 mod choice;
@@ -25,8 +26,8 @@ mod xml;
 use roxmltree::{Document, ParsingOptions};
 use serde::Serialize;
 
-use self::lane_centre::{Stretch, stretch};
-use self::network::{Leg, Network, Next};
+use self::lane_centre::{MOST_PIECES, Stretch, stretch};
+use self::network::{Leg, Network, Next, listed};
 use self::road::{Lane, Road};
 use super::Course;
 use super::piece::{Piece, Pose};
@@ -71,9 +72,16 @@ pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course
             "not an OpenDRIVE file: its root is <{found}>, not <OpenDRIVE>"
         ));
     }
-    let network = Network::read(root)?;
+    let network = Network::read(root, &choice.turns)?;
     let mut drive = Drive::begin(&network, choice)?;
     drive.follow()?;
+    let driven = |turn: &&String| drive.roads.iter().all(|used| used.road != **turn);
+    if let Some(turn) = choice.turns.iter().find(driven) {
+        let notes = drive.notes.join("; ");
+        return Err(format!(
+            "turn {turn}: no junction on the way leads there ({notes})"
+        ));
+    }
     let Drive {
         pieces,
         segments,
@@ -133,21 +141,34 @@ impl<'n, 'a> Drive<'n, 'a> {
             }
             self.roads.push(here);
             let road = Road::read(id, self.network.roads[index].node)?;
-            let links = self.through_sections(&road, along)?;
+            let Some(links) = self.through_sections(&road, along)? else {
+                return Ok(());
+            };
             let lane = self.lane;
             (self.leg, self.lane) = match self.network.next(self.leg, Some(lane))? {
                 Next::End => return Ok(()),
-                Next::Road(leg) => {
-                    let next = self.network.roads[leg.0].id;
-                    (leg, one_link(id, lane, &links, || format!("road {next}"), along)?)
+                Next::Outside(what) => {
+                    self.notes.push(format!("the way ends with road {id}: {what}"));
+                    return Ok(());
                 }
+                Next::Road(leg) => match one_link(lane, &links) {
+                    Some(next) => (leg, next),
+                    None => {
+                        let next = self.network.roads[leg.0].id;
+                        self.notes.push(format!(
+                            "the way ends with road {id}: lane {lane} goes on to no lane of road {next}"
+                        ));
+                        return Ok(());
+                    }
+                },
                 Next::Connection(leg, to) => (leg, to.unwrap_or(lane)),
-                Next::Junction(junction, roads) => {
-                    self.notes.push(match &roads[..] {
+                Next::Junction(junction, ways) => {
+                    self.notes.push(match &ways[..] {
                         [] => format!("the way ends at junction {junction}: road {id} lane {lane} does not go on there"),
                         _ => format!(
-                            "the way ends at junction {junction}: road {id} lane {lane} goes on there to roads {}",
-                            roads.join(", ")
+                            "the way ends at junction {junction}: road {id} lane {lane} goes on there to roads {}; --turn ID \
+                             takes one of them",
+                            listed(&ways)
                         ),
                     });
                     return Ok(());
@@ -156,8 +177,8 @@ impl<'n, 'a> Drive<'n, 'a> {
         }
     }
 
-    /// Drives through the sections of a road; returns the links of its last lane onwards.
-    fn through_sections(&mut self, road: &Road, along: bool) -> Result<Vec<i32>, String> {
+    /// Drives through the sections of a road; returns the links of its last lane onwards, or nothing if the way ends before.
+    fn through_sections(&mut self, road: &Road, along: bool) -> Result<Option<Vec<i32>>, String> {
         let mut sections = road.sections(self.lane)?;
         if !along {
             sections.reverse();
@@ -165,15 +186,20 @@ impl<'n, 'a> Drive<'n, 'a> {
         let mut links = Vec::new();
         for (i, section) in sections.iter().enumerate() {
             if i > 0 {
-                self.lane = match section.lane(self.lane) {
+                let next = match section.lane(self.lane) {
                     // Files that link no lanes at all inside a road mean the same id.
-                    Some(same) if links.is_empty() && same.links(!along).is_empty() => same.id,
-                    _ => {
-                        let start_m = section.start_m;
-                        let what = || format!("the section at s = {start_m} m");
-                        one_link(road.id, self.lane, &links, what, along)?
-                    }
+                    Some(same) if links.is_empty() && same.links(!along).is_empty() => Some(same.id),
+                    _ => one_link(self.lane, &links),
                 };
+                let Some(next) = next else {
+                    let (id, lane) = (road.id, self.lane);
+                    let s_m = if along { section.start_m } else { section.end_m };
+                    self.notes.push(format!(
+                        "the way ends in road {id} at s = {s_m} m: lane {lane} goes on to no lane there"
+                    ));
+                    return Ok(None);
+                };
+                self.lane = next;
             }
             let lane: Lane = section.need(road.id, self.lane)?;
             let piece = stretch(road, section, self.lane)?;
@@ -184,7 +210,7 @@ impl<'n, 'a> Drive<'n, 'a> {
             )?;
             links = lane.links(along);
         }
-        Ok(links)
+        Ok(Some(links))
     }
 
     fn append(&mut self, mut stretch: Stretch, road: &str, s_m: f64) -> Result<(), String> {
@@ -196,6 +222,12 @@ impl<'n, 'a> Drive<'n, 'a> {
                 piece.middle.heading_rad -= turns * std::f64::consts::TAU;
             }
             heading = Some(piece.middle.heading_rad);
+        }
+        if self.pieces.len() + stretch.pieces.len() > MOST_PIECES {
+            return Err(format!(
+                "road {road}: in the section at s = {s_m} m the way has come to more than {MOST_PIECES} pieces; begin \
+                 nearer to its end"
+            ));
         }
         let joints = self.pieces.last().into_iter().chain(&stretch.pieces);
         let joints: Vec<&Piece> = joints.collect();
@@ -226,21 +258,8 @@ impl<'n, 'a> Drive<'n, 'a> {
     }
 }
 
-/// The one lane that a lane is linked to.
-fn one_link(
-    road: &str,
-    lane: i32,
-    links: &[i32],
-    to: impl Fn() -> String,
-    along: bool,
-) -> Result<i32, String> {
-    let side = if along { "successor" } else { "predecessor" };
-    match links {
-        [one] => Ok(*one),
-        [] => Err(format!(
-            "road {road}: lane {lane} has no link to a {side} in {}",
-            to()
-        )),
-        several => Ok(*several.iter().find(|id| **id == lane).unwrap_or(&several[0])),
-    }
+/// The one lane that a lane is linked to, if it is to any.
+fn one_link(lane: i32, links: &[i32]) -> Option<i32> {
+    let same = links.iter().find(|id| **id == lane);
+    same.or(links.first()).copied()
 }

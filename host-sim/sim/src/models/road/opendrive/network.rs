@@ -14,6 +14,8 @@ pub(super) struct Network<'a> {
     pub(super) roads: Vec<RoadNode<'a>>,
     by_id: HashMap<&'a str, usize>,
     junctions: HashMap<&'a str, Node<'a, 'a>>,
+    /// Roads to take where a junction leaves a choice.
+    turns: Vec<String>,
 }
 
 /// A road in the network.
@@ -29,18 +31,42 @@ pub(super) struct RoadNode<'a> {
 pub(super) enum Next<'a> {
     /// The road ends.
     End,
+    /// A road or a junction that is not in the file, in words.
+    Outside(String),
     /// A road; the link of the lane says which lane.
     Road(Leg),
     /// A way through a junction, and which lane it gives to ours, if it says so.
     Connection(Leg, Option<i32>),
     /// A junction that leads on to none or to several roads.
-    Junction(&'a str, Vec<&'a str>),
+    Junction(&'a str, Vec<Way<'a>>),
+}
+
+/// A way through a junction.
+#[derive(Debug)]
+pub(super) struct Way<'a> {
+    /// The connecting road.
+    road: &'a str,
+    /// None if it is not in the file.
+    leg: Option<Leg>,
+    /// The road behind the junction.
+    beyond: Option<&'a str>,
+    lane: Option<i32>,
+}
+
+/// The ways in words: the connecting roads, and where they lead.
+pub(super) fn listed(ways: &[Way]) -> String {
+    let words = ways.iter().take(12).map(|way| match way.beyond {
+        Some(beyond) => format!("{} (to {beyond})", way.road),
+        None => way.road.to_owned(),
+    });
+    let more = if ways.len() > 12 { ", ..." } else { "" };
+    words.collect::<Vec<_>>().join(", ") + more
 }
 
 impl<'a> Network<'a> {
     /// # Errors
     /// A road without an identifier, or two with the same one; no road at all.
-    pub(super) fn read(root: Node<'a, 'a>) -> Result<Self, String> {
+    pub(super) fn read(root: Node<'a, 'a>, turns: &[String]) -> Result<Self, String> {
         let (mut roads, mut by_id) = (Vec::new(), HashMap::new());
         for node in children(root, "road") {
             let id = text(node, "id").ok_or("a <road> has no `id`")?;
@@ -62,6 +88,7 @@ impl<'a> Network<'a> {
             junctions: junctions.collect(),
             roads,
             by_id,
+            turns: turns.to_vec(),
         })
     }
 
@@ -81,7 +108,7 @@ impl<'a> Network<'a> {
     /// What comes after a leg, for a lane of it if one is given.
     ///
     /// # Errors
-    /// A link to a road or junction that is not in the file.
+    /// A link that names nothing, or no end of a road.
     pub(super) fn next(&self, (road, along): Leg, lane: Option<i32>) -> Result<Next<'a>, String> {
         let RoadNode { id, node, .. } = self.roads[road];
         let side = if along { "successor" } else { "predecessor" };
@@ -92,14 +119,17 @@ impl<'a> Network<'a> {
             return Err(format!("road {id}: its {side} has no `elementId`"));
         };
         if text(link, "elementType") == Some("junction") {
-            let junction = self.junctions.get(target);
-            let missing = || format!("road {id}: its {side} is junction {target}, which is not in the file");
-            return self.through(target, *junction.ok_or_else(missing)?, (road, along), lane);
+            return Ok(match self.junctions.get(target) {
+                Some(junction) => self.through(target, *junction, (road, along), lane),
+                None => Next::Outside(format!(
+                    "its {side} is junction {target}, which is not in the file"
+                )),
+            });
         }
         let Some(&target_road) = self.by_id.get(target) else {
-            return Err(format!(
-                "road {id}: its {side} is road {target}, which is not in the file"
-            ));
+            return Ok(Next::Outside(format!(
+                "its {side} is road {target}, which is not in the file"
+            )));
         };
         let at_start = match text(link, "contactPoint") {
             Some("start") => true,
@@ -127,25 +157,20 @@ impl<'a> Network<'a> {
         link.is_some_and(|link| text(link, "elementId") == Some(id))
     }
 
-    /// The way through a junction, if there is one only.
+    /// The way through a junction: the only one, or the one of a turn.
     fn through(
         &self,
         junction: &'a str,
         node: Node<'a, 'a>,
         (road, along): Leg,
         lane: Option<i32>,
-    ) -> Result<Next<'a>, String> {
+    ) -> Next<'a> {
         let id = self.roads[road].id;
-        let mut ways: Vec<(Leg, Option<i32>)> = Vec::new();
+        let mut ways: Vec<Way> = Vec::new();
         for connection in children(node, "connection").filter(|c| text(*c, "incomingRoad") == Some(id)) {
             // A direct junction links roads themselves.
             let to = text(connection, "connectingRoad").or(text(connection, "linkedRoad"));
             let Some(to) = to else { continue };
-            let Some(&target) = self.by_id.get(to) else {
-                return Err(format!(
-                    "junction {junction}: connecting road {to} is not in the file"
-                ));
-            };
             let at_start = text(connection, "contactPoint") != Some("end");
             let pairs: Vec<[i32; 2]> = children(connection, "laneLink")
                 .filter_map(|link| Some([text(link, "from")?.parse().ok()?, text(link, "to")?.parse().ok()?]))
@@ -156,16 +181,39 @@ impl<'a> Network<'a> {
                 .map(|[_, to]| *to);
             if lane.is_none() || pairs.is_empty() || ours.is_some() {
                 let straight = lane.map(|lane| if at_start == along { lane } else { -lane });
-                ways.push(((target, at_start), ours.or(straight)));
+                let leg = self.by_id.get(to).map(|&target| (target, at_start));
+                ways.push(Way {
+                    road: to,
+                    leg,
+                    beyond: leg.and_then(|leg| self.linked_road(leg)),
+                    lane: ours.or(straight),
+                });
             }
         }
-        match ways[..] {
-            [(leg, lane)] => Ok(Next::Connection(leg, lane)),
-            _ => {
-                let roads = ways.iter().map(|((road, _), _)| self.roads[*road].id).collect();
-                Ok(Next::Junction(junction, roads))
-            }
+        let turn = |turn: &String| {
+            let leads = |way: &&Way| way.road == turn || way.beyond == Some(turn);
+            ways.iter().find(leads)
+        };
+        let way = match &ways[..] {
+            [only] => Some(only),
+            _ => self.turns.iter().find_map(turn),
+        };
+        match way {
+            Some(Way {
+                leg: Some(leg), lane, ..
+            }) => Next::Connection(*leg, *lane),
+            Some(Way { road, .. }) => Next::Outside(format!(
+                "junction {junction} leads on to road {road}, which is not in the file"
+            )),
+            None => Next::Junction(junction, ways),
         }
+    }
+
+    /// The road that a leg's own link names.
+    fn linked_road(&self, (road, along): Leg) -> Option<&'a str> {
+        let side = if along { "successor" } else { "predecessor" };
+        let link = child(self.roads[road].node, "link").and_then(|link| child(link, side))?;
+        text(link, "elementId").filter(|_| text(link, "elementType") != Some("junction"))
     }
 
     /// The legs from one on, for as long as there is one way only; a ring ends where it began.
@@ -176,6 +224,7 @@ impl<'a> Network<'a> {
             match next {
                 Next::Road(leg) | Next::Connection(leg, _) if seen.insert(leg.0) => legs.push(leg),
                 Next::Junction(..) => return Ok((legs, Some(next))),
+                Next::Outside(_) => return Ok((legs, Some(next))),
                 Next::End | Next::Road(_) | Next::Connection(..) => return Ok((legs, None)),
             }
         }

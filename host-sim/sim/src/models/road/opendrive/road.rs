@@ -176,8 +176,8 @@ impl<'a> Section<'a> {
             .flatten()
             .flat_map(|side| children(side, "lane"));
         nodes.filter_map(|node| {
-            let id = text(node, "id")?.parse().ok().filter(|id| *id != 0)?;
-            Some(Lane { id, node })
+            let id: i16 = text(node, "id")?.parse().ok().filter(|id| *id != 0)?;
+            Some(Lane { id: id.into(), node })
         })
     }
 
