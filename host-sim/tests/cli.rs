@@ -104,6 +104,11 @@ fn another_course_speed_and_window_are_measured_without_claims() {
         "{note}"
     );
     assert!(stderr(&output).contains(note));
+    assert!(
+        stderr(&output).contains("no claim of the paper applies: they are about paper-course at 60 km/h"),
+        "{}",
+        stderr(&output)
+    );
     assert!(results["runs"][4]["failure_s_m"].is_null());
     assert!(directory.path().join("elsewhere/report.html").exists());
 

@@ -76,6 +76,10 @@ fn tolerance(sensors: Sensors) -> (f64, f64) {
     }
 }
 
+/// What is said where they do not.
+pub(super) const NONE_APPLIES: &str = "no claim of the paper applies: they are about paper-course at 60 km/h, a failure at 70 s, \
+     and the paper's vehicle, drivers and guidance";
+
 /// Whether an evaluation is the paper's, so that the claims speak of it.
 pub(super) fn apply_to(base: &Scenario, window: Window) -> bool {
     // The evaluation sets condition, gains, delay and kind of failure by itself, and without a remnant the seed

@@ -121,6 +121,8 @@ pub fn evaluate(
     };
     if claims::apply_to(base, window) {
         results.claims = claims::check(&results);
+    } else {
+        results.notes.push(claims::NONE_APPLIES.into());
     }
     results.claims.extend(claims::guided_throughout(&results));
     Ok(Evaluation { runs, results })

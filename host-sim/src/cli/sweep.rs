@@ -73,7 +73,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         }
         Err(error) => return Err(error.into()),
     };
-    let file = arguments.file.display().to_string();
+    // What drives a row again is told the table too.
+    let file = format!("{} --out {}", arguments.file.display(), arguments.out.display());
     match Output::beside(&arguments.out, "sweep", kept(&arguments.out)) {
         Ok(output) => output.finish(|place| files::write(&sweep, &summary, &file, place))?,
         // Every shard that finds all chunks makes the same files.
