@@ -188,6 +188,26 @@ def tuned(path):
     return len(tunable)
 
 
+def unguided(path):
+    """The request goes for a second and comes again, then the speed sensor jumps: the causes in turn, step by step with the mode."""
+    unit, away, causes = Unit(path, engaged_at_start=True), 0, []
+    for k, (e_y, e_theta, driver, wheel) in enumerate(samples()):
+        speed = 16.5 if k < 3000 else 3.0
+        unit.put(**dict(zip(INPUTS, (e_y, e_theta, driver, wheel, unit.get("torque_nm")[0], speed))))
+        unit.turn(engage=not 500 <= k < 1500)
+        unit.step(k)
+        mode, cause = unit.code("mode"), unit.code("unguided_cause")
+        assert (cause == 0) == (mode == 2), (k, mode, cause)
+        away += mode != 2
+        assert abs(unit.get("unguided_s")[0] - away * 1e-3) < 1e-9
+        if causes[-1:] != [cause]:
+            causes.append(cause)
+    unit.end()
+    # -3: the request ended; bit 16 of the fault word: SpeedStep.
+    assert causes == [0, -3, 0, 1 << 16], causes
+    return away
+
+
 def bounds(path):
     """Every input has a range; beyond it, and for no number, the unit says name, value and range, and stays as it was."""
     unit, checked = Unit(path), 0
@@ -358,6 +378,7 @@ def main(directory, run_csv):
         differing = controller(directory / f"HapticController.{ending}")
         print(f"{ending}: {tuned(directory / f'HapticController.{ending}')} parameters tunable in Standby, with the library's torques")
         paths = [directory / f"{model}.{ending}" for model in MODELS]
+        print(f"{ending}: {unguided(paths[0])} steps without guidance, with why")
         default_driver(paths[1])
         too_long(paths[1])
         sizes = [written(path, paths[i - 1]) for i, path in enumerate(paths)]

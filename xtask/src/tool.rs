@@ -51,7 +51,8 @@ impl Built {
         build.args(["build", "-q"]);
         let place = match self {
             Self::ForTests => {
-                build.args(SHAPE);
+                // With the tests, whose dependencies switch on features of what the rest depends on too.
+                build.args(SHAPE).arg("--all-targets");
                 "release"
             }
             Self::ToShip => {

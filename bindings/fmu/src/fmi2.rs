@@ -107,7 +107,7 @@ functions! {
     /// Reads codes and words. The fault word has 32 bits: the sign is its highest.
     fmi2GetInteger(pointer: Pointer, references: *const u32, count: usize, values: *mut c_int) -> c_int {
         // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, count), Kind::Integer, |x| x as u32 as c_int) }
+        unsafe { unit::get(pointer, (references, count), (values, count), Kind::Integer, |x| x as i64 as c_int) }
     }
 
     /// Sets codes: there is none that can be set.

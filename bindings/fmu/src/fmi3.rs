@@ -81,7 +81,7 @@ functions! {
         pointer: Pointer, references: *const u32, count: usize, values: *mut i32, places: usize,
     ) -> c_int {
         // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, places), Kind::Integer, |x| x as u32 as i32) }
+        unsafe { unit::get(pointer, (references, count), (values, places), Kind::Integer, |x| x as i64 as i32) }
     }
 
     /// Sets codes and words.

@@ -133,10 +133,10 @@ mod tests {
         );
         let both = Away::of(&[
             stretch(10.0, Some(20.0), Cause::RequestEnded),
-            stretch(52.505, Some(60.0), HANDS_OFF),
+            stretch(52.5, Some(60.0), HANDS_OFF),
         ]);
         assert!(both.is_by_itself());
-        assert_eq!(both.texts().join(","), "52.505,HandsOff,60,17.495");
+        assert_eq!(both.texts().join(","), "52.5,HandsOff,60,17.5");
         assert_eq!(
             both.when_and_why().unwrap(),
             "at 52.5 s: HandsOff, back at 60.0 s"

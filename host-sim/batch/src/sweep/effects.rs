@@ -15,6 +15,8 @@ use super::{Driven, Point, SLICES, Sweep, units, value};
 const MOST_LEVELS: usize = 64;
 /// Most repeats that are told apart; of more, those with the same remainder are one observation.
 const MOST_REPEATS: u64 = 64;
+/// Fewer observations of its own say nothing of a level.
+const FEWEST: u64 = 5;
 /// Means that differ by a smaller share of themselves are called equal, however certain the difference is.
 const SMALL: f64 = 0.01;
 
@@ -302,23 +304,24 @@ impl Axis {
             .is_some_and(|([low, high], [other_low, other_high])| low > other_high || other_low > high)
     }
 
-    /// Whether two means are told apart: in the observations that both levels have, if there are two; else by what each has
-    /// of its own (Welch). A single observation is all there is where nothing is drawn.
+    /// Whether two means are told apart: in the observations that both levels have, or, if each has its own, by these (Welch).
+    /// A single observation is all there is where nothing is drawn.
     fn means_differ(&self, i: usize, j: usize, certainty: f64) -> bool {
         let own = [i, j].map(|level| self.levels[level].all.observed);
+        let fewer = own[0].count.min(own[1].count);
         let pair = &self.pairs[i.min(j) * MOST_LEVELS + i.max(j)];
-        let (difference, half) = match (pair.count, pair.of_mean(), own.map(|own| own.of_mean())) {
-            (_, Some((variance, free)), _) => (pair.mean, student(certainty, free) * variance.sqrt()),
-            (0, _, [Some((a, free_a)), Some((b, free_b))]) => {
+        let half = |variance: f64, free: f64| student(certainty, free) * variance.sqrt();
+        let (difference, half) = match own.map(|own| own.of_mean()) {
+            [None, None] => (pair.mean, 0.0),
+            _ if pair.count == fewer => match pair.of_mean() {
+                Some((variance, free)) => (pair.mean, half(variance, free)),
+                None => return false,
+            },
+            [Some((a, free_a)), Some((b, free_b))] if fewer >= FEWEST => {
                 let free = (a + b).powi(2) / (a * a / free_a + b * b / free_b);
-                let half = if a + b > 0.0 {
-                    student(certainty, free) * (a + b).sqrt()
-                } else {
-                    0.0
-                };
+                let half = if a + b > 0.0 { half(a + b, free) } else { 0.0 };
                 (own[0].mean - own[1].mean, half)
             }
-            (1, ..) if own.iter().all(|own| own.count == 1) => (pair.mean, 0.0),
             _ => return false,
         };
         difference.abs() > half.max(SMALL * own[0].mean.abs().max(own[1].mean.abs()))

@@ -1,6 +1,6 @@
 //! A figure in pieces that a printed page can hold.
 
-use super::{Axis, Figure, Panel, Series};
+use super::{Axis, Band, Figure, Panel, Series};
 
 /// Most names on a page.
 const ROWS: usize = 60;
@@ -20,12 +20,25 @@ impl Figure {
             let titled = panels.iter().any(|panel| !panel.title.is_empty());
             let most = if titled { PANELS - 1 } else { PANELS };
             let (low, high) = self.x_limits();
-            let piece = |panels: &[Panel]| Figure {
-                x: self.x.clone().within(low, high),
-                panels: panels.to_vec(),
-                ..self.clone()
+            let piece = |(number, panels): (usize, &[Panel])| {
+                let bands = self.bands.iter().filter_map(|band| {
+                    let place = match band.panel {
+                        Some(panel) => Some(panel.checked_sub(number * most).filter(|i| *i < panels.len())?),
+                        None => None,
+                    };
+                    Some(Band {
+                        panel: place,
+                        ..band.clone()
+                    })
+                });
+                Figure {
+                    x: self.x.clone().within(low, high),
+                    panels: panels.to_vec(),
+                    bands: bands.collect(),
+                    ..self.clone()
+                }
             };
-            let pages = panels.chunks(most).map(piece).collect();
+            let pages = panels.chunks(most).enumerate().map(piece).collect();
             return if panels.len() > most {
                 pages
             } else {

@@ -285,6 +285,12 @@ fn pages_hold_all_of_a_figure_on_the_same_axes() {
         assert_eq!(rows, figure.rows.iter().collect::<Vec<_>>());
         assert!((2..=3).contains(&pages.len()), "{}", pages.len());
     }
+    // A band of one panel goes with it: the fifth is the first of the second page.
+    let mut banded = two_panels();
+    banded.panels = vec![banded.panels[0].clone(); 6];
+    banded.bands[0].panel = Some(4);
+    let bands: Vec<Option<usize>> = banded.pages().iter().flat_map(|page| &page.bands).map(|band| band.panel).collect();
+    assert_eq!(bands, [Some(0)], "the first page has no fifth panel");
     // A row's dot goes with its name: on the third page the row 100 is the twelfth.
     let third = Figure {
         rows: names,

@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn a_clock_that_was_set_is_refused_or_cut_at_its_line() {
         let all = (f64::NEG_INFINITY, f64::INFINITY);
-        for set_by in [86_400.0, 1.7e9, 1e300] {
+        for set_by in [86_400.0, 1.7e9, 1e12] {
             let text = text(set_by);
             let within = |stretches: &[_]| DriveLog::read_within(text.as_bytes(), false, stretches);
             for stretches in [&[][..], &[(0.0, 5.0), (set_by + 1.0, all.1)], &[all]] {
@@ -121,7 +121,7 @@ mod tests {
                 before.start_s
             );
             assert_eq!(before.e_y_m[1199], e_y_m(1199));
-            if set_by < 1e300 {
+            if set_by < 1e12 {
                 let after = within(&[(set_by, all.1)]).unwrap();
                 assert!((after.start_s - set_by - 12.0).abs() < 1e-6, "{}", after.start_s);
                 assert_eq!((after.len(), after.e_y_m[0]), (1300, e_y_m(1200)));
