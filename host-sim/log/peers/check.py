@@ -151,12 +151,14 @@ def buses():
 def written_by_them(run):
     """What others write, with their types, compressions and units."""
     small = run.iloc[:400]
-    small.to_parquet(WORK / "pandas.parquet")
+    packed = ("snappy", "gzip", "zstd", "lz4", None)
+    for compression in packed:
+        small.to_parquet(WORK / f"pandas{compression}.parquet", compression=compression)
     small.astype({"e_y_m": "float32"}).to_csv(WORK / "pandas.csv", index=False)
     columns = {name: small[name].to_numpy() for name in small}
     for compressed in (False, True):
         scipy.io.savemat(WORK / f"scipy{compressed}.mat", columns, do_compression=compressed, oned_as="column")
-    for name in ("pandas.parquet", "pandas.csv", "scipyFalse.mat", "scipyTrue.mat"):
+    for name in (*(f"pandas{c}.parquet" for c in packed), "pandas.csv", "scipyFalse.mat", "scipyTrue.mat"):
         back = table(convert(WORK / name, "back.csv"))
         for column in small.columns:
             expected = small[column].astype("float32") if name == "pandas.csv" and column == "e_y_m" else small[column]

@@ -101,6 +101,12 @@ pub fn in_brackets(text: &str) -> Option<(&str, &str)> {
     split('[', ']').or_else(|| split('(', ')'))
 }
 
+/// A name without the unit in brackets behind it.
+#[must_use]
+pub fn bare(name: &str) -> &str {
+    in_brackets(name).map_or(name, |(name, _)| name)
+}
+
 /// The unit that a name ends with, if it does.
 #[must_use]
 pub fn of_name(name: &str) -> Option<&'static str> {

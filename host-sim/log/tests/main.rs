@@ -2,3 +2,4 @@
 
 mod channels;
 mod formats;
+mod parquet;

@@ -190,13 +190,11 @@ const NO_PARQUET: &str = "this build reads and writes no Parquet: pyarrow or the
 /// Columns of a table, the time among them, as a recording.
 fn with_time(mut columns: Vec<Series>, time: Option<&TimeColumn>) -> Result<Recording, RecordingError> {
     let (wanted, scale) = time.map_or(("time_s", None), |t| (t.name.as_str(), t.scale));
-    let bare = |text: &str| {
-        units::in_brackets(text)
-            .map_or(text, |(name, _)| name)
-            .to_lowercase()
-    };
     let exact = columns.iter().position(|c| c.name.eq_ignore_ascii_case(wanted));
-    let place = exact.or_else(|| columns.iter().position(|c| bare(&c.name) == bare(wanted)));
+    let place = exact.or_else(|| {
+        let is_it = |c: &Series| units::bare(&c.name).eq_ignore_ascii_case(units::bare(wanted));
+        columns.iter().position(is_it)
+    });
     let Some(place) = place else {
         let names: Vec<&str> = columns.iter().take(8).map(|c| c.name.as_str()).collect();
         return Err(format!(

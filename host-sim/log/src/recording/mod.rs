@@ -147,17 +147,16 @@ impl Recording {
             all.filter(|(g, c)| c.name == wanted || format!("{}.{}", g.name, c.name) == wanted)
                 .collect()
         };
-        let bare = |text: &str| units::in_brackets(text).map_or(text, |(name, _)| name).to_owned();
         let mut found = named(name);
         if found.is_empty() {
-            found = named(&bare(name));
+            found = named(units::bare(name));
         }
         if found.is_empty() {
             let all = self
                 .groups
                 .iter()
                 .flat_map(|g| g.channels.iter().map(move |c| (g, c)));
-            found = all.filter(|(_, c)| bare(&c.name) == name).collect();
+            found = all.filter(|(_, c)| units::bare(&c.name) == name).collect();
         }
         match found[..] {
             [found] => Ok(found),

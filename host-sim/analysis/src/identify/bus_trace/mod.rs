@@ -160,14 +160,7 @@ fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Resul
     };
     let speed = course("Vehicle_Speed1")?;
     let mut findings: Vec<[String; 3]> = audits.iter().filter_map(Audit::finding).collect();
-    let not_valid = valid.value.iter().filter(|&&v| v == 0.0).count();
-    if not_valid > 0 {
-        findings.push([
-            "LanePreview".to_owned(),
-            format!("{not_valid} frames that say that they are not valid"),
-            "not used".to_owned(),
-        ]);
-    }
+    findings.extend(valid.not_valid());
     [e_y, e_theta] = [e_y, e_theta].map(|c| c.earlier_by(&age).only(&valid));
 
     let mut needed: Vec<Course> = [e_y, e_theta, torque, angle]
@@ -364,6 +357,18 @@ impl Course {
         }
         self.line.truncate(to);
         self.line.drain(..from.min(to));
+    }
+
+    /// How often the lane preview says that it is not valid, in words.
+    fn not_valid(&self) -> Option<[String; 3]> {
+        let count = self.value.iter().filter(|&&v| v == 0.0).count();
+        (count > 0).then(|| {
+            [
+                "LanePreview".to_owned(),
+                format!("{count} frames that say that they are not valid"),
+                "not used".to_owned(),
+            ]
+        })
     }
 
     /// How often the signal pauses, in words.

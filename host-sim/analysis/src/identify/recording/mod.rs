@@ -89,13 +89,9 @@ pub fn of_table(
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     once(maps)?;
-    let bare = |text: &str| units::in_brackets(text).map_or(text, |(name, _)| name).to_owned();
-    let asked: Vec<String> = NAMES
-        .into_iter()
-        .chain(maps.iter().map(|map| map.channel.as_str()))
-        .map(bare)
-        .collect();
-    columns.retain(|(name, _)| asked.contains(&bare(name)));
+    let asked = NAMES.into_iter().chain(maps.iter().map(|map| map.channel.as_str()));
+    let asked: Vec<&str> = asked.map(units::bare).collect();
+    columns.retain(|(name, _)| asked.contains(&units::bare(name)));
     let recording = formats::table(columns, time_of(maps).as_ref());
     let recording = recording.map_err(|e| LogError::new(e.to_string()))?;
     of_channels(&recording, maps, how).map_err(LogError::new)
