@@ -289,7 +289,12 @@ fn pages_hold_all_of_a_figure_on_the_same_axes() {
     let mut banded = two_panels();
     banded.panels = vec![banded.panels[0].clone(); 6];
     banded.bands[0].panel = Some(4);
-    let bands: Vec<Option<usize>> = banded.pages().iter().flat_map(|page| &page.bands).map(|band| band.panel).collect();
+    let bands: Vec<Option<usize>> = banded
+        .pages()
+        .iter()
+        .flat_map(|page| &page.bands)
+        .map(|band| band.panel)
+        .collect();
     assert_eq!(bands, [Some(0)], "the first page has no fifth panel");
     // A row's dot goes with its name: on the third page the row 100 is the twelfth.
     let third = Figure {

@@ -89,7 +89,9 @@ pub fn of_table(
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     once(maps)?;
-    let asked = NAMES.into_iter().chain(maps.iter().map(|map| map.channel.as_str()));
+    let asked = NAMES
+        .into_iter()
+        .chain(maps.iter().map(|map| map.channel.as_str()));
     let asked: Vec<&str> = asked.map(units::bare).collect();
     columns.retain(|(name, _)| asked.contains(&units::bare(name)));
     let recording = formats::table(columns, time_of(maps).as_ref());
