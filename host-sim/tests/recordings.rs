@@ -78,7 +78,9 @@ fn a_clock_that_was_set_is_refused_with_its_line_and_one_side_is_used() {
     let to = format!("{}", first_s + 30.0);
     let of_part = identified(directory.path(), &["log.csv", "--to", &to]);
     let of_whole = identified(directory.path(), &[LOG, "--to", &to]);
-    assert_eq!(of_part["rows"], of_whole["rows"]);
+    // The mean rate of the shorter record may move the last row of the grid.
+    let count = |of: &Value| of["rows"].as_i64().unwrap();
+    assert!((count(&of_part) - count(&of_whole)).abs() <= 1 && count(&of_part) > 3000);
 }
 
 /// The same drive as a table of another tool: semicolons, units in brackets, another name for the speed.

@@ -80,7 +80,7 @@ enum Command {
     Lab(lab::Arguments),
     /// A driver's parameters from a recorded drive, with their uncertainty
     Identify(identify::Arguments),
-    /// Several drivers beside each other: what differs between two, and what a group is like
+    /// Several drivers beside each other: what differs between two, what a group is like
     Drivers(drivers::Arguments),
     /// Which experiment tells a driver's parameters: probe, course and length for a given error
     Design(design::Arguments),

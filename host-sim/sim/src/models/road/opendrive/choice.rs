@@ -127,7 +127,7 @@ fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> Strin
                  --road"
             );
         }
-        Some(Next::Outside(what)) => {
+        Some(Next::Outside(_, what)) => {
             let last = network.roads[chain[chain.len() - 1].0].id;
             return format!(
                 "its roads are not one chain: road {last}: {what}; choose the road to begin on with --road"

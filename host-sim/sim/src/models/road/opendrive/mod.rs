@@ -75,8 +75,10 @@ pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course
     let network = Network::read(root, &choice.turns)?;
     let mut drive = Drive::begin(&network, choice)?;
     drive.follow()?;
-    let driven = |turn: &&String| drive.roads.iter().all(|used| used.road != **turn);
-    if let Some(turn) = choice.turns.iter().find(driven) {
+    let not_taken = |turn: &&String| {
+        drive.outside != Some(turn.as_str()) && drive.roads.iter().all(|used| used.road != **turn)
+    };
+    if let Some(turn) = choice.turns.iter().find(not_taken) {
         let notes = drive.notes.join("; ");
         return Err(format!(
             "turn {turn}: no junction on the way leads there ({notes})"
@@ -105,6 +107,8 @@ struct Drive<'n, 'a> {
     pieces: Vec<Piece>,
     segments: Vec<super::Segment>,
     roads: Vec<RoadUsed>,
+    /// Where the way goes on to that is not in the file.
+    outside: Option<&'a str>,
     notes: Vec<String>,
 }
 
@@ -119,6 +123,7 @@ impl<'n, 'a> Drive<'n, 'a> {
             pieces: Vec::new(),
             segments: Vec::new(),
             roads: Vec::new(),
+            outside: None,
             notes,
         })
     }
@@ -147,7 +152,8 @@ impl<'n, 'a> Drive<'n, 'a> {
             let lane = self.lane;
             (self.leg, self.lane) = match self.network.next(self.leg, Some(lane))? {
                 Next::End => return Ok(()),
-                Next::Outside(what) => {
+                Next::Outside(target, what) => {
+                    self.outside = Some(target);
                     self.notes.push(format!("the way ends with road {id}: {what}"));
                     return Ok(());
                 }

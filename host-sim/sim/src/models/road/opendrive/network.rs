@@ -31,8 +31,8 @@ pub(super) struct RoadNode<'a> {
 pub(super) enum Next<'a> {
     /// The road ends.
     End,
-    /// A road or a junction that is not in the file, in words.
-    Outside(String),
+    /// A road or a junction that is not in the file: its id, and the sentence.
+    Outside(&'a str, String),
     /// A road; the link of the lane says which lane.
     Road(Leg),
     /// A way through a junction, and which lane it gives to ours, if it says so.
@@ -121,15 +121,17 @@ impl<'a> Network<'a> {
         if text(link, "elementType") == Some("junction") {
             return Ok(match self.junctions.get(target) {
                 Some(junction) => self.through(target, *junction, (road, along), lane),
-                None => Next::Outside(format!(
-                    "its {side} is junction {target}, which is not in the file"
-                )),
+                None => Next::Outside(
+                    target,
+                    format!("its {side} is junction {target}, which is not in the file"),
+                ),
             });
         }
         let Some(&target_road) = self.by_id.get(target) else {
-            return Ok(Next::Outside(format!(
-                "its {side} is road {target}, which is not in the file"
-            )));
+            return Ok(Next::Outside(
+                target,
+                format!("its {side} is road {target}, which is not in the file"),
+            ));
         };
         let at_start = match text(link, "contactPoint") {
             Some("start") => true,
@@ -202,9 +204,10 @@ impl<'a> Network<'a> {
             Some(Way {
                 leg: Some(leg), lane, ..
             }) => Next::Connection(*leg, *lane),
-            Some(Way { road, .. }) => Next::Outside(format!(
-                "junction {junction} leads on to road {road}, which is not in the file"
-            )),
+            Some(Way { road, .. }) => Next::Outside(
+                road,
+                format!("junction {junction} leads on to road {road}, which is not in the file"),
+            ),
             None => Next::Junction(junction, ways),
         }
     }
@@ -224,7 +227,7 @@ impl<'a> Network<'a> {
             match next {
                 Next::Road(leg) | Next::Connection(leg, _) if seen.insert(leg.0) => legs.push(leg),
                 Next::Junction(..) => return Ok((legs, Some(next))),
-                Next::Outside(_) => return Ok((legs, Some(next))),
+                Next::Outside(..) => return Ok((legs, Some(next))),
                 Next::End | Next::Road(_) | Next::Connection(..) => return Ok((legs, None)),
             }
         }
