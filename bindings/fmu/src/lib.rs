@@ -1,7 +1,7 @@
 //! The binaries of the FMUs: three models, FMI 2.0 and 3.0 co-simulation. Which model it is the token says that the importing
 //! tool gives.
 //!
-//! A model's variables are one list, from which both descriptions follow. `unsafe` is in [`unit`], [`fmi2`] and [`fmi3`] alone:
+//! A model's variables are one list, from which both descriptions follow. `unsafe` is in [`mod@unit`], [`fmi2`] and [`fmi3`] alone:
 //! pointers come from the importing tool, as the standards say.
 
 pub mod controller;

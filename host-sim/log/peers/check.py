@@ -37,7 +37,7 @@ def host_sim(*arguments, code=0):
 
 
 def convert(source, target, *options):
-    host_sim("convert", source, WORK / target, *options)
+    host_sim("convert", "--force", source, WORK / target, *options)
     return WORK / target
 
 

@@ -141,6 +141,7 @@ class ScenarioFields(TypedDict, total=False):
     course: Union[str, PathLike[str], CourseTable]
     road: str
     lane: int
+    turn: list[str]
     speed: Union[float, SpeedTable]
     condition: Literal["manual", "high", "mid", "low"]
     sensors: Literal["exact", "paper"]

@@ -89,6 +89,23 @@ pub fn of_table(
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     once(maps)?;
+    let is_there = |map: &Mapping| {
+        columns
+            .iter()
+            .any(|(name, _)| units::bare(name) == units::bare(&map.channel))
+    };
+    if let Some(map) = maps.iter().find(|map| !is_there(map)) {
+        let names: Vec<&str> = columns.iter().take(8).map(|(name, _)| name.as_str()).collect();
+        let there = if names.is_empty() {
+            "none".into()
+        } else {
+            names.join(", ")
+        };
+        return Err(LogError::new(format!(
+            "there is no channel {}; there are {there}",
+            map.channel
+        )));
+    }
     let asked = NAMES
         .into_iter()
         .chain(maps.iter().map(|map| map.channel.as_str()));
