@@ -82,7 +82,7 @@ enum Command {
     Identify(identify::Arguments),
     /// Several drivers beside each other: what differs between two, what a group is like
     Drivers(drivers::Arguments),
-    /// Which experiment tells a driver's parameters: probe, course and length for a given error
+    /// Which experiment tells a driver's parameters to a given error: probe, course, length
     Design(design::Arguments),
     /// Participants and conditions from one file, in a balanced order
     ///
