@@ -6,6 +6,9 @@
 
 use haptic_log::formats::{self, Contents, Format};
 
+/// Name, unit, and the value at a time.
+type Column = (&'static str, &'static str, fn(f64) -> f64);
+
 fn read(name: &str) -> Result<Contents, String> {
     let path = format!(
         "{}/../../tests/data/parquet/{name}.parquet",
@@ -16,7 +19,7 @@ fn read(name: &str) -> Result<Contents, String> {
 
 #[test]
 fn files_of_polars_and_pyarrow_are_read_in_every_usual_compression() {
-    let columns: [(&str, &str, fn(f64) -> f64); 4] = [
+    let columns: [Column; 4] = [
         ("Torque [Nm]", "Nm", |k| ((0.07 * k).sin() * 1e3).round() / 1e3),
         ("count", "", |k| (k / 10.0).floor()),
         ("gap", "", |k| {
