@@ -18,7 +18,7 @@ const INPUTS: [&str; 4] = ["100", "110", "120", "130"];
 
 /// Prints the table, and fails where a door sends another bit.
 pub(crate) fn check(built: Built) -> Result<()> {
-    let out = root().join("target/bindings-agree");
+    let out = root().join("target/bindings-agree/run");
     run(command(&built.host_sim()?.to_string_lossy())
         .args(["run", SCENARIO, "--bus-log", "--out"])
         .arg(&out)
