@@ -210,3 +210,30 @@ pub(crate) fn stretched_curve(k: f64) -> Result<Course, String> {
     );
     course.map_err(|e| e.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Peaks that keep the bound (0.12 of 0.1 m), once with a drive that was not guided throughout.
+    #[test]
+    fn a_row_that_rests_on_an_unguided_drive_is_broken() {
+        let drives = |left: bool| {
+            let mut drives = vec![([Some(0.1), Some(0.1), Some(0.01)], false); RUNS_OF_A_CASE];
+            // With the input lost: of high reliance, and of low, which is not judged.
+            for place in [2, 8] {
+                drives[place] = ([Some(0.12); 3], left);
+            }
+            rows_of(60.0, 0.1, &drives).collect::<Vec<_>>()
+        };
+        let told = |row: &HandoverRow| (row.left_by_itself, row.is_broken());
+        assert_eq!(
+            drives(false).iter().map(told).collect::<Vec<_>>(),
+            [(0, false); 3]
+        );
+        assert_eq!(
+            drives(true).iter().map(told).collect::<Vec<_>>(),
+            [(1, true), (0, false), (1, false)]
+        );
+    }
+}
