@@ -4,7 +4,7 @@
 //! - [`slcan_can`]: a serial port as a CAN controller (`embedded-can`), by SLCAN.
 //! - `boards`: the `boards::Board` trait and one file per board; a feature of the same name chooses it.
 //! - `log`: defmt over the board's log port.
-//! - `product`: the product's loop. `reset`: why the processor started. `stack`: its guard and its budget.
+//! - `product`: the product's loop. `service`: what it says of its parameters and of frames not used. `reset`: why the processor started. `stack`: its guard and its budget.
 //! - [`image`]: whether the image in the flash is the one that was built.
 //! - [`eccr`]: where in the STM32G4's flash an error lies.
 //! - [`analogue`]: a motor stage and the column's sensors, in counts of converters.
@@ -40,5 +40,7 @@ pub mod host;
 pub mod log;
 #[cfg(target_os = "none")]
 pub mod product;
+#[cfg(target_os = "none")]
+pub mod service;
 #[cfg(target_os = "none")]
 pub mod stack;

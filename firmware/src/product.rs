@@ -15,31 +15,20 @@
 
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
-use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{
-    Column, Identity, Message, ParameterStatus, ParameterValue, Rejection, ResetCause,
-};
+use haptic_core::bus::messages::{Column, Message, ResetCause};
 use haptic_core::config::Setup;
-use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::ecu::{Boot, Ecu, Step};
 use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
 use haptic_core::params::Params;
 use haptic_core::rejections::Rejections;
 
 use crate::boards::{Board, ThisBoard};
+use crate::service::{STEPS_TO_SETTLE, Service};
 use crate::storage::{self, Found};
 use crate::{analogue, image, reset, stack};
 
 /// Steps between two lines of the log: one second.
 const STEPS_PER_REPORT: u32 = 1000;
-/// Steps between two parameters in use, and two counts of rejections, on the bus; these half a turn apart, and neither in
-/// a step with a warning or a line of the fault history, which come on multiples of 50.
-const STEPS_PER_LINE: u32 = 100;
-const VALUE_AT: u32 = 25;
-const REJECTION_AT: u32 = 75;
-/// Steps after which earlier resets no longer count: 10 s.
-const STEPS_TO_SETTLE: u32 = 10_000;
 
 /// What the log says once a second.
 #[derive(Default)]
@@ -51,46 +40,8 @@ struct Counts {
     /// Cycles of the frames received since the last step, and the most that they and a step took.
     receiving: u32,
     worst_cycles: u32,
-    /// The last count that the log told.
-    told: Option<Rejection>,
     /// Faults that the record of resets holds already.
     latched: FaultSet,
-}
-
-/// What has to do with parameters.
-struct Service {
-    download: Download,
-    /// As the download sees it, of the last step.
-    mode: Mode,
-    found: Found,
-    /// The set in use; None while the controller is locked for want of one.
-    in_use: Option<Params>,
-    boot: Boot,
-}
-
-impl Service {
-    fn status(&self) -> ParameterStatus {
-        let is_damaged = self.found.damaged != [false, false];
-        self.download.status(self.found.stored.as_ref(), is_damaged)
-    }
-
-    fn identity(&self) -> Identity {
-        Identity {
-            vehicle: self.found.stored.map_or(0, |stored| stored.set.vehicle),
-            hardware: ThisBoard::hardware(),
-        }
-    }
-
-    /// What a set finds that comes now.
-    fn conditions(&self, ecu: &Ecu, steps: u32) -> Conditions {
-        Conditions {
-            mode: self.mode,
-            stands: ecu.stands(),
-            settled: self.boot.reset == ResetCause::PowerOn || steps >= STEPS_TO_SETTLE,
-            in_use: self.found.stored.map_or(0, |stored| stored.sequence),
-            now_ms: steps,
-        }
-    }
 }
 
 /// Runs the product. `disturb` is called before each step with its number: the product has nothing to say there,
@@ -110,13 +61,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     let params = params(&found).filter(|_| is_sound);
     let setup = params.and_then(|params| Setup::new(&params).ok());
     let ecu = begin(ecu, setup.as_ref(), boot);
-    let mut service = Service {
-        download: Download::NEW,
-        mode: Mode::Boot,
-        found,
-        in_use: params,
-        boot,
-    };
+    let mut service = Service::new(found, params, boot);
     let mut counts = Counts::default();
     defmt::info!(
         "steering-ecu on {=str}, reset cause {=u8}, resets of late {=u8}, parameters {=u32}",
@@ -150,8 +95,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
             if let Err(reason) = received {
                 counts.rejected.count(frame.id(), reason);
             }
-            let conditions = service.conditions(ecu, counts.steps);
-            if let Some(set) = service.download.receive(&frame, &conditions) {
+            if let Some(set) = service.receive(&frame, ecu, counts.steps) {
                 ThisBoard::zero_torque();
                 reset::restart_with(&set);
             }
@@ -238,18 +182,9 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             counts.unsent = counts.unsent.wrapping_add(1);
         }
     }
-    service.mode = mode_for_parameters(step.command.mode, step.command.faults);
     // The torque is on its way; what follows may take its time.
-    let status = counts.steps.is_multiple_of(STEPS_PER_REPORT).then(|| {
-        let turn = counts.steps / STEPS_PER_REPORT;
-        [
-            service.status().encode(turn as u8),
-            service.identity().encode(turn as u8),
-        ]
-    });
-    let line = line(service, counts);
-    let report = status.as_slice().as_flattened();
-    for frame in ecu.background_step().iter().chain(report).chain(&line) {
+    let report = service.frames(&step.command, &mut counts.rejected, counts.steps);
+    for frame in ecu.background_step().iter().chain(&report) {
         if board.can().transmit(frame).is_err() {
             counts.unsent = counts.unsent.wrapping_add(1);
         }
@@ -273,30 +208,6 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
             stack::used(),
             stack::budget()
         );
-    }
-}
-
-/// A parameter in use or a count of rejections, when it is its turn.
-fn line(service: &Service, counts: &mut Counts) -> Option<Frame> {
-    let turn = counts.steps / STEPS_PER_LINE;
-    match counts.steps % STEPS_PER_LINE {
-        VALUE_AT => {
-            let value: ParameterValue = download::value(service.in_use.as_ref()?, turn)?;
-            Some(value.encode(turn as u8))
-        }
-        REJECTION_AT => {
-            let line: Rejection = counts.rejected.line()?;
-            if counts.told.replace(line) != Some(line) {
-                defmt::warn!(
-                    "message {=u16:#05x} was not used {=u16} times, reason {=u8}",
-                    line.id,
-                    line.count,
-                    line.reason as u8
-                );
-            }
-            Some(line.encode(turn as u8))
-        }
-        _ => None,
     }
 }
 

@@ -64,6 +64,12 @@ pub fn from_record(record: &[u8; RECORD_LEN]) -> Option<Frame> {
     Frame::new(u16::from_le_bytes([*low, *high]), data.get(..usize::from(*len))?)
 }
 
+/// Whether a frame is one of this protocol's, which no vehicle's bus carries.
+#[must_use]
+pub fn is_of_a_lock_step_run(frame: &Frame) -> bool {
+    frame.id() >= PARAMETER_ID
+}
+
 /// How many parameters a set has.
 pub const PARAMETERS: usize = params::PARAMETERS.len();
 /// Identifier of the first parameter's frame; the others follow.
@@ -122,6 +128,9 @@ pub enum StartState {
     WithoutParameters(Boot),
     /// Guiding, with every sender trusted, as in the paper's studies.
     Engaged,
+    /// As a product at power-up, with good parameters; the image also says what a product says of its parameters, of itself
+    /// and of frames that it did not use, and takes a set of parameters over the bus.
+    Product,
 }
 
 impl Start {
@@ -136,6 +145,7 @@ impl Start {
             StartState::Boot(boot) => (0, boot),
             StartState::WithoutParameters(boot) => (1, boot),
             StartState::Engaged => (2, Boot::default()),
+            StartState::Product => (3, Boot::default()),
         };
         let head = code | (boot.reset as u8) << 2 | boot.recent_resets.min(7) << 5;
         let [a, b, c, d] = self.at.us().to_le_bytes();
@@ -160,7 +170,7 @@ impl Start {
                 0 => StartState::Boot(boot),
                 1 => StartState::WithoutParameters(boot),
                 2 => StartState::Engaged,
-                _ => return None,
+                _ => StartState::Product,
             },
             at: Instant::from_us(u32::from_le_bytes([a, b, c, d])),
         })
@@ -181,6 +191,7 @@ impl Start {
             StartState::Boot(boot) => Ecu::new(Some(setup), boot, self.at),
             StartState::WithoutParameters(boot) => Ecu::new(None, boot, self.at),
             StartState::Engaged => Ecu::engaged(setup, self.at),
+            StartState::Product => Ecu::new(Some(setup), Boot::default(), self.at),
         }
     }
 }

@@ -84,6 +84,7 @@ fn starts() {
         ),
         // Engaged without any input hands over in its first step.
         (StartState::Engaged, [2, 0, 0, 0, 1, 2, 3, 4], Mode::Handover),
+        (StartState::Product, [3, 0, 0, 0, 1, 2, 3, 4], Mode::Standby),
     ] {
         let start = Start { state, at };
         assert_eq!(start.encode(), frame(0x7EF, &bytes));
@@ -108,7 +109,6 @@ fn starts() {
     for none in [
         frame(0x7EF, &[0; 7]),
         frame(0x7EE, &[0; 8]),
-        frame(0x7EF, &[3, 0, 0, 0, 0, 0, 0, 0]),
         frame(0x7EF, &[7 << 2, 0, 0, 0, 0, 0, 0, 0]),
     ] {
         assert_eq!(Start::decode(&none), None, "{none:?}");

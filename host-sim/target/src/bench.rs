@@ -5,7 +5,9 @@
 //! hands its answer to every client, as a bus does. Clients hear each other too. A host that is too busy to keep time is
 //! told, and the ECU's clock waits meanwhile.
 //!
-//! Not here: a product's parameters, its flash and its watchdog, which the lock-step image has not (`cargo xtask qemu`).
+//! The ECU says what a product says: its parameters, which set and which processor it has, and what it did not use. It
+//! takes a set of parameters and starts anew with it, and keeps it until it ends. Not here: a product's flash and its
+//! watchdog, which the lock-step image has not (`cargo xtask qemu`).
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
@@ -14,7 +16,9 @@ use std::time::{Duration, Instant};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::slcan::{self, Line, Parser};
+use haptic_core::params::Params;
 use haptic_core::quantity;
+use haptic_lockstep::{Start, StartState, is_of_a_lock_step_run};
 
 use super::PilError;
 use super::stepped::Stepped;
@@ -56,7 +60,12 @@ impl Bench {
         let cannot = |e: std::io::Error| PilError::Failed(format!("cannot listen on {address}: {e}"));
         // A wrong address is told before the image is built, and nobody waits at the door while it is.
         drop(TcpListener::bind(address).map_err(cannot)?);
-        let ecu = Stepped::start(false)?;
+        let mut ecu = Stepped::start(false)?;
+        let start = Start {
+            state: StartState::Product,
+            at: quantity::Instant::from_us(0),
+        };
+        ecu.begin(&Params::PAPER, start)?;
         let listener = TcpListener::bind(address).map_err(cannot)?;
         listener.set_nonblocking(true).map_err(cannot)?;
         Ok(Self {
@@ -86,7 +95,11 @@ impl Bench {
             self.clients.extend(Client::new(stream));
         }
         let heard = self.on_the_bus();
-        let frames: Vec<Frame> = heard.iter().map(|(_, frame)| *frame).collect();
+        // A client must not end the ECU's millisecond.
+        let for_the_ecu = heard.iter().map(|(_, frame)| *frame);
+        let frames: Vec<Frame> = for_the_ecu
+            .filter(|frame| !is_of_a_lock_step_run(frame))
+            .collect();
         self.ecu.tick(quantity::Instant::from_us(self.time_us), &frames)?;
         self.time_us = self.time_us.wrapping_add(1000);
         let answer = self.ecu.answer()?;

@@ -4,11 +4,18 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 
 use haptic_core::bus::Frame;
+use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance, Message};
+use haptic_core::bus::messages::{
+    Guidance, Identity, LanePreview, Message, ParameterStatus, ParameterValue, Rejection, ResetCause,
+    Vehicle, WriteOutcome,
+};
 use haptic_core::bus::slcan::{self, Line, Parser};
+use haptic_core::download;
 use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
+use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::quantity::Speed;
 use haptic_target::PilError;
 use haptic_target::bench::Bench;
 
@@ -114,6 +121,132 @@ fn clients_and_the_ecu_hear_each_other_and_nobody_himself() {
         bench.tick().unwrap();
         heard += other.heard().len();
     }
+    bench.end().unwrap();
+}
+
+/// Messages of one kind.
+fn messages<M: Message>(frames: &[Frame]) -> Vec<M> {
+    let of = frames.iter().filter(|frame| frame.id() == M::ID);
+    of.map(|frame| M::decode(&mut { ReceiverState::TRUSTED }, frame).unwrap())
+        .collect()
+}
+
+impl Client {
+    fn say(&mut self, frame: &Frame) {
+        self.stream.write_all(&slcan::format(frame)).unwrap();
+    }
+
+    /// What is heard in so many milliseconds, in which a vehicle of that speed says so every 10 ms.
+    fn drive(&mut self, bench: &mut Bench, ms: u32, speed: Speed, counter: &mut u8) -> Vec<Frame> {
+        let mut heard = Vec::new();
+        for k in 0..ms {
+            if k.is_multiple_of(10) {
+                let vehicle = Vehicle {
+                    speeds: [speed; 2],
+                    yaw_rate: None,
+                };
+                self.say(&vehicle.encode(*counter));
+                *counter = counter.wrapping_add(1);
+            }
+            bench.tick().unwrap();
+            heard.extend(self.heard());
+        }
+        heard
+    }
+}
+
+fn near(values: &[ParameterValue], params: &Params) -> bool {
+    let told: Vec<f32> = values.iter().map(|value| value.value).collect();
+    let expected = params.to_values().map(|value| value as f32);
+    (0..PARAMETERS.len()).all(|k| usize::from(values[k].index) == k) && told[..PARAMETERS.len()] == expected
+}
+
+#[test]
+fn the_ecu_says_what_it_did_not_use_and_which_parameters_it_has() {
+    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut client = Client::join(&bench);
+    let mut counter = 0;
+    let mut heard = client.drive(&mut bench, 500, Speed::from_m_per_s(0.0), &mut counter);
+    // A flipped bit, and a frame that would end the ECU's millisecond if it were taken for one of the lock step.
+    let mut damaged = LanePreview::default().encode(0).full_data().unwrap();
+    damaged[7] ^= 1;
+    client.say(&Frame::full(LanePreview::ID, damaged));
+    client.say(&Frame::full(0x7F0, [0; 8]));
+    client.say(&Frame::full(0x7C0, [0; 8]));
+    heard.extend(client.drive(&mut bench, 2600, Speed::from_m_per_s(0.0), &mut counter));
+    let rejections = messages::<Rejection>(&heard);
+    let expected = Rejection {
+        id: LanePreview::ID,
+        reason: Reject::Crc,
+        count: 1,
+    };
+    assert!(rejections.len() >= 20, "{}", rejections.len());
+    assert!(rejections.contains(&expected), "{rejections:?}");
+    assert!(
+        rejections
+            .iter()
+            .all(|line| [LanePreview::ID, Vehicle::ID].contains(&line.id))
+    );
+    let (statuses, identities) = (messages::<ParameterStatus>(&heard), messages::<Identity>(&heard));
+    assert!((2..=4).contains(&statuses.len()) && statuses.len() == identities.len());
+    assert!(
+        statuses
+            .iter()
+            .all(|status| !status.stored && status.sequence == 0)
+    );
+    let values = messages::<ParameterValue>(&heard);
+    let first = values.iter().position(|value| value.index == 0).unwrap();
+    assert!(values.len() >= 28 && near(&values[first..], &Params::PAPER));
+    bench.end().unwrap();
+}
+
+#[test]
+fn parameters_can_be_tried() {
+    let mut bench = Bench::start("127.0.0.1:0").unwrap();
+    let mut client = Client::join(&bench);
+    let (mut counter, still) = (0, Speed::from_m_per_s(0.0));
+    let params = Params {
+        k_1: 0.125,
+        torque_limit_nm: 3.0,
+        ..Params::PAPER
+    };
+    let send = |client: &mut Client, in_use: u32| {
+        for frame in [download::unlock(in_use, 77)]
+            .iter()
+            .chain(&download::frames(&params))
+        {
+            client.say(frame);
+        }
+    };
+    let last = |heard: &[Frame]| *messages::<ParameterStatus>(heard).last().unwrap();
+    // Not in a vehicle that moves, and not by the number of another set.
+    for (speed, in_use, outcome) in [
+        (Speed::from_m_per_s(5.0), 0, WriteOutcome::NotStanding),
+        (still, 3, WriteOutcome::NotUnlocked),
+    ] {
+        client.drive(&mut bench, 300, speed, &mut counter);
+        send(&mut client, in_use);
+        let heard = client.drive(&mut bench, 1100, speed, &mut counter);
+        assert_eq!(last(&heard).outcome, outcome);
+        assert!(!last(&heard).stored);
+    }
+    send(&mut client, 0);
+    let heard = client.drive(&mut bench, 3500, still, &mut counter);
+    assert_eq!((last(&heard).stored, last(&heard).sequence), (true, 1));
+    assert_eq!(messages::<Identity>(&heard).last().unwrap().vehicle, 77);
+    assert_eq!(guidance(&heard).last().unwrap().reset, ResetCause::NewParameters);
+    let values = messages::<ParameterValue>(&heard);
+    let restart = values.iter().rposition(|value| value.index == 0).unwrap();
+    let restart = if values.len() - restart < PARAMETERS.len() {
+        restart - PARAMETERS.len()
+    } else {
+        restart
+    };
+    assert!(near(&values[restart..], &params), "{values:?}");
+    // Every start takes a set after ten seconds at the earliest.
+    send(&mut client, 1);
+    let heard = client.drive(&mut bench, 1100, still, &mut counter);
+    assert_eq!(last(&heard).outcome, WriteOutcome::TooSoon);
     bench.end().unwrap();
 }
 

@@ -25,12 +25,18 @@ mod target {
     use embedded_can::nb::Can;
     use embedded_hal_nb::nb;
     use haptic_core::bus::Frame;
+    use haptic_core::bus::messages::ResetCause;
     use haptic_core::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
+    use haptic_core::faults::FaultSet;
     use haptic_core::params::Params;
     use haptic_core::quantity::{Instant, Micros};
+    use haptic_core::rejections::Rejections;
+    use haptic_core::stored::{Set, Stored};
     use haptic_firmware::boards::{Board, ThisBoard};
+    use haptic_firmware::service::Service;
     use haptic_firmware::stack;
+    use haptic_firmware::storage::Found;
     use haptic_lockstep::SimTime;
     use haptic_lockstep::{StackUse, Start, StartState, StepCost, set_parameter};
     use heapless::Vec;
@@ -89,7 +95,11 @@ mod target {
         params: Params,
         frames: Vec<Frame, FRAMES_PER_TICK>,
         steps: u32,
-        rejected: u32,
+        rejected: Rejections,
+        /// What a product says beside its ECU, in a run that asks for it, and its steps since it started.
+        product: Option<(Service, u32)>,
+        /// Class C faults of the last step, which a restart does not end.
+        latched: FaultSet,
     }
 
     impl Run {
@@ -97,7 +107,9 @@ mod target {
             params: Params::PAPER,
             frames: Vec::new(),
             steps: 0,
-            rejected: 0,
+            rejected: Rejections::NONE,
+            product: None,
+            latched: FaultSet::NONE,
         };
 
         fn take(&mut self, frame: Frame, ecu: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
@@ -106,26 +118,36 @@ mod target {
             } else if let Some(start) = Start::decode(&frame) {
                 begin(ecu, start, &self.params);
                 self.frames.clear();
+                self.product = (start.state == StartState::Product).then(|| {
+                    (
+                        Service::new(Found::default(), Some(self.params), Boot::default()),
+                        0,
+                    )
+                });
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
             }
         }
 
-        fn tick(&mut self, now: Instant, ecu: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
+        fn tick(&mut self, now: Instant, place: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
             let boot = Start {
                 state: StartState::Boot(Boot::default()),
                 at: now,
             };
-            if ecu.is_none() {
-                begin(ecu, boot, &self.params);
+            if place.is_none() {
+                begin(place, boot, &self.params);
             }
-            let Some(ecu) = ecu else {
+            let Some(ecu) = place else {
                 return;
             };
+            let mut new = None;
             let start = ThisBoard::cycles();
             for frame in &self.frames {
-                if ecu.receive(frame, now).is_err() {
-                    self.rejected = self.rejected.wrapping_add(1);
+                if let Err(reason) = ecu.receive(frame, now) {
+                    self.rejected.count(frame.id(), reason);
+                }
+                if let Some((service, steps)) = &mut self.product {
+                    new = service.receive(frame, ecu, *steps).or(new);
                 }
             }
             let step = ecu.step(now);
@@ -139,6 +161,12 @@ mod target {
             for frame in step.others.iter().chain(&background) {
                 send(can, frame);
             }
+            if let Some((service, steps)) = &mut self.product {
+                let said = service.frames(&step.command, &mut self.rejected, *steps);
+                said.iter().for_each(|frame| send(can, frame));
+                *steps = steps.wrapping_add(1);
+            }
+            self.latched = step.command.faults.common(FaultSet::CRITICAL);
             if self.steps.is_multiple_of(STACK_TURN) {
                 let bytes = stack::used();
                 send(can, &StackUse { bytes }.encode());
@@ -148,6 +176,36 @@ mod target {
                 background_cycles,
             };
             send(can, &cost.encode());
+            if let Some(set) = new {
+                let boot = self.restarted_with(set);
+                let start = Start {
+                    state: StartState::Boot(boot),
+                    at: now,
+                };
+                begin(place, start, &self.params);
+            }
+        }
+
+        /// A product stores a set and starts with it. Here it is gone when the machine ends.
+        fn restarted_with(&mut self, set: Set) -> Boot {
+            let last = self
+                .product
+                .as_ref()
+                .and_then(|(service, _)| service.found().stored);
+            let (copy, sequence) = last.map_or((0, 1), |last| (1 - last.copy, last.sequence.wrapping_add(1)));
+            let found = Found {
+                stored: Some(Stored { set, sequence, copy }),
+                ..Found::default()
+            };
+            let boot = Boot {
+                reset: ResetCause::NewParameters,
+                recent_resets: 0,
+                latched: self.latched,
+            };
+            self.params = set.params;
+            self.rejected = Rejections::NONE;
+            self.product = Some((Service::new(found, Some(set.params), boot), 0));
+            boot
         }
 
         /// The client has ended the run: so does QEMU.
@@ -155,7 +213,7 @@ mod target {
             defmt::info!(
                 "end of the run: {=u32} steps, {=u32} frames rejected, {=u32} of {=u32} bytes of stack used",
                 self.steps,
-                self.rejected,
+                self.rejected.total(),
                 stack::used(),
                 stack::budget()
             );

@@ -1,0 +1,118 @@
+//! What an ECU says of its parameters, of itself and of frames that it did not use, and the sets that it takes over the
+//! bus. Behind the torque, which is on its way by then. Not here: where a set is stored, and the restart that it causes.
+
+use haptic_core::bus::Frame;
+use haptic_core::bus::messages::{Identity, Message, Rejection, ResetCause};
+use haptic_core::controller::Command;
+use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
+use haptic_core::ecu::{Boot, Ecu};
+use haptic_core::modes::Mode;
+use haptic_core::params::Params;
+use haptic_core::rejections::Rejections;
+use haptic_core::stored::Set;
+use heapless::Vec;
+
+use crate::boards::{Board, ThisBoard};
+use crate::storage::Found;
+
+/// Steps between two statuses: one second.
+const STEPS_PER_STATUS: u32 = 1000;
+/// Steps between two parameters in use, and two counts of rejections, on the bus; these half a turn apart, and neither in
+/// a step with a warning or a line of the fault history, which come on multiples of 50.
+const STEPS_PER_LINE: u32 = 100;
+const VALUE_AT: u32 = 25;
+const REJECTION_AT: u32 = 75;
+/// Steps after which earlier resets no longer count: 10 s.
+pub const STEPS_TO_SETTLE: u32 = 10_000;
+
+/// What has to do with parameters.
+pub struct Service {
+    download: Download,
+    /// As the download sees it, of the last step.
+    mode: Mode,
+    found: Found,
+    /// The set in use; None while the controller is locked for want of one.
+    in_use: Option<Params>,
+    boot: Boot,
+    /// The last count of rejections that the log told.
+    told: Option<Rejection>,
+}
+
+impl Service {
+    /// Of an ECU that starts up so, with what lies in its memory and the set that it uses.
+    #[must_use]
+    pub const fn new(found: Found, in_use: Option<Params>, boot: Boot) -> Self {
+        Self {
+            download: Download::NEW,
+            mode: Mode::Boot,
+            found,
+            in_use,
+            boot,
+            told: None,
+        }
+    }
+
+    /// What lies in the memory.
+    #[must_use]
+    pub const fn found(&self) -> &Found {
+        &self.found
+    }
+
+    /// Takes a frame in the step of that number; the set that it completes.
+    pub fn receive(&mut self, frame: &Frame, ecu: &Ecu, steps: u32) -> Option<Set> {
+        let conditions = Conditions {
+            mode: self.mode,
+            stands: ecu.stands(),
+            settled: self.boot.reset == ResetCause::PowerOn || steps >= STEPS_TO_SETTLE,
+            in_use: self.found.stored.map_or(0, |stored| stored.sequence),
+            now_ms: steps,
+        };
+        self.download.receive(frame, &conditions)
+    }
+
+    /// What is to be said behind the step of that number.
+    pub fn frames(&mut self, command: &Command, rejected: &mut Rejections, steps: u32) -> Vec<Frame, 3> {
+        self.mode = mode_for_parameters(command.mode, command.faults);
+        let mut frames = Vec::new();
+        if steps.is_multiple_of(STEPS_PER_STATUS) {
+            let turn = (steps / STEPS_PER_STATUS) as u8;
+            let is_damaged = self.found.damaged != [false, false];
+            let status = self.download.status(self.found.stored.as_ref(), is_damaged);
+            let identity = Identity {
+                vehicle: self.found.stored.map_or(0, |stored| stored.set.vehicle),
+                hardware: ThisBoard::hardware(),
+            };
+            // Three frames have three places.
+            let _ = frames.push(status.encode(turn));
+            let _ = frames.push(identity.encode(turn));
+        }
+        if let Some(line) = self.line(rejected, steps) {
+            let _ = frames.push(line);
+        }
+        frames
+    }
+
+    /// A parameter in use or a count of rejections, when it is its turn.
+    fn line(&mut self, rejected: &mut Rejections, steps: u32) -> Option<Frame> {
+        let turn = steps / STEPS_PER_LINE;
+        match steps % STEPS_PER_LINE {
+            VALUE_AT => {
+                let value = download::value(self.in_use.as_ref()?, turn)?;
+                Some(value.encode(turn as u8))
+            }
+            REJECTION_AT => {
+                let line = rejected.line()?;
+                if self.told.replace(line) != Some(line) {
+                    defmt::warn!(
+                        "message {=u16:#05x} was not used {=u16} times, reason {=u8}",
+                        line.id,
+                        line.count,
+                        line.reason as u8
+                    );
+                }
+                Some(line.encode(turn as u8))
+            }
+            _ => None,
+        }
+    }
+}
