@@ -351,8 +351,8 @@ fn toml_value(value: &Bound<'_, PyAny>, place: &str) -> PyResult<Value> {
     if let Ok(fields) = value.cast::<PyDict>() {
         return Ok(Value::Table(table(fields, &format!("{place}."))?));
     }
-    if let Ok(items) = value.cast::<PyList>() {
-        let items = items.iter().map(|item| toml_value(&item, place));
+    if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let items = value.try_iter()?.map(|item| toml_value(&item?, place));
         return Ok(Value::Array(items.collect::<PyResult<_>>()?));
     }
     // Numbers of NumPy, and paths.

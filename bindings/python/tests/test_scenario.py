@@ -41,6 +41,7 @@ def test_a_speed_that_changes_is_a_mapping_or_a_table():
     run = hg.simulate(braking)
     assert run["speed_m_per_s"][[0, 1500, -1]] == pytest.approx([20.0, 15.0, 10.0])
     assert run.metrics["min_speed_m_per_s"] == pytest.approx(10.0)
+    assert braking == braking.replace(speed={"time": (5, 10), "kmh": (72.0, 36.0)}), "a tuple is as good as a list"
     by_place = braking.replace(speed={"place": [50, 200], "kmh": [72, 36]})
     assert by_place.to_dict()["speed"] == {"place": [50, 200], "kmh": [72, 36]}
     assert by_place.replace(speed=60) == hg.Scenario(course={"segment": [{"length": 300.0}]})
