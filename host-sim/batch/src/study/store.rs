@@ -7,7 +7,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use haptic_log::trace::Trace;
+use haptic_log::trace::{Sample, Trace};
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::scenario::{Condition, Scenario};
 use haptic_sim::simulation::{Ending, Run};
@@ -32,6 +32,12 @@ pub(super) struct Stored {
 
 /// Largest difference between the speed of a recording and the scenario's, as a share.
 const SPEED_WITHIN: f64 = 0.02;
+/// Largest difference between the road's curvature in a recording and in the scenario, 1/m; and the share of rows that may lie
+/// beyond, where a curve begins a little elsewhere.
+const CURVATURE_WITHIN_1PM: f64 = 2e-4;
+const OTHER_ROAD_SHARE: f64 = 0.02;
+/// Less torque than this on the wheel is nobody's, N.m.
+const HANDS_NM: f64 = 0.01;
 /// Shortest recording that is a drive, s.
 const LEAST_S: f64 = 5.0;
 
@@ -125,7 +131,54 @@ pub(super) fn import(study: &Study, session: &Session, out: &Path, file: &Path) 
     let csv = fs::read(file).map_err(|e| named(e.to_string()))?;
     let trace = Trace::read_csv(&csv[..]).map_err(|e| named(e.to_string()))?;
     check(session, &trace).map_err(named)?;
+    check_hands(&trace).map_err(named)?;
+    check_road(session, &trace).map_err(named)?;
     keep(study, session, out, &csv, Source::Imported, false)
+}
+
+/// A drive in which nobody drove says nothing of anybody.
+fn check_hands(trace: &Trace) -> Result<(), String> {
+    let torques = trace.samples.iter().map(|sample| sample.driver_torque_nm.abs());
+    let most = torques.fold(0.0, f64::max);
+    if most < HANDS_NM {
+        return Err(format!(
+            "driver_torque_nm is at most {most:.3} N.m in its {} rows: nobody held the wheel",
+            trace.samples.len()
+        ));
+    }
+    Ok(())
+}
+
+/// The road of a recording is told by its curvature at each place.
+fn check_road(session: &Session, trace: &Trace) -> Result<(), String> {
+    let course = session.scenario.course().centreline();
+    let told = || {
+        trace
+            .samples
+            .iter()
+            .filter(|sample| sample.curvature_1pm.is_finite())
+    };
+    let wanted = |s_m: f64| course.at(s_m.clamp(0.0, course.length_m())).1;
+    let differs = |sample: &&Sample| {
+        !(0.0..=course.length_m()).contains(&sample.s_m)
+            || (sample.curvature_1pm - wanted(sample.s_m)).abs() > CURVATURE_WITHIN_1PM
+    };
+    let differing = told().filter(differs).count();
+    if differing as f64 <= OTHER_ROAD_SHARE * told().count() as f64 {
+        return Ok(());
+    }
+    let Sample {
+        s_m, curvature_1pm, ..
+    } = told().find(differs).copied().unwrap_or_default();
+    Err(format!(
+        "driven on another road: {differing} of {} rows do not lie on that of condition {}, {}; at {s_m:.1} m the file has a curvature \
+         of {curvature_1pm:.5} 1/m, and that road, {:.1} m long, {:.5} 1/m",
+        trace.samples.len(),
+        session.condition,
+        session.scenario.course().name(),
+        course.length_m(),
+        wanted(s_m)
+    ))
 }
 
 /// What tells a recording of this session from one of another.

@@ -151,6 +151,19 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
         _ => format!("{line}\n"),
     };
     fs::write(&jumped, text.lines().enumerate().map(set).collect::<String>()).unwrap();
+    // The lab's: on the paper's course, for 60 s; and one in which nobody touched the wheel.
+    let elsewhere = file("elsewhere.csv", &|s| {
+        s.to_builder()
+            .course(haptic_sim::models::road::Course::paper())
+            .build()
+            .unwrap()
+    });
+    let hands_off = out.path().join("hands-off.csv");
+    let mut trace = haptic_log::trace::Trace::read_csv(text.as_bytes()).unwrap();
+    for sample in &mut trace.samples {
+        sample.driver_torque_nm = 0.0;
+    }
+    trace.write_csv(fs::File::create(&hands_off).unwrap()).unwrap();
     let foreign = out.path().join("foreign.csv");
     fs::write(&foreign, "a,b\n1,2\n").unwrap();
     for (what, path, says) in [
@@ -165,6 +178,17 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
             "driven with guidance, and condition manual is without guidance",
         ),
         ("P03/guided", &short, "it lasts 1.0 s"),
+        (
+            "P03/guided",
+            &elsewhere,
+            "rows do not lie on that of condition guided, one curve; at 100.",
+        ),
+        (
+            "P03/guided",
+            &elsewhere,
+            "the file has a curvature of 0.00000 1/m, and that road, 300.0 m long, 0.00300 1/m",
+        ),
+        ("P03/guided", &hands_off, "nobody held the wheel"),
         (
             "P03/guided",
             &jumped,
