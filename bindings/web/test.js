@@ -63,6 +63,26 @@ async function tests() {
   check("too short a drive", document.getElementById("result").textContent.includes("10 s"),
     document.getElementById("result").textContent);
 
+  // What the page says of a drive is for whoever drove it: a hand that pulls the car off the road, one that holds nothing, and
+  // the guidance alone.
+  const command_line = /--|\bline \d|_nm\b|_rad\b|_m\b|CSV|\blog\b/;
+  const told = (guided, hand) => {
+    document.getElementById("guided").value = guided ? "on" : "off";
+    lab.begin(page.scenario(true));
+    while (lab.now().s_m < 1500 && lab.step(hand(lab.now()), { engage: guided }));
+    page.show(!guided);
+    return [...document.querySelectorAll("#result p")].map(p => p.textContent).join(" ");
+  };
+  const after = s => now => now.time_s < s ? synthetic_hand(now) : 4;
+  const synthetic_hand = synthetic(truth);
+  const left = told(false, after(20));
+  check("off the road", /At \d+\.\d s .*beyond/.test(left) && !command_line.test(left), left);
+  const nobody = told(true, () => 0);
+  check("nobody's hands", /nobody held the wheel|cannot be told|does not fit/.test(nobody) && !command_line.test(nobody), nobody);
+  const guided = told(true, synthetic(truth));
+  check("a guided drive", guided.length > 0 && !command_line.test(guided), guided);
+  document.getElementById("guided").value = "off";
+
   // Left behind for the picture: the synthetic drive on the road, its charts and what was found.
   lab.begin(page.scenario(true));
   const again = synthetic(truth);

@@ -24,6 +24,33 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// A checkout that was copied or moved has its own page, wherever this program was built.
+#[test]
+fn the_lab_is_that_of_the_checkout_in_which_it_is_asked_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let root = directory.path().canonicalize().unwrap();
+    for place in ["firmware", "target/dist", "docs/how-to"] {
+        std::fs::create_dir_all(root.join(place)).unwrap();
+    }
+    std::fs::write(root.join("firmware/Cargo.toml"), "").unwrap();
+    let below = root.join("docs/how-to");
+    let output = host_sim(&below, &["lab", "--print"]);
+    let page = root.join("target/dist/haptic-lab.html");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains(page.to_str().unwrap()),
+        "{}",
+        stderr(&output)
+    );
+    std::fs::write(&page, "").unwrap();
+    let output = host_sim(&below, &["lab", "--print"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout).trim(),
+        page.to_str().unwrap()
+    );
+}
+
 #[test]
 fn an_evaluation_prints_its_records_and_leaves_its_files() {
     let directory = tempfile::tempdir().unwrap();

@@ -4,6 +4,7 @@
 //! UTF-8 where [`take`] says and reads the answer at [`text`]. There is one run at a time. No model and no maths is here.
 
 mod replay;
+mod words;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -127,7 +128,8 @@ impl Run {
     }
 
     fn identified(&self, manual: bool) -> Result<String, String> {
-        let log = DriveLog::read(self.csv()?.as_bytes(), manual).map_err(|e| e.to_string())?;
+        let log = DriveLog::read(self.csv()?.as_bytes(), manual);
+        let log = log.map_err(|why| words::refusal(&why.to_string(), &self.trace))?;
         let options = Options::given(manual, &[]).map_err(|e| e.to_string())?;
         let found = identify_with_noise_model(&log, &options);
         let parameters: Vec<Value> = found
@@ -136,7 +138,7 @@ impl Run {
             .into_iter()
             .map(|(name, unit, parameter)| json!({"name": name, "unit": unit, "found": parameter}))
             .collect();
-        let notes = &found.notes;
+        let notes = words::notes(&found, manual);
         Ok(json!({"fit_percent": found.fit_percent, "parameters": parameters, "notes": notes}).to_string())
     }
 }

@@ -1,9 +1,10 @@
 //! `host-sim lab`: the page in the browser.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use clap::Args;
+use haptic_target::image::checkout;
 
 use super::{BadInput, Outcome, print};
 
@@ -12,7 +13,7 @@ const PAGE: &str = "target/dist/haptic-lab.html";
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The page, if it is not target/dist/haptic-lab.html of this checkout
+    /// The page, if it is not target/dist/haptic-lab.html of the checkout that the working directory or this program lies in
     #[arg(value_name = "PAGE.html")]
     page: Option<PathBuf>,
     /// Print where the page is, and open nothing
@@ -21,8 +22,10 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
-    let checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(PAGE);
-    let page = arguments.page.clone().unwrap_or(checkout);
+    let of_checkout = || checkout().map(|root| root.join(PAGE));
+    let page = arguments.page.clone().or_else(of_checkout).ok_or_else(|| {
+        format!("neither the working directory nor this program lies in a checkout of the repository: name the page, {PAGE} of one")
+    })?;
     let page = page
         .canonicalize()
         .map_err(|e| format!("{}: {e}; `cargo xtask web` builds the page", page.display()))?;

@@ -1,0 +1,62 @@
+//! What an identification says of a drive, for whoever drove it in the page: no option of a command line, no line of a
+//! file.
+
+use haptic_analysis::identify::{Identification, Reason};
+use haptic_log::trace::Trace;
+
+/// What the columns of a log are to a driver.
+const COLUMNS: [(&str, &str); 5] = [
+    ("e_y_m", "the car's distance from its lane ahead"),
+    ("e_theta_rad", "the angle between the car and its lane ahead"),
+    ("wheel_angle_rad", "the wheel's angle"),
+    ("guidance_torque_nm", "the torque of the guidance"),
+    ("driver_torque_nm", "your torque"),
+];
+
+/// Why a drive cannot be looked at. A log's reader names the line, of which the first is the columns' names.
+pub(crate) fn refusal(why: &str, trace: &Trace) -> String {
+    let at = why.strip_prefix("line ").and_then(|rest| {
+        let (line, what) = rest.split_once(": ")?;
+        let sample = trace.samples.get(line.parse::<usize>().ok()?.checked_sub(2)?)?;
+        Some((sample.time_s, what))
+    });
+    let Some((time_s, what)) = at else {
+        return why.replace("the log covers", "your drive lasts");
+    };
+    let column = COLUMNS.iter().find(|(name, _)| what.starts_with(name));
+    let what = column.map_or("the drive", |(_, words)| words);
+    format!(
+        "At {time_s:.1} s {what} was beyond what a driver on the road has. Stop before the car leaves the road, or begin again."
+    )
+}
+
+/// What a driver has to know of what was found.
+pub(crate) fn notes(found: &Identification, manual: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    for left_out in found.preflight.iter().flat_map(|looked| &looked.left_out) {
+        let what = match left_out.reason {
+            Reason::HandsOff => "nobody held the wheel",
+            Reason::Standstill => "nothing moved",
+            Reason::LaneChange => "you changed the lane",
+            Reason::Asked | Reason::Pause => "nothing new could be seen",
+        };
+        let (from_s, to_s) = (left_out.from_s, left_out.to_s);
+        notes.push(format!(
+            "From {from_s:.1} to {to_s:.1} s {what}: that is left out."
+        ));
+    }
+    if !found.refuted.is_empty() {
+        notes.push(
+            "The model of a driver does not fit this drive, so nothing is said of you. It takes one driver who steers by the \
+             road ahead, all the time and in one way."
+                .to_owned(),
+        );
+    } else if !manual && !found.parameters.k_hg.identified {
+        notes.push(
+            "Your weight on the guidance cannot be told: the guidance pulled as you did, or not at all. A longer drive through \
+             more bends says more."
+                .to_owned(),
+        );
+    }
+    notes
+}
