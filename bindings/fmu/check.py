@@ -371,6 +371,8 @@ def coupled(directory, ending, until_s, **road):
 
 
 def main(directory, run_csv):
+    tokens = {read_model_description(directory / f"{model}.fmu").guid for model in MODELS}
+    assert len(tokens) == len(MODELS), "a token tells which model of the binary it is"
     for ending in ("fmu", "fmi3.fmu"):
         for model in MODELS:
             problems = validate_fmu(str(directory / f"{model}.{ending}"))

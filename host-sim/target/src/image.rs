@@ -39,7 +39,8 @@ pub fn build(machine: Machine) -> Result<PathBuf, PilError> {
 
 /// The nearest checkout above the working directory, else above this program. Found when it is asked for: a path
 /// from the build would be that of another checkout once this one is moved or copied.
-fn checkout() -> Option<PathBuf> {
+#[must_use]
+pub fn checkout() -> Option<PathBuf> {
     let starts = [std::env::current_dir(), std::env::current_exe()];
     let above = |start: PathBuf| {
         let root = start
