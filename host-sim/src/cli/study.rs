@@ -18,8 +18,9 @@ pub(super) struct Arguments {
     /// study that was interrupted goes on where it was
     #[arg(long, value_name = "DIR", default_value = "out/study")]
     out: PathBuf,
-    /// Keep a person's drive, such as the log of the lab, as the recording of a session; may be repeated
-    #[arg(long, value_name = "PARTICIPANT/CONDITION=FILE.csv")]
+    /// Keep a person's drive, such as the log of the lab, as the recording of a session (N: its repetition, from the
+    /// second on); may be repeated
+    #[arg(long, value_name = "PARTICIPANT/CONDITION[/N]=FILE.csv")]
     import: Vec<Import>,
     /// Only check the file, and print who drives what in which order
     #[arg(long, conflicts_with_all = ["import", "json"])]
@@ -65,6 +66,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             .import(out, &import.session, &import.file)
             .map_err(|e| format!("--import {}: {e}", import.session))?;
     }
+    output::keeps(format!(
+        "{} keeps every session that was done; the same command goes on from there.",
+        out.display()
+    ))?;
     let bar = progress::bar(missing as u64, "sessions");
     study.run(out, || bar.inc(1))?;
     bar.finish_and_clear();
@@ -87,13 +92,15 @@ fn readable(results: &StudyResults) -> String {
         files::sessions(results).to_text(),
         files::by_condition(results).to_text()
     );
+    if !results.differences.is_empty() {
+        text.push_str(&format!("\n{}", files::differences(results).to_text()));
+    }
     let waits = |s: &&haptic_batch::study::SessionResult| s.who == Who::Person && s.recorded.is_none();
     if let Some(session) = results.sessions.iter().find(waits) {
         text.push_str(&format!(
-            "\n{} sessions wait for a person: --import {}/{}=FILE.csv",
+            "\n{} sessions wait for a person: --import {}=FILE.csv",
             results.sessions.iter().filter(waits).count(),
-            session.participant,
-            session.condition
+            session.name()
         ));
     }
     text

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use haptic_sim::input::{InputError, parse_toml};
+use haptic_sim::input::{InputError, in_range, parse_toml};
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::participants as published;
 use haptic_sim::scenario::{FailureKind, Scenario};
@@ -22,6 +22,8 @@ struct StudyFile {
     seed: u64,
     #[serde(default)]
     order: Order,
+    #[serde(default = "one")]
+    repetitions: u64,
     #[serde(default)]
     scenario: Table,
     condition: Vec<ConditionFile>,
@@ -50,6 +52,8 @@ fn one() -> u64 {
     1
 }
 
+/// Most times that a participant drives under each condition.
+const MOST_REPETITIONS: u64 = 100;
 /// Longest name: it becomes the name of a directory.
 const LONGEST_NAME: usize = 40;
 
@@ -65,17 +69,27 @@ pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study
     check_names("study", [&file.name]).map_err(bad)?;
     check_names("condition", file.condition.iter().map(|c| &c.name)).map_err(bad)?;
     check_names("participant", file.participant.iter().map(|p| &p.name)).map_err(bad)?;
+    in_range(
+        "repetitions",
+        file.repetitions as f64,
+        1.0..=MOST_REPETITIONS as f64,
+        "",
+    )
+    .map_err(|e| bad(e.to_string()))?;
     let rows = file.order.rows(file.condition.len());
     let mut sessions = Vec::new();
     for (number, participant) in file.participant.iter().enumerate() {
-        let order = &rows[number % rows.len()];
-        for (place, condition) in order.iter().enumerate() {
-            let condition = &file.condition[*condition];
-            let session = session(source, &file, participant, condition, folder)?;
-            sessions.push(Session {
-                position: place + 1,
-                ..session
-            });
+        // Each repetition is a block with every condition once, in the next order.
+        for block in 0..file.repetitions as usize {
+            let order = &rows[(number + block) % rows.len()];
+            for (place, condition) in order.iter().enumerate() {
+                let condition = &file.condition[*condition];
+                let session = session(source, &file, participant, condition, block + 1, folder)?;
+                sessions.push(Session {
+                    position: block * order.len() + place + 1,
+                    ..session
+                });
+            }
         }
     }
     let mut notes = Vec::new();
@@ -120,6 +134,7 @@ fn session(
     file: &StudyFile,
     participant: &ParticipantFile,
     condition: &ConditionFile,
+    repetition: usize,
     folder: &Path,
 ) -> Result<Session, InputError> {
     let here = format!(
@@ -155,7 +170,11 @@ fn session(
         _ => return Err(bad("one of published, driver and person = true is wanted".into())),
     };
     // 53 bits, which every reader of a number takes whole.
-    let seed = named(named(file.seed, &participant.name), &condition.name) >> 11;
+    let first = named(named(file.seed, &participant.name), &condition.name);
+    let seed = match repetition {
+        1 => first,
+        later => named(first, &later.to_string()),
+    } >> 11;
     fields.insert("seed".into(), Value::Integer(seed as i64));
     let scenario = Scenario::from_toml(&here, &fields.to_string(), |course, lane| {
         let path = folder.join(course);
@@ -175,6 +194,7 @@ fn session(
         participant: participant.name.clone(),
         condition: condition.name.clone(),
         position: 1,
+        repetition,
         who,
         scenario,
     })

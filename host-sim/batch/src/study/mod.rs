@@ -11,6 +11,7 @@
 
 mod file;
 mod order;
+mod paired;
 mod store;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use order::Order;
+pub use paired::Difference;
 
 use crate::lanes::drive_all;
 use crate::left_by_themselves;
@@ -70,6 +72,8 @@ pub struct Session {
     pub condition: String,
     /// Place in the participant's order, from 1.
     pub position: usize,
+    /// Which time it is that the participant drives under the condition, from 1.
+    pub repetition: usize,
     /// Who drives.
     pub who: Who,
     /// Everything that decides it. Of a person it says road, speed and guidance, and the driver is not meant.
@@ -85,6 +89,8 @@ pub struct SessionResult {
     pub position: usize,
     /// Name of the condition.
     pub condition: String,
+    /// Which time it is that the participant drives under the condition, from 1.
+    pub repetition: usize,
     /// Who drives.
     pub who: Who,
     /// Of all random numbers.
@@ -113,8 +119,32 @@ pub struct StudyResults {
     pub conditions: Vec<String>,
     /// Every session, in order.
     pub sessions: Vec<SessionResult>,
+    /// How much the conditions differ, participant by participant.
+    pub differences: Vec<Difference>,
     /// What a reader has to know.
     pub notes: Vec<String>,
+}
+
+impl Session {
+    /// What the command line calls it.
+    fn name(&self) -> String {
+        name_of(&self.participant, &self.condition, self.repetition)
+    }
+}
+
+fn name_of(participant: &str, condition: &str, repetition: usize) -> String {
+    match repetition {
+        1 => format!("{participant}/{condition}"),
+        later => format!("{participant}/{condition}/{later}"),
+    }
+}
+
+impl SessionResult {
+    /// What the command line calls it.
+    #[must_use]
+    pub fn name(&self) -> String {
+        name_of(&self.participant, &self.condition, self.repetition)
+    }
 }
 
 impl Study {
@@ -126,21 +156,18 @@ impl Study {
         file::load(path)
     }
 
-    /// Keeps a person's recording. `what` is `PARTICIPANT/CONDITION`.
+    /// Keeps a person's recording. `what` is `PARTICIPANT/CONDITION`, with `/2` and so on from the second repetition on.
     ///
     /// # Errors
     /// A session that the study does not have, is simulated or is recorded already; a file that is no drive of it.
     pub fn import(&self, out: &Path, what: &str, file: &Path) -> Result<(), String> {
-        let found = self
-            .sessions
-            .iter()
-            .find(|s| format!("{}/{}", s.participant, s.condition) == what);
+        let found = self.sessions.iter().find(|s| s.name() == what);
         let Some(session) = found else {
             let names: Vec<String> = self
                 .sessions
                 .iter()
                 .filter(|s| s.who == Who::Person)
-                .map(|s| format!("{}/{}", s.participant, s.condition))
+                .map(Session::name)
                 .collect();
             return Err(format!(
                 "{what}: no session of a person; there are: {}",
@@ -200,6 +227,7 @@ impl Study {
                 participant: session.participant.clone(),
                 position: session.position,
                 condition: session.condition.clone(),
+                repetition: session.repetition,
                 who: session.who,
                 seed: session.scenario.seed(),
                 recorded: found.map(|(stored, record)| Recorded {
@@ -217,8 +245,7 @@ impl Study {
         let mut notes = self.notes.clone();
         let guided = sessions.iter().filter_map(|s| {
             let recorded = s.recorded.as_ref()?;
-            let name = format!("{}/{}", s.participant, s.condition);
-            (recorded.record.condition != Condition::Manual).then_some((&recorded.record.away, name))
+            (recorded.record.condition != Condition::Manual).then_some((&recorded.record.away, s.name()))
         });
         notes.extend(
             left_by_themselves(guided.clone()).map(|left| format!("{left}; the means hold them too")),
@@ -244,6 +271,7 @@ impl Study {
         Ok(StudyResults {
             study: self.name.clone(),
             conditions: self.conditions.clone(),
+            differences: paired::differences(&self.conditions, &sessions),
             sessions,
             notes,
         })

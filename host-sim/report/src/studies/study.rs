@@ -6,9 +6,9 @@ use super::OutputError;
 use crate::document::{Cell, Provenance, Stamped, Table, write_file, write_json};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
-use haptic_batch::study::{Recorded, Session, SessionResult, StudyResults, Who};
+use haptic_batch::study::{Difference, Recorded, Session, SessionResult, StudyResults, Who};
 
-/// Writes the table of sessions (CSV) and the results (JSON).
+/// Writes the table of sessions and that of the differences between conditions (CSV), and the results (JSON).
 ///
 /// # Errors
 /// What could not be written.
@@ -18,13 +18,38 @@ pub fn write(results: &StudyResults, directory: &Path) -> Result<(), OutputError
         let (away, metrics) = (Away::NAMES.join(","), metrics.join(","));
         writeln!(
             file,
-            "participant,position,condition,who,seed,source,version,diverged,end_m,{away},{metrics}"
+            "participant,position,condition,repetition,who,seed,source,version,diverged,end_m,{away},{metrics}"
         )?;
         for session in &results.sessions {
             let Some(recorded) = &session.recorded else {
                 continue;
             };
             writeln!(file, "{}", row(session, recorded))?;
+        }
+        Ok(())
+    })?;
+    write_file(&directory.join("differences.csv"), |file| {
+        writeln!(
+            file,
+            "from,to,metric,unit,participants,mean,from_95,to_95,effect_size_dz"
+        )?;
+        for d in &results.differences {
+            let [low, high] = d.interval_95.map_or([None; 2], |ends| ends.map(Some));
+            let [low, high, effect] =
+                [low, high, d.effect_size].map(|x| x.map_or(String::new(), |x| x.to_string()));
+            let Difference {
+                from,
+                to,
+                metric,
+                unit,
+                participants,
+                mean,
+                ..
+            } = d;
+            writeln!(
+                file,
+                "{from},{to},{metric},{unit},{participants},{mean},{low},{high},{effect}"
+            )?;
         }
         Ok(())
     })?;
@@ -43,6 +68,7 @@ fn row(session: &SessionResult, recorded: &Recorded) -> String {
         session.participant.clone(),
         session.position.to_string(),
         session.condition.clone(),
+        session.repetition.to_string(),
         who(session.who).into(),
         session.seed.to_string(),
         source.into(),
@@ -131,6 +157,42 @@ pub fn sessions(results: &StudyResults) -> Table {
         .map(String::from)
         .to_vec(),
         rows: results.sessions.iter().map(row).collect(),
+    }
+}
+
+/// Metrics whose differences a terminal shows; the files have all.
+const SHOWN: [&str; 4] = [
+    "peak_lateral_error_m",
+    "sdlp_m",
+    "rms_driver_torque_nm",
+    "conflict_time_share",
+];
+
+/// How much the conditions differ in some metrics, participant by participant.
+pub fn differences(results: &StudyResults) -> Table {
+    let row = |d: &Difference| {
+        let label = DEFINITIONS.iter().find(|own| own.name == d.metric);
+        let number = |value: Option<f64>, decimals| Cell::Number { value, decimals };
+        vec![
+            text(format!("{} - {}", d.to, d.from)),
+            text(label.map_or(d.metric, |own| own.label)),
+            text(d.unit),
+            number(Some(d.mean), 4),
+            number(d.interval_95.map(|ends| ends[0]), 4),
+            number(d.interval_95.map(|ends| ends[1]), 4),
+            number(d.effect_size, 2),
+            Cell::number(d.participants as f64, 0),
+        ]
+    };
+    let shown = results.differences.iter().filter(|d| SHOWN.contains(&d.metric));
+    Table {
+        caption: "Differences within participants, each with its own 95 % interval (not corrected for their number); d_z is the \
+                  mean over the standard deviation of the differences. differences.csv has every metric."
+            .into(),
+        columns: ["Conditions", "Metric", "Unit", "Difference", "95 % from", "to", "d_z", "n"]
+            .map(String::from)
+            .to_vec(),
+        rows: shown.map(row).collect(),
     }
 }
 

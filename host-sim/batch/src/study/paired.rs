@@ -1,0 +1,119 @@
+//! How much two conditions differ, participant by participant.
+//!
+//! Each participant has one value under each condition: the mean over the repetitions. The differences of those who have both
+//! are taken as normal: their mean has Student's interval, and the *effect size* d_z is the mean over the standard deviation
+//! of the differences (Lakens 2013, Front. Psychol. 4:863).
+
+use haptic_analysis::metrics::{DEFINITIONS, Definition};
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::SessionResult;
+
+/// One metric under two conditions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// Name of the metric.
+    pub metric: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The condition whose value is taken off.
+    pub from: String,
+    /// The other one.
+    pub to: String,
+    /// Participants with a value under both.
+    pub participants: usize,
+    /// Mean of the differences.
+    pub mean: f64,
+    /// Its 95 % interval, not corrected for the number of metrics and pairs; none of a single participant.
+    pub interval_95: Option<[f64; 2]>,
+    /// d_z; none of a single participant, or where all differences are the same.
+    pub effect_size: Option<f64>,
+}
+
+/// Every pair of conditions, the earlier taken off the later, in every metric that has values.
+pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> Vec<Difference> {
+    let mut participants: Vec<&str> = sessions.iter().map(|s| s.participant.as_str()).collect();
+    participants.dedup();
+    let value = |participant: &str, condition: &str, metric: &Definition| {
+        let own = sessions
+            .iter()
+            .filter(|s| s.participant == participant && s.condition == condition);
+        let recorded = own
+            .filter_map(|s| s.recorded.as_ref())
+            .filter(|r| !r.record.diverged);
+        mean_of(
+            &recorded
+                .filter_map(|r| (metric.value)(&r.record.metrics))
+                .collect::<Vec<_>>(),
+        )
+    };
+    let mut all = Vec::new();
+    for (place, from) in conditions.iter().enumerate() {
+        for to in &conditions[place + 1..] {
+            all.extend(DEFINITIONS.iter().filter_map(|metric| {
+                let of = |name: &&str| Some(value(name, to, metric)? - value(name, from, metric)?);
+                let found: Vec<f64> = participants.iter().filter_map(of).collect();
+                let (mean, interval_95, effect_size) = paired(&found)?;
+                Some(Difference {
+                    metric: metric.name,
+                    unit: metric.unit,
+                    from: from.clone(),
+                    to: to.clone(),
+                    participants: found.len(),
+                    mean,
+                    interval_95,
+                    effect_size,
+                })
+            }));
+        }
+    }
+    all
+}
+
+fn mean_of(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Mean, its interval and d_z of differences.
+fn paired(differences: &[f64]) -> Option<(f64, Option<[f64; 2]>, Option<f64>)> {
+    let mean = mean_of(differences)?;
+    let freedom = differences.len() as f64 - 1.0;
+    let square: f64 = differences.iter().map(|value| (value - mean).powi(2)).sum();
+    let deviation = (square / freedom).sqrt();
+    let t = StudentsT::new(0.0, 1.0, freedom)
+        .ok()
+        .map(|t| t.inverse_cdf(0.975));
+    let interval = t.map(|t| {
+        let margin = t * deviation / (freedom + 1.0).sqrt();
+        [mean - margin, mean + margin]
+    });
+    Some((mean, interval, (deviation > 0.0).then(|| mean / deviation)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::paired;
+
+    /// SciPy 1.17.1: `r = stats.ttest_rel(a, b); r.confidence_interval(0.95)` of a = 1.2, 0.8, 1.5, 0.9, 1.1 and
+    /// b = 1.0, 0.9, 1.1, 0.7, 1.0.
+    #[test]
+    fn agrees_with_scipy() {
+        let (mean, interval, effect) = paired(&[0.2, -0.1, 0.4, 0.2, 0.1]).unwrap();
+        let [low, high] = interval.unwrap();
+        for (value, expected) in [
+            (mean, 0.16),
+            (low, -0.065_559_466_629_904),
+            (high, 0.385_559_466_629_904),
+            (effect.unwrap(), 0.880_771_012_101_088),
+        ] {
+            assert!((value - expected).abs() < 1e-9, "{value} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn of_one_participant_there_is_no_interval() {
+        assert_eq!(paired(&[0.5]), Some((0.5, None, None)));
+        assert_eq!(paired(&[]), None);
+    }
+}
