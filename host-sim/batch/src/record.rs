@@ -46,6 +46,7 @@ impl RunRecord {
             lane_width_m: scenario.course().lane_width_m(),
             window: Some(window),
             failure,
+            probe_hz: probe_hz(scenario),
         };
         Self {
             t_p: scenario.driver().t_p,
@@ -62,6 +63,13 @@ impl RunRecord {
             metrics: metrics::measure(&run.trace, &circumstances),
         }
     }
+}
+
+/// Frequency of the probe, if it is on, Hz.
+fn probe_hz(scenario: &Scenario) -> Option<f64> {
+    let guidance = scenario.guidance();
+    (guidance.probe && scenario.condition() != Condition::Manual)
+        .then_some(guidance.controller.probe_frequency_hz)
 }
 
 /// The stretch that a study measures unless told otherwise: the first curve of the paper's course, or all of

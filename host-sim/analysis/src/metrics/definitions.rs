@@ -76,7 +76,8 @@ metrics! {
         "Godthelp, Milgram and Blaauw 1984, Human Factors 26:257-268";
     reversals_3deg_per_min, "Steering reversals, 3 deg", "1/min",
         "Steering wheel reversals larger than 3 deg per minute, after a second-order Butterworth low-pass of \
-         0.6 Hz run forward and backward. Visual load.",
+         0.6 Hz run forward and backward. Visual load. Where the probe is on, a notch of 0.5 Hz about its \
+         frequency takes it out first.",
         "Markkula and Engstroem 2006, 13th ITS World Congress; SAE J2944:2015";
     reversals_0p1deg_per_min, "Steering reversals, 0.1 deg", "1/min",
         "The same with 0.1 deg and 2 Hz. Cognitive load.",
@@ -111,7 +112,8 @@ metrics! {
         "ours";
     conflict_time_share, "Conflict", "1",
         "Share of time in which driver and guidance turn the wheel against each other: T_d and T_h of opposite \
-         sign, both larger than a dead band of 0.005 N.m (the torque sensor's resolution: less has no sign).",
+         sign, both larger than a dead band of 0.005 N.m (the torque sensor's resolution: less has no sign). \
+         The probe is taken out of both first, as for reversals.",
         "Boink, van Paassen, Mulder and Abbink 2014, IEEE SMC; the dead band is ours";
     mean_abs_driver_torque_in_conflict_nm, "Driver torque in conflict", "N.m",
         "Mean of |T_d| over the time in conflict; no value without conflict.",

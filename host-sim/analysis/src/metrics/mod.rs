@@ -7,14 +7,14 @@
 //! A window that holds no sample, or a sample that is not finite (a run that diverged), has no metrics: every
 //! field is `None`. Comparing runs, choosing windows and calling a run diverged is NOT done here.
 
-mod butterworth;
 mod definitions;
+mod filters;
 mod lane_crossing;
 mod moments;
 mod reversals;
 
-pub use butterworth::zero_phase_low_pass;
 pub use definitions::{DEFINITIONS, Definition, Metrics};
+pub use filters::{zero_phase_low_pass, zero_phase_notch};
 pub use lane_crossing::{Placement, distance_to_lane_crossing_m};
 pub use reversals::count_reversals;
 
@@ -28,6 +28,8 @@ pub const CONFLICT_DEAD_BAND_NM: f64 = 0.005;
 /// Gap, deg, and cut-off, Hz, of the two steering reversal rates (Markkula and Engstroem 2006).
 const VISUAL_REVERSALS: (f64, f64) = (3.0, 0.6);
 const COGNITIVE_REVERSALS: (f64, f64) = (0.1, 2.0);
+/// Width of the notch that takes the probe out, Hz: the driver's own movements beside it stay.
+const PROBE_WIDTH_HZ: f64 = 0.5;
 
 /// A stretch of road by arc length, ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +62,8 @@ pub struct Circumstances {
     pub window: Option<Window>,
     /// Failure during the run, if any.
     pub failure: Option<Failure>,
+    /// Frequency of the probe, if it was on: reversals and conflict are the driver's without it.
+    pub probe_hz: Option<f64>,
 }
 
 /// Measures a run.
@@ -81,9 +85,22 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         mut driver_in_conflict,
     ] = [Moments::default(); 5];
     let [mut out_of_lane, mut limited, mut in_conflict] = [0.0; 3];
+    // The whole run is filtered, so that the ends of the window carry no transient of a filter.
+    let without_probe = |value: fn(&Sample) -> f64| {
+        let record: Vec<f64> = trace.samples.iter().map(value).collect();
+        let Some(probe_hz) = circumstances.probe_hz else {
+            return record;
+        };
+        let left = zero_phase_notch(&record, trace.sample_rate_hz, probe_hz, PROBE_WIDTH_HZ);
+        left.unwrap_or(record)
+    };
+    let torques = [
+        without_probe(|s| s.driver_torque_nm),
+        without_probe(|s| s.guidance_torque_nm),
+    ];
     let speeds = || samples.iter().map(|sample| speed_m_s(sample, circumstances));
     let mut times_to_crossing_s = Vec::with_capacity(samples.len());
-    for sample in samples {
+    for (place, sample) in range.clone().zip(samples) {
         let (t_d, t_h) = (sample.driver_torque_nm, sample.guidance_torque_nm);
         lateral.add(sample.lateral_error_m);
         wheel.add(sample.wheel_angle_rad);
@@ -91,6 +108,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         guidance.add(t_h);
         out_of_lane += f64::from(sample.lateral_error_m.abs() > half_room_m);
         limited += f64::from(sample.guidance_limited);
+        let [t_d, t_h] = torques.each_ref().map(|torque| torque[place]);
         if t_d * t_h < 0.0 && t_d.abs().min(t_h.abs()) > CONFLICT_DEAD_BAND_NM {
             in_conflict += 1.0;
             driver_in_conflict.add(t_d);
@@ -105,13 +123,8 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         .failure
         .map(|failure| recovery(&trace.samples[..range.end], &failure))
         .unwrap_or_default();
+    let angle_deg = without_probe(|s| s.wheel_angle_rad.to_degrees());
     let reversals_per_min = |(gap_deg, cut_off_hz)| {
-        // The whole run is filtered, so that the ends of the window carry no transient of the filter.
-        let angle_deg: Vec<f64> = trace
-            .samples
-            .iter()
-            .map(|s| s.wheel_angle_rad.to_degrees())
-            .collect();
         let filtered = zero_phase_low_pass(&angle_deg, trace.sample_rate_hz, cut_off_hz)?;
         let filtered = &filtered[range.clone()];
         let known = filtered.iter().all(|x| x.is_finite());

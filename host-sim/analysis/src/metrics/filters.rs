@@ -1,4 +1,4 @@
-//! Second-order Butterworth low-pass, run forward and backward over a record (zero phase).
+//! A second-order Butterworth low-pass and a notch, run forward and backward over a record (zero phase).
 //!
 //! For records only: it looks into the future. The result is that of the usual `filtfilt`: the record is
 //! continued at both ends by its own odd reflection, and each pass starts in the steady state of its first
@@ -14,8 +14,31 @@ const REFLECTED: usize = 9;
 ///
 /// `None` if the record has fewer than 10 samples or the cut-off is not between 0 and half the sample rate.
 pub fn zero_phase_low_pass(signal: &[f64], sample_rate_hz: f64, cut_off_hz: f64) -> Option<Vec<f64>> {
+    let filter = Biquad::low_pass(within(cut_off_hz, sample_rate_hz)?);
+    forward_and_backward(&filter, signal)
+}
+
+/// `signal` without what lies about a frequency: a second-order notch `width_hz` wide at half the power, forward and backward.
+///
+/// `None` if the record has fewer than 10 samples or the frequency is not between 0 and half the sample rate.
+pub fn zero_phase_notch(
+    signal: &[f64],
+    sample_rate_hz: f64,
+    frequency_hz: f64,
+    width_hz: f64,
+) -> Option<Vec<f64>> {
+    let filter = Biquad::notch(within(frequency_hz, sample_rate_hz)?, width_hz / sample_rate_hz);
+    forward_and_backward(&filter, signal)
+}
+
+/// A frequency in cycles per sample; none if the record cannot hold it.
+fn within(frequency_hz: f64, sample_rate_hz: f64) -> Option<f64> {
+    (frequency_hz > 0.0 && frequency_hz < sample_rate_hz / 2.0).then_some(frequency_hz / sample_rate_hz)
+}
+
+fn forward_and_backward(filter: &Biquad, signal: &[f64]) -> Option<Vec<f64>> {
     let n = signal.len();
-    if n <= REFLECTED || !(cut_off_hz > 0.0 && cut_off_hz < sample_rate_hz / 2.0) {
+    if n <= REFLECTED {
         return None;
     }
     let (first, last) = (signal[0], signal[n - 1]);
@@ -24,7 +47,6 @@ pub fn zero_phase_low_pass(signal: &[f64], sample_rate_hz: f64, cut_off_hz: f64)
     record.extend_from_slice(signal);
     record.extend((1..=REFLECTED).map(|i| 2.0 * last - signal[n - 1 - i]));
 
-    let filter = LowPass::new(cut_off_hz / sample_rate_hz);
     filter.run(record.iter_mut());
     filter.run(record.iter_mut().rev());
     record.truncate(n + REFLECTED);
@@ -33,20 +55,30 @@ pub fn zero_phase_low_pass(signal: &[f64], sample_rate_hz: f64, cut_off_hz: f64)
 }
 
 /// Coefficients of (b0 + b1/z + b2/z^2) / (1 + a1/z + a2/z^2), unit gain at zero frequency.
-struct LowPass {
+struct Biquad {
     b: [f64; 3],
     a: [f64; 2],
 }
 
-impl LowPass {
+impl Biquad {
     /// Bilinear transform with the cut-off (in cycles per sample) prewarped.
-    fn new(cut_off: f64) -> Self {
+    fn low_pass(cut_off: f64) -> Self {
         let w = (PI * cut_off).tan();
         let norm = 1.0 / (1.0 + SQRT_2 * w + w * w);
         let b0 = w * w * norm;
         Self {
             b: [b0, 2.0 * b0, b0],
             a: [2.0 * (w * w - 1.0) * norm, (1.0 - SQRT_2 * w + w * w) * norm],
+        }
+    }
+
+    /// Zero at `frequency`, half the power `width` apart about it, both in cycles per sample.
+    fn notch(frequency: f64, width: f64) -> Self {
+        let gain = 1.0 / (1.0 + (PI * width).tan());
+        let middle = -2.0 * gain * (2.0 * PI * frequency).cos();
+        Self {
+            b: [gain, middle, gain],
+            a: [middle, 2.0 * gain - 1.0],
         }
     }
 
@@ -74,21 +106,44 @@ mod tests {
     /// `i = numpy.arange(24); x = numpy.sin(0.4*i) + 0.1*i + (i % 5 == 0)`
     /// `b, a = scipy.signal.butter(2, FC, fs=FS); scipy.signal.filtfilt(b, a, x)`
     #[test]
-    fn agrees_with_scipy() {
-        let x: Vec<f64> = (0..24)
-            .map(|i| (0.4 * i as f64).sin() + 0.1 * i as f64 + f64::from(i % 5 == 0))
-            .collect();
+    fn the_low_pass_agrees_with_scipy() {
         for (sample_rate_hz, cut_off_hz, expected) in SCIPY {
-            let y = zero_phase_low_pass(&x, sample_rate_hz, cut_off_hz).unwrap();
-            assert_eq!(y.len(), x.len());
-            for (i, (y, want)) in y.iter().zip(expected).enumerate() {
-                assert!(
-                    (y - want).abs() < 1e-11,
-                    "sample {i} at {cut_off_hz} Hz: {y} instead of {want}"
-                );
-            }
+            let y = zero_phase_low_pass(&signal(), sample_rate_hz, cut_off_hz).unwrap();
+            assert_same(&y, &expected);
         }
     }
+
+    /// The same signal; `b, a = scipy.signal.iirnotch(2.5, 2.5 / 0.5, fs=120)`, every third value.
+    #[test]
+    fn the_notch_agrees_with_scipy() {
+        let y = zero_phase_notch(&signal(), 120.0, 2.5, 0.5).unwrap();
+        let third: Vec<f64> = y.into_iter().step_by(3).collect();
+        assert_same(&third, &SCIPY_NOTCH);
+    }
+
+    fn signal() -> Vec<f64> {
+        (0..24)
+            .map(|i| (0.4 * i as f64).sin() + 0.1 * i as f64 + f64::from(i % 5 == 0))
+            .collect()
+    }
+
+    fn assert_same(y: &[f64], expected: &[f64]) {
+        assert_eq!(y.len(), expected.len());
+        for (i, (y, want)) in y.iter().zip(expected).enumerate() {
+            assert!((y - want).abs() < 1e-11, "sample {i}: {y} instead of {want}");
+        }
+    }
+
+    const SCIPY_NOTCH: [f64; 8] = [
+        1.085095300517,
+        1.401577708293,
+        1.512308780614,
+        0.734188922729,
+        0.480403315079,
+        2.452417366021,
+        2.746374293196,
+        3.009121102291,
+    ];
 
     const SCIPY: [(f64, f64, [f64; 24]); 2] = [
         (
