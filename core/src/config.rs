@@ -188,23 +188,31 @@ impl Estimator {
     #[must_use]
     const fn new(p: &Params) -> Self {
         let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
-        // T_d = -K T_h/(1 + j x) read with another lag y is K (1 + x y)/(1 + x^2): off by x (x - y)/(1 + x y) of itself.
-        let assumed = turns * p.t_nms_s;
-        let [shortest, longest] = [turns * T_NMS_RANGE_S[0], turns * T_NMS_RANGE_S[1]];
-        let [below, above] = [
-            shortest * (shortest - assumed) / (1.0 + shortest * assumed),
-            longest * (longest - assumed) / (1.0 + longest * assumed),
-        ];
-        let (below, above) = (below.abs(), above.abs());
         Self {
             phase_per_us: phase_per_us(p.probe_frequency_hz),
             periods: (p.probe_frequency_hz * BLOCK_S + 0.5) as u32,
             amplitude_nm: p.probe_amplitude_nm as f32,
             lag: (turns * p.t_nms_s) as f32,
             k_nms: p.k_nms as f32,
-            muscle: if below > above { below as f32 } else { above as f32 },
+            muscle: arm_share(p) as f32,
         }
     }
+}
+
+/// The part of the deviation reported with K_hg that is no noise, as a share of K_hg: the largest error that an arm with another
+/// t_nms of [`T_NMS_RANGE_S`] makes.
+#[must_use]
+pub const fn arm_share(p: &Params) -> f64 {
+    let turns = p.probe_frequency_hz * 2.0 * core::f64::consts::PI;
+    // T_d = -K T_h/(1 + j x) read with another lag y is K (1 + x y)/(1 + x^2): off by x (x - y)/(1 + x y) of itself.
+    let assumed = turns * p.t_nms_s;
+    let [shortest, longest] = [turns * T_NMS_RANGE_S[0], turns * T_NMS_RANGE_S[1]];
+    let [below, above] = [
+        shortest * (shortest - assumed) / (1.0 + shortest * assumed),
+        longest * (longest - assumed) / (1.0 + longest * assumed),
+    ];
+    let (below, above) = (below.abs(), above.abs());
+    if below > above { below } else { above }
 }
 
 impl Monitor {

@@ -1,6 +1,8 @@
 //! One scenario, simulated and measured.
 
 use haptic_core::bus::Frame;
+use haptic_core::config::arm_share;
+use haptic_core::estimator::T_NMS_RANGE_S;
 use serde::Serialize;
 
 use super::RunRecord;
@@ -11,6 +13,21 @@ use haptic_sim::ecu_events::{EcuEvents, Said};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
 use haptic_sim::simulation::{Run, observe, simulate};
 use haptic_sim::unguided::{Unguided, stretches};
+
+/// K_hg as the ECU reports it, and what its deviation is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LiveEstimate {
+    /// The estimate.
+    pub k_hg: f64,
+    /// The deviation that is reported: the sum of the two below.
+    pub deviation: f64,
+    /// Standard deviation of the noise.
+    pub noise: f64,
+    /// Largest error that an arm of another t_nms makes.
+    pub arm: f64,
+    /// Which t_nms, s: from and to.
+    pub t_nms_s: [f64; 2],
+}
 
 /// A scenario with its run.
 #[derive(Debug, Clone)]
@@ -48,8 +65,8 @@ pub struct SingleResults {
     pub failure_time_s: Option<f64>,
     /// Seed of the remnant.
     pub seed: u64,
-    /// The ECU's last estimate of K_hg and its standard deviation, if it identified any.
-    pub k_hg: Option<[f64; 2]>,
+    /// The ECU's last estimate of K_hg, if it identified any.
+    pub k_hg: Option<LiveEstimate>,
     /// Stretch that was measured, m: the paper's curve on its course, else all of it.
     pub window_m: [f64; 2],
     /// The run's record.
@@ -92,6 +109,7 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
         None
     };
     let record = RunRecord::new(&scenario, &run, window, nominal_peak_m);
+    let k_hg = readings.readings.iter().rev().find_map(|r| r.estimate);
     let results = SingleResults {
         course: scenario.course().name().into(),
         course_length_m: scenario.course().length_m(),
@@ -99,7 +117,16 @@ pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
         sensors: scenario.sensors(),
         failure_time_s: scenario.failure().at_s(),
         seed: scenario.seed(),
-        k_hg: readings.readings.iter().rev().find_map(|r| r.estimate),
+        k_hg: k_hg.map(|[k_hg, deviation]| {
+            let arm = arm_share(&scenario.guidance().controller) * k_hg.abs();
+            LiveEstimate {
+                k_hg,
+                deviation,
+                noise: (deviation - arm).max(0.0),
+                arm,
+                t_nms_s: T_NMS_RANGE_S,
+            }
+        }),
         window_m: [window.from_m, window.to_m],
         record,
         notes: failure_notes(scenario.failure().time_s, &[record], window),

@@ -73,12 +73,15 @@ pub fn table(results: &SingleResults) -> Table {
         ]
     };
     let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
-    if let Some([k_hg, deviation]) = results.k_hg {
+    if let Some(read) = results.k_hg {
         let name = Cell::Text("K_hg, as the ECU reads it".into());
         rows.push(vec![
             name,
-            Cell::number(k_hg, 4),
-            Cell::Text(format!("+- {deviation:.4}")),
+            Cell::number(read.k_hg, 4),
+            Cell::Text(format!(
+                "+- {:.4}: {:.4} of noise, {:.4} for an arm with a t_nms of {} to {} s",
+                read.deviation, read.noise, read.arm, read.t_nms_s[0], read.t_nms_s[1]
+            )),
         ]);
     }
     Table {
