@@ -6,7 +6,7 @@ use super::files::{write_figure, write_report};
 use super::{OutputError, ended};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
-use haptic_analysis::identify::INFORMED;
+use haptic_analysis::identify::{INFORMED, TABLE_4};
 use haptic_batch::design::{Answer, Design};
 
 /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
@@ -109,6 +109,7 @@ pub fn sentences(answer: &Answer) -> Vec<String> {
         needed_s / 60.0,
         best.course
     )];
+    out.extend(cost_of_delay(answer, best, needed_s));
     if best.left_by_itself > 0 {
         out.push(format!(
             "It rests on {} drives in which the ECU ended guidance by itself, and does not hold for guided driving.",
@@ -127,6 +128,22 @@ pub fn sentences(answer: &Answer) -> Vec<String> {
         ));
     }
     out
+}
+
+/// How little a drive that is long enough for another parameter tells of the delay; none if it tells enough.
+fn cost_of_delay(answer: &Answer, best: &Design, needed_s: f64) -> Option<String> {
+    // Its fourth parameter is t_p.
+    let (_, low, high) = TABLE_4[3];
+    let enough_s = 0.1 * (high - low);
+    let place = INFORMED.iter().position(|name| *name == "t_p")?;
+    let error_s = best.standard_errors[place] * (best.span_s / needed_s).sqrt();
+    (answer.parameter != "t_p" && error_s > enough_s).then(|| {
+        let minutes = needed_s / 60.0 * (error_s / enough_s).powi(2);
+        format!(
+            "That drive tells t_p to {error_s:.3} s only, of the {low} to {high} s that drivers have (table 4): for a tenth of \
+             that range, {enough_s:.3} s, drive {minutes:.0} minutes."
+        )
+    })
 }
 
 /// Minutes over the frequency, a line for each amplitude, a panel for each course.
