@@ -7,7 +7,7 @@ use haptic_batch::experiment::{Drive, Experiment, Plan, experiment};
 use haptic_report::studies::experiment as files;
 
 use super::output::Output;
-use super::participants::Participants;
+use super::participants::{Participants, check_probe};
 use super::{BadInput, Outcome, print, print_json, print_notes, progress};
 
 #[derive(Debug, Args)]
@@ -16,12 +16,7 @@ pub(super) struct Arguments {
     participants: Participants,
     /// Amplitude of the probe in the guided drives, N.m (0: none). The probe is a small torque added to the guidance;
     /// the driver's answer to it tells K_hg
-    #[arg(
-        long,
-        value_name = "AMPLITUDE",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.0)]
     probe: f64,
     /// Seed of the remnants
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -38,6 +33,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    check_probe("--probe", arguments.probe)?;
     let plan = Plan {
         participants: arguments.participants.numbers(),
         probe_nm: arguments.probe,
@@ -79,7 +75,7 @@ fn readable(result: &Experiment) -> String {
     let [low, middle, high] = result.published_trajectory_error_m;
     format!(
         "{}, probe {} N.m, seed {}; a dash: not identified\n\nManual\n{}\nGuided\n{}\n{}\n\
-         Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69)\n\
+         Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69). {}\n\
          Mean trajectory error, guided: noise model {} m, published method {} m (the paper: {middle}, {low} to {high})",
         result.course,
         result.probe_nm,
@@ -89,6 +85,7 @@ fn readable(result: &Experiment) -> String {
         files::trajectory_table(result).to_text(),
         mean(false, |d| Some(d.paper.identification.fit_percent)),
         mean(true, |d| Some(d.paper.identification.fit_percent)),
+        files::FIT_IS_CALIBRATED,
         mean(true, |d| d.noise_model.trajectory_error_m),
         mean(true, |d| d.paper.trajectory_error_m),
     )
