@@ -56,7 +56,7 @@ async function tests() {
   road.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.4 * box.width, clientY: box.top + 50 }));
   for (let k = 0; k < 80 && lab.now().time_s < 0.5; k++) await new Promise(done => setTimeout(done, 250));
   const driven = lab.now();
-  check("pointer", driven.time_s > 0.5 && driven.wheel_angle_rad > 0.02,
+  check("pointer", driven.time_s >= 0.5 && driven.wheel_angle_rad > 0.02,
     `after ${driven.time_s.toFixed(1)} s the wheel is at ${driven.wheel_angle_rad.toFixed(3)} rad`);
   page.end();
   await new Promise(done => setTimeout(done, 200));

@@ -50,7 +50,7 @@ pub(crate) fn check(built: Built) -> Result<()> {
         row(door, frames, wrong);
     }
     let in_file = root().join(BUS);
-    let (frames, wrong) = compared(&web::replayed(&in_file)?, &expected);
+    let (frames, wrong) = compared(&web::replayed(&in_file, built)?, &expected);
     row("WebAssembly", frames, wrong);
     // The units take SI values and give SI values: torque, limit and mode of each guidance frame.
     fmu::build(built)?;

@@ -21,7 +21,10 @@ pub(crate) fn refusal(why: &str, trace: &Trace) -> String {
         Some((sample.time_s, what))
     });
     let Some((time_s, what)) = at else {
-        return why.replace("the log covers", "your drive lasts");
+        let plain = why.replace("the log covers", "your drive lasts");
+        return COLUMNS
+            .iter()
+            .fold(plain, |why, (name, words)| why.replace(name, words));
     };
     let column = COLUMNS.iter().find(|(name, _)| what.starts_with(name));
     let what = column.map_or("the drive", |(_, words)| words);
