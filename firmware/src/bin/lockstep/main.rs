@@ -27,6 +27,7 @@ mod target {
     use haptic_core::bus::Frame;
     use haptic_core::bus::messages::ResetCause;
     use haptic_core::config::Setup;
+    use haptic_core::controller::Command;
     use haptic_core::ecu::{Boot, Ecu};
     use haptic_core::faults::FaultSet;
     use haptic_core::params::Params;
@@ -95,11 +96,52 @@ mod target {
         params: Params,
         frames: Vec<Frame, FRAMES_PER_TICK>,
         steps: u32,
+        rejected: u32,
+        product: Option<Product>,
+    }
+
+    /// What a product says beside its ECU, in a run that asks for it. It is kept out of what is measured.
+    struct Product {
+        service: Service,
+        /// Since it started.
+        steps: u32,
         rejected: Rejections,
-        /// What a product says beside its ECU, in a run that asks for it, and its steps since it started.
-        product: Option<(Service, u32)>,
+        /// A set that was taken in this step, which begins the next start.
+        new: Option<Set>,
         /// Class C faults of the last step, which a restart does not end.
         latched: FaultSet,
+    }
+
+    impl Product {
+        fn new(found: Found, params: Params, boot: Boot) -> Self {
+            Self {
+                service: Service::new(found, Some(params), boot),
+                steps: 0,
+                rejected: Rejections::NONE,
+                new: None,
+                latched: FaultSet::NONE,
+            }
+        }
+
+        #[inline(never)]
+        fn hear(&mut self, frames: &[Frame], ecu: &mut Ecu, now: Instant) {
+            for frame in frames {
+                if let Err(reason) = ecu.receive(frame, now) {
+                    self.rejected.count(frame.id(), reason);
+                }
+                if let Some(set) = self.service.receive(frame, ecu, self.steps) {
+                    self.new = Some(set);
+                }
+            }
+        }
+
+        #[inline(never)]
+        fn say(&mut self, command: &Command, can: &mut impl Can<Frame = Frame>) {
+            let said = self.service.frames(command, &mut self.rejected, self.steps);
+            said.iter().for_each(|frame| send(can, frame));
+            self.steps = self.steps.wrapping_add(1);
+            self.latched = command.faults.common(FaultSet::CRITICAL);
+        }
     }
 
     impl Run {
@@ -107,9 +149,8 @@ mod target {
             params: Params::PAPER,
             frames: Vec::new(),
             steps: 0,
-            rejected: Rejections::NONE,
+            rejected: 0,
             product: None,
-            latched: FaultSet::NONE,
         };
 
         fn take(&mut self, frame: Frame, ecu: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
@@ -118,12 +159,8 @@ mod target {
             } else if let Some(start) = Start::decode(&frame) {
                 begin(ecu, start, &self.params);
                 self.frames.clear();
-                self.product = (start.state == StartState::Product).then(|| {
-                    (
-                        Service::new(Found::default(), Some(self.params), Boot::default()),
-                        0,
-                    )
-                });
+                self.product = (start.state == StartState::Product)
+                    .then(|| Product::new(Found::default(), self.params, Boot::default()));
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
             }
@@ -140,14 +177,14 @@ mod target {
             let Some(ecu) = place else {
                 return;
             };
-            let mut new = None;
+            if let Some(product) = &mut self.product {
+                product.hear(&self.frames, ecu, now);
+                self.frames.clear();
+            }
             let start = ThisBoard::cycles();
             for frame in &self.frames {
-                if let Err(reason) = ecu.receive(frame, now) {
-                    self.rejected.count(frame.id(), reason);
-                }
-                if let Some((service, steps)) = &mut self.product {
-                    new = service.receive(frame, ecu, *steps).or(new);
+                if ecu.receive(frame, now).is_err() {
+                    self.rejected = self.rejected.wrapping_add(1);
                 }
             }
             let step = ecu.step(now);
@@ -161,12 +198,9 @@ mod target {
             for frame in step.others.iter().chain(&background) {
                 send(can, frame);
             }
-            if let Some((service, steps)) = &mut self.product {
-                let said = service.frames(&step.command, &mut self.rejected, *steps);
-                said.iter().for_each(|frame| send(can, frame));
-                *steps = steps.wrapping_add(1);
+            if let Some(product) = &mut self.product {
+                product.say(&step.command, can);
             }
-            self.latched = step.command.faults.common(FaultSet::CRITICAL);
             if self.steps.is_multiple_of(STACK_TURN) {
                 let bytes = stack::used();
                 send(can, &StackUse { bytes }.encode());
@@ -176,36 +210,41 @@ mod target {
                 background_cycles,
             };
             send(can, &cost.encode());
-            if let Some(set) = new {
-                let boot = self.restarted_with(set);
-                let start = Start {
-                    state: StartState::Boot(boot),
-                    at: now,
-                };
-                begin(place, start, &self.params);
+            if self.product.as_ref().is_some_and(|product| product.new.is_some()) {
+                self.restart(place, now);
             }
         }
 
-        /// A product stores a set and starts with it. Here it is gone when the machine ends.
-        fn restarted_with(&mut self, set: Set) -> Boot {
-            let last = self
-                .product
-                .as_ref()
-                .and_then(|(service, _)| service.found().stored);
+        /// A product stores a new set and starts with it. Here it is gone when the machine ends.
+        #[inline(never)]
+        fn restart(&mut self, place: &mut Option<Ecu>, now: Instant) {
+            let Some(Product {
+                service,
+                new: Some(set),
+                latched,
+                ..
+            }) = self.product.take()
+            else {
+                return;
+            };
+            let last = service.found().stored;
             let (copy, sequence) = last.map_or((0, 1), |last| (1 - last.copy, last.sequence.wrapping_add(1)));
+            let boot = Boot {
+                reset: ResetCause::NewParameters,
+                recent_resets: 0,
+                latched,
+            };
+            self.params = set.params;
             let found = Found {
                 stored: Some(Stored { set, sequence, copy }),
                 ..Found::default()
             };
-            let boot = Boot {
-                reset: ResetCause::NewParameters,
-                recent_resets: 0,
-                latched: self.latched,
+            self.product = Some(Product::new(found, self.params, boot));
+            let start = Start {
+                state: StartState::Boot(boot),
+                at: now,
             };
-            self.params = set.params;
-            self.rejected = Rejections::NONE;
-            self.product = Some((Service::new(found, Some(set.params), boot), 0));
-            boot
+            begin(place, start, &self.params);
         }
 
         /// The client has ended the run: so does QEMU.
@@ -213,7 +252,7 @@ mod target {
             defmt::info!(
                 "end of the run: {=u32} steps, {=u32} frames rejected, {=u32} of {=u32} bytes of stack used",
                 self.steps,
-                self.rejected.total(),
+                self.rejected,
                 stack::used(),
                 stack::budget()
             );
