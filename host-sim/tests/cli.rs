@@ -448,22 +448,17 @@ fn what_a_processor_in_the_loop_lacks_is_named_and_exits_with_2() {
     assert_eq!(pil(), (Some(2), no_target.into()));
 }
 
-/// Ctrl-C in the middle of the runs: the files of the last complete run stay, and nothing else.
+/// Runs the program until it `has_begun`, and presses Ctrl-C.
 #[cfg(unix)]
-#[test]
-fn an_interrupted_evaluation_leaves_the_old_files() {
-    let directory = tempfile::tempdir().unwrap();
-    let out = directory.path().join("out");
-    std::fs::create_dir(&out).unwrap();
-    std::fs::write(out.join("report.html"), "old").unwrap();
+fn interrupted(directory: &Path, arguments: &[&str], has_begun: impl Fn() -> bool) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_host-sim"))
-        .args(["evaluate", "--force"])
-        .current_dir(directory.path())
+        .args(arguments)
+        .current_dir(directory)
         .stderr(std::process::Stdio::piped())
         .stdout(std::process::Stdio::null())
         .spawn()
         .unwrap();
-    while !out.join(".unfinished/lock").exists() {
+    while !has_begun() {
         assert!(child.try_wait().unwrap().is_none(), "ended before it began");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
@@ -473,6 +468,51 @@ fn an_interrupted_evaluation_leaves_the_old_files() {
     assert!(interrupt.unwrap().success());
     let ended = child.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(130));
+    ended
+}
+
+/// A long study keeps what it has done, says where, and goes on from there; its checkpoint may lie beside its results.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_availability_keeps_its_drives() {
+    let directory = tempfile::tempdir().unwrap();
+    let kept = directory.path().join("out/kept.jsonl");
+    let drives = || std::fs::read_to_string(&kept).unwrap_or_default().lines().count();
+    let study = [
+        "availability",
+        "--fault-seeds",
+        "0",
+        "--checkpoint",
+        "out/kept.jsonl",
+        "--out",
+        "out",
+    ];
+    std::fs::create_dir(directory.path().join("out")).unwrap();
+    let ended = interrupted(
+        directory.path(),
+        &[&study[..], &["--hours", "1000"]].concat(),
+        || drives() > 2,
+    );
+    let says = "Interrupted: out/kept.jsonl keeps every drive that was done; the same command goes on from there. out holds";
+    assert!(stderr(&ended).contains(says), "{}", stderr(&ended));
+    assert!(drives() > 2);
+    // Its results come beside the checkpoint, and once more.
+    for _ in 0..2 {
+        let again = host_sim(directory.path(), &[&study[..], &["--drives", "0"]].concat());
+        assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+    }
+}
+
+/// Ctrl-C in the middle of the runs: the files of the last complete run stay, and nothing else.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_evaluation_leaves_the_old_files() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("report.html"), "old").unwrap();
+    let lock = out.join(".unfinished/lock");
+    let ended = interrupted(directory.path(), &["evaluate", "--force"], || lock.exists());
     assert!(
         stderr(&ended)
             .contains("Interrupted: nothing of this run is kept, and out holds what it held before."),

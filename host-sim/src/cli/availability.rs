@@ -1,6 +1,6 @@
 //! `host-sim availability`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use haptic_batch::availability::{Leg, Plan, ROADS, study};
@@ -11,7 +11,7 @@ use haptic_report::studies::availability::{self as files, Balance, Detection};
 use haptic_sim::worlds::WORLDS;
 
 use super::checkpoint::Checkpoint;
-use super::output::Output;
+use super::output::{self, Output};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
@@ -60,12 +60,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = arguments
         .out
         .as_deref()
-        .map(|place| Output::begin(place, "availability"))
+        .map(|place| {
+            Output::beside(
+                place,
+                "availability",
+                &kept_in(place, arguments.checkpoint.as_deref()),
+            )
+        })
         .transpose()?;
     let (checkpoint, on_record) = match &arguments.checkpoint {
         None => (None, Vec::new()),
         Some(path) => {
             let (checkpoint, legs) = Checkpoint::open::<Leg>(path, &heading(plan.seed)?)?;
+            output::keeps(format!(
+                "{} keeps every drive that was done; the same command goes on from there.",
+                path.display()
+            ))?;
             (Some(checkpoint), legs)
         }
     };
@@ -105,6 +115,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     } else {
         Outcome::Good
     })
+}
+
+/// The checkpoint's name, if it lies in the directory of the results.
+fn kept_in<'a>(directory: &Path, checkpoint: Option<&'a Path>) -> Vec<&'a str> {
+    let within = checkpoint.filter(|path| path.parent() == Some(directory));
+    within
+        .and_then(|path| path.file_name()?.to_str())
+        .into_iter()
+        .collect()
 }
 
 fn plan(arguments: &Arguments) -> Result<Plan, BadInput> {

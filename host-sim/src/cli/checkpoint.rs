@@ -33,7 +33,11 @@ impl Checkpoint {
         };
         let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
         let mut lines = whole.lines();
-        if let Some(found) = lines.next().filter(|found| *found != heading) {
+        // Without an end of a line it is this study's only if a cut left a part of the heading.
+        let first = lines
+            .next()
+            .or(Some(text.as_str()).filter(|text| !heading.starts_with(text)));
+        if let Some(found) = first.filter(|found| *found != heading) {
             let what = format!(
                 "belongs to another study; name another file, or delete it\n  it has {found}\n  this is {heading}"
             );

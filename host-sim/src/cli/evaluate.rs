@@ -21,13 +21,13 @@ pub(super) struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
     /// Speed, km/h (20 to 250)
-    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
+    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH)]
     speed: f64,
     /// When the guidance fails in the runs with failure, s after the start; default: 70
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     failure_time: Option<f64>,
     /// Stretch of road to measure, m; default: 1080 1740 on paper-course, else the whole course
-    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"])]
     window: Option<Vec<f64>>,
     /// What the controller sees: full resolution every millisecond, or the paper's sensors over the bus
     #[arg(long, value_enum, default_value_t = SensorsArgument::Paper)]

@@ -37,14 +37,14 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
     /// Use the log from this time on, s; may be repeated with --to for several stretches
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     from: Vec<f64>,
     /// Use the log up to this time, s
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S")]
     to: Vec<f64>,
     /// Bridge pauses of a signal (lost rows, NaN, a stuck sensor) up to so long, s (0 to 1), and cut the drive at longer
     /// ones; 0 cuts at each
-    #[arg(long, value_name = "S", default_value_t = 0.3, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 0.3)]
     max_gap: f64,
     /// Take the lane signals as they are: no camera noise is estimated and removed
     #[arg(long)]
@@ -55,7 +55,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
     /// Speed on that course, km/h (20 to 250)
-    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH, allow_negative_numbers = true)]
+    #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH)]
     speed: f64,
     /// Directory for figures, results and a report
     #[arg(long, value_name = "DIR", default_value = "out/identify")]

@@ -54,7 +54,17 @@ pub(super) fn grouped(program: clap::Command) -> clap::Command {
         }
     }
     let _ = write!(help, "\n{header}Options:{header:#}\n{{options}}{{after-help}}");
-    program.help_template(help)
+    program
+        .help_template(help)
+        .mut_subcommands(|command| with_signs(command).mut_subcommands(with_signs))
+}
+
+/// A value may begin with a minus: what is wrong with it is its range.
+fn with_signs(command: clap::Command) -> clap::Command {
+    command.mut_args(|option| {
+        let takes_values = option.get_action().takes_values();
+        option.allow_negative_numbers(takes_values)
+    })
 }
 
 /// The sentence for a name of an older version, or for an option of the evaluation without its command.
@@ -78,6 +88,17 @@ pub(super) fn explain(error: &clap::Error, arguments: &[OsString]) -> Option<Str
         .find(|(command, old, _)| name == old && (command.is_empty() || first == command));
     if let Some((_, old, new)) = renamed {
         return Some(format!("`{old}` is `{new}`"));
+    }
+    // A command of the ECU, or what looks like one.
+    let of_ecu = |(_, old, new): &&(&str, &str, &'static str)| {
+        new.starts_with("host-sim ecu ") && (old.starts_with(name.as_str()) || name.starts_with(old))
+    };
+    if let Some((.., new)) = RENAMED
+        .iter()
+        .find(of_ecu)
+        .filter(|_| name.len() > 2 && name == first)
+    {
+        return Some(format!("there is no command `{name}`; did you mean `{new}`?"));
     }
     let own_option = name.starts_with('-') && first.starts_with('-');
     own_option.then(|| {

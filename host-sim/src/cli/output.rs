@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use haptic_report::document::{FileSet, Owner};
 use haptic_report::studies::OutputError;
@@ -18,6 +18,49 @@ static FORCE: AtomicBool = AtomicBool::new(false);
 /// What an interrupt has to remove. Locked while a set begins and while its files are moved into place, so that
 /// an interrupt waits.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// What an interrupt keeps, as a sentence.
+static KEPT: OnceLock<String> = OnceLock::new();
+
+/// From now on an interrupt says what it keeps of the work under way.
+pub(super) fn keeps(what: String) -> Result<(), BadInput> {
+    KEPT.get_or_init(|| what);
+    catch_interrupts()
+}
+
+fn catch_interrupts() -> Result<(), BadInput> {
+    static CAUGHT: OnceLock<Result<(), String>> = OnceLock::new();
+    let caught = CAUGHT.get_or_init(|| ctrlc::set_handler(on_interrupt).map_err(|e| e.to_string()));
+    Ok(caught.clone()?)
+}
+
+fn on_interrupt() {
+    let traces = lock_unfinished();
+    // What stays is cleared by the next run.
+    for (k, place) in traces.iter().enumerate() {
+        let _ = if k == 0 {
+            std::fs::remove_dir_all(place)
+        } else {
+            std::fs::remove_dir(place)
+        };
+    }
+    let directory = traces.first().and_then(|staging| staging.parent());
+    let directory = directory.map(|directory| {
+        let kept = if directory.exists() {
+            "holds what it held before"
+        } else {
+            "was not made"
+        };
+        format!("{} {kept}.", directory.display())
+    });
+    match (KEPT.get(), directory) {
+        (Some(kept), Some(directory)) => eprintln!("Interrupted: {kept} {directory}"),
+        (Some(kept), None) => eprintln!("Interrupted: {kept}"),
+        (None, Some(directory)) => eprintln!("Interrupted: nothing of this run is kept, and {directory}"),
+        (None, None) => {}
+    }
+    process::exit(INTERRUPTED.into());
+}
 
 /// Whether a command may write there, before it has worked for long.
 pub(super) fn check(directory: &Path, command: &str, keeps: &[&str]) -> Result<(), BadInput> {
@@ -57,29 +100,7 @@ impl Output {
 
     /// The same, where the command keeps files by other means too.
     pub(super) fn beside(directory: &Path, command: &str, keeps: &[&str]) -> Result<Self, BadInput> {
-        ctrlc::set_handler(|| {
-            let traces = lock_unfinished();
-            // What stays is cleared by the next run.
-            for (k, place) in traces.iter().enumerate() {
-                let _ = if k == 0 {
-                    std::fs::remove_dir_all(place)
-                } else {
-                    std::fs::remove_dir(place)
-                };
-            }
-            if let Some(directory) = traces.first().and_then(|staging| staging.parent()) {
-                let kept = if directory.exists() {
-                    "holds what it held before"
-                } else {
-                    "was not made"
-                };
-                eprintln!(
-                    "Interrupted: nothing of this run is kept, and {} {kept}.",
-                    directory.display()
-                );
-            }
-            process::exit(INTERRUPTED.into());
-        })?;
+        catch_interrupts()?;
         let mut unfinished = lock_unfinished();
         let files = FileSet::begin(directory, owner(command, keeps))?;
         *unfinished = files.traces();

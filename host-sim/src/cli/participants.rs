@@ -1,7 +1,19 @@
 //! The paper's participants on the command line: how many, or which ones.
 
 use clap::Args;
+use haptic_core::params::PARAMETERS;
+use haptic_sim::input::{RangeError, in_range};
 use haptic_sim::participants::participants;
+
+/// Refuses a probe that the ECU refuses, by the name of the option.
+pub(super) fn check_probe(option: &str, amplitude_nm: f64) -> Result<(), RangeError> {
+    let own = PARAMETERS
+        .iter()
+        .find(|parameter| parameter.name == "probe_amplitude_nm");
+    own.map_or(Ok(()), |own| {
+        in_range(option, amplitude_nm, own.min..=own.max, own.unit)
+    })
+}
 
 #[derive(Debug, Args)]
 pub(super) struct Participants {
@@ -41,17 +53,18 @@ impl std::str::FromStr for List {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let number = |s: &str| {
-            s.trim()
-                .parse::<u32>()
-                .map_err(|_| format!("{s:?} is not a participant's number, as in 1,3..5"))
+        let last = participants().len() as u32;
+        let number = |s: &str| match s.trim().parse::<u32>() {
+            Ok(number) if (1..=last).contains(&number) => Ok(number),
+            Ok(number) => Err(format!("{number} is outside 1 to {last}")),
+            Err(_) => Err(format!("{s:?} is not a participant's number, as in 1,3..5")),
         };
         let mut all = Vec::new();
         for part in text.split(',') {
             match part.split_once("..") {
                 Some((from, to)) => {
                     let (from, to) = (number(from)?, number(to.trim_start_matches('='))?);
-                    if from > to || to > 1000 {
+                    if from > to {
                         return Err(format!("{part:?} is no range of participants, as in 1,3..5"));
                     }
                     all.extend(from..=to);
@@ -77,7 +90,7 @@ mod tests {
         ] {
             assert_eq!(text.parse(), Ok(List(numbers.to_vec())), "{text}");
         }
-        for bad in ["", "a", "2..x", "5..3", "1..99999999"] {
+        for bad in ["", "a", "2..x", "5..3", "0", "15", "1..99999999"] {
             assert!(bad.parse::<List>().is_err(), "{bad}");
         }
     }

@@ -8,7 +8,7 @@ use haptic_report::studies::reliance as files;
 use haptic_sim::input::in_range;
 
 use super::output::Output;
-use super::participants::Participants;
+use super::participants::{Participants, check_probe};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
@@ -16,16 +16,16 @@ pub(super) struct Arguments {
     #[command(flatten)]
     participants: Participants,
     /// Drives of each participant, each with its own remnant
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     seeds: u32,
     /// Frequency of the probe, Hz: a small sine added to the guidance torque, whose answer tells K_hg
-    #[arg(long, value_name = "HZ", default_value_t = 2.5, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", default_value_t = 2.5)]
     frequency: f64,
     /// Amplitude of the probe, N.m
-    #[arg(long, value_name = "NM", default_value_t = 0.2, allow_negative_numbers = true)]
+    #[arg(long, value_name = "NM", default_value_t = 0.2)]
     amplitude: f64,
     /// The drivers' t_nms, s (0.02 to 0.5); the ECU goes on assuming 0.1
-    #[arg(long, value_name = "S", default_value_t = 0.1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 0.1)]
     t_nms: f64,
     /// Directory for a figure, the results and a report; default: no files
     #[arg(long, value_name = "DIR")]
@@ -37,6 +37,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     in_range("--t-nms", arguments.t_nms, 0.02..=0.5, "s")?;
+    check_probe("--amplitude", arguments.amplitude)?;
     let plan = Plan {
         participants: arguments.participants.numbers(),
         seeds: arguments.seeds,

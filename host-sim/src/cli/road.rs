@@ -22,7 +22,7 @@ pub(super) struct LaneArguments {
     road: Option<String>,
     /// Lane of that road to begin in, by its id (right lanes are negative); default: the rightmost driving lane in
     /// the direction of travel
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N")]
     lane: Option<i32>,
     /// Where a junction leads on to several roads, the one to take, by the id of the road through the junction or of the one
     /// behind it; may be repeated. Without it the way ends at such a junction

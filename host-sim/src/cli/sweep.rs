@@ -56,6 +56,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     }
     output::check(&arguments.out, "sweep", kept(&arguments.out))?;
     let store = Store::open(&sweep, VERSION, &arguments.out)?;
+    output::keeps(format!(
+        "{} keeps every chunk that was done; the same command goes on from there.",
+        arguments.out.display()
+    ))?;
     let threads = arguments.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         |threads| threads as usize,

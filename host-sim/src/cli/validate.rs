@@ -7,7 +7,7 @@ use haptic_batch::experiment::{POPULATION, Plan, corruptions, methods, repeat};
 use haptic_report::studies::validation::Validation;
 
 use super::output::Output;
-use super::participants::Participants;
+use super::participants::{Participants, check_probe};
 use super::{BadInput, Outcome, print, print_json, progress};
 
 #[derive(Debug, Args)]
@@ -32,12 +32,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     participants: Participants,
     /// Amplitude of the probe, N.m (0: none): a small torque added to the guidance, whose answer tells K_hg
-    #[arg(
-        long,
-        value_name = "AMPLITUDE",
-        default_value_t = 0.2,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "AMPLITUDE", default_value_t = 0.2)]
     probe: f64,
     /// Seed of the remnants of the first drive of each participant; the others count on from it
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -51,6 +46,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    check_probe("--probe", arguments.probe)?;
     let plan = Plan {
         participants: arguments.participants.numbers(),
         probe_nm: arguments.probe,

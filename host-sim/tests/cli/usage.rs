@@ -15,7 +15,34 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("late.toml", "[failure]\nkind = 'torque'\ntime = 5000\n");
     write("empty.toml", "");
     write("course.toml", "[[segment]]\nlength = 500\n");
-    let cases: [(&[&str], &str); 23] = [
+    write("on-a-tight-road.toml", "course = 'tight.toml'\n");
+    write("notes.txt", "of somebody");
+    let cases: [(&[&str], &str); 30] = [
+        (
+            &["run", "on-a-tight-road.toml"],
+            "on-a-tight-road.toml: course: tight.toml: ",
+        ),
+        (
+            &["experiment", "--probe", "9"],
+            "--probe = 9 N.m is outside 0 to 0.3 N.m",
+        ),
+        (
+            &["reliance", "--amplitude", "9"],
+            "--amplitude = 9 N.m is outside 0 to 0.3 N.m",
+        ),
+        (&["validate", "--coverage", "--probe", "-1"], "--probe = -1 N.m"),
+        (
+            &["experiment", "--participant", "0"],
+            "'--participant <LIST>': 0 is outside 1 to 14",
+        ),
+        (
+            &["availability", "--hours", "-1"],
+            "--hours: -1 is outside 0 to 100000 h",
+        ),
+        (
+            &["availability", "--drives", "3", "--checkpoint", "notes.txt"],
+            "notes.txt: belongs to another study",
+        ),
         (&["evaluate", "--course", "none.toml"], "none.toml"),
         (
             &["evaluate", "--course", "paper-course", "--window", "0", "3351"],
@@ -94,13 +121,20 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         );
         assert!(output.stdout.is_empty(), "{arguments:?}");
     }
+    let notes = std::fs::read_to_string(directory.path().join("notes.txt")).unwrap();
+    assert_eq!(notes, "of somebody");
 }
 
 /// Who knows a name of an older version, mistypes one or forgets the command, is told what to write.
 #[test]
 fn another_name_is_answered_with_the_right_one() {
     let directory = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 20] = [
+    let cases: [(&[&str], &str); 22] = [
+        (
+            &["parameter"],
+            "there is no command `parameter`; did you mean `host-sim ecu parameters`?",
+        ),
+        (&["buss"], "did you mean `host-sim ecu bus`?"),
         (&["pil"], "error: `pil` is `host-sim ecu pil`\n"),
         (&["live", "--can", "can0"], "`live` is `host-sim ecu live`"),
         (

@@ -33,7 +33,9 @@ pub(super) fn parse(
         turns: file.turn.clone(),
     };
     let course = match &file.course {
-        CourseField::Named(path) if path != PAPER_COURSE => course(path, &choice)?,
+        CourseField::Named(path) if path != PAPER_COURSE => {
+            course(path, &choice).map_err(|error| InputError::new(name, format!("course: {error}")))?
+        }
         built_in => {
             choice.check_none(name)?;
             built_in.own(name)?

@@ -143,7 +143,7 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         parse("course = 'nowhere.toml'")
             .unwrap_err()
             .to_string()
-            .starts_with("nowhere.toml: ")
+            .starts_with("s.toml: course: nowhere.toml: ")
     );
 }
 
