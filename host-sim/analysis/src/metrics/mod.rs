@@ -85,19 +85,8 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         mut driver_in_conflict,
     ] = [Moments::default(); 5];
     let [mut out_of_lane, mut limited, mut in_conflict] = [0.0; 3];
-    // The whole run is filtered, so that the ends of the window carry no transient of a filter.
-    let without_probe = |value: fn(&Sample) -> f64| {
-        let record: Vec<f64> = trace.samples.iter().map(value).collect();
-        let Some(probe_hz) = circumstances.probe_hz else {
-            return record;
-        };
-        let left = zero_phase_notch(&record, trace.sample_rate_hz, probe_hz, PROBE_WIDTH_HZ);
-        left.unwrap_or(record)
-    };
-    let torques = [
-        without_probe(|s| s.driver_torque_nm),
-        without_probe(|s| s.guidance_torque_nm),
-    ];
+    let torque = |value| without_probe(trace, circumstances.probe_hz, value);
+    let torques = [torque(|s| s.driver_torque_nm), torque(|s| s.guidance_torque_nm)];
     let speeds = || samples.iter().map(|sample| speed_m_s(sample, circumstances));
     let mut times_to_crossing_s = Vec::with_capacity(samples.len());
     for (place, sample) in range.clone().zip(samples) {
@@ -123,7 +112,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         .failure
         .map(|failure| recovery(&trace.samples[..range.end], &failure))
         .unwrap_or_default();
-    let angle_deg = without_probe(|s| s.wheel_angle_rad.to_degrees());
+    let angle_deg = without_probe(trace, circumstances.probe_hz, |s| s.wheel_angle_rad.to_degrees());
     let reversals_per_min = |(gap_deg, cut_off_hz)| {
         let filtered = zero_phase_low_pass(&angle_deg, trace.sample_rate_hz, cut_off_hz)?;
         let filtered = &filtered[range.clone()];
@@ -159,6 +148,14 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         min_speed_m_per_s: speeds().reduce(f64::min),
         max_speed_m_per_s: speeds().reduce(f64::max),
     }
+}
+
+/// A quantity over the whole run, so that the ends of a window carry no transient of the filter; as it is where there is no
+/// probe, or the run is too short to filter.
+fn without_probe(trace: &Trace, probe_hz: Option<f64>, value: fn(&Sample) -> f64) -> Vec<f64> {
+    let record: Vec<f64> = trace.samples.iter().map(value).collect();
+    let notched = |hz| zero_phase_notch(&record, trace.sample_rate_hz, hz, PROBE_WIDTH_HZ);
+    probe_hz.and_then(notched).unwrap_or(record)
 }
 
 /// Speed of a sample, m/s.
