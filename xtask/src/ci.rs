@@ -84,7 +84,7 @@ const STAGES: &[Stage] = &[
     stage(
         "boards",
         When::Beside,
-        "lints of every board's image; QEMU's boards compared frame by frame, with their figures",
+        "QEMU's boards: lints, frames compared one by one, figures",
         || boards::check(boards::Scope::Qemu, Built::ForTests, false),
     ),
     stage("page", When::Beside, "the lab, in a headless Chromium", || {
@@ -139,7 +139,7 @@ const STAGES: &[Stage] = &[
     stage(
         "all-boards",
         When::Full,
-        "the images of all boards, with their figures",
+        "the same of all boards, the real ones' images among them",
         || boards::check(boards::Scope::All, Built::ForTests, false),
     ),
     stage(

@@ -159,11 +159,16 @@ mod target {
             } else if let Some(start) = Start::decode(&frame) {
                 begin(ecu, start, &self.params);
                 self.frames.clear();
-                self.product = (start.state == StartState::Product)
-                    .then(|| Product::new(Found::default(), self.params, Boot::default()));
+                self.be_product(start.state == StartState::Product);
             } else if !set_parameter(&mut self.params, &frame) && self.frames.push(frame).is_err() {
                 panic!("more than {FRAMES_PER_TICK} frames in one tick");
             }
+        }
+
+        /// A function of its own, for the same reason as [`begin`].
+        #[inline(never)]
+        fn be_product(&mut self, is_one: bool) {
+            self.product = is_one.then(|| Product::new(Found::default(), self.params, Boot::default()));
         }
 
         fn tick(&mut self, now: Instant, place: &mut Option<Ecu>, can: &mut impl Can<Frame = Frame>) {
