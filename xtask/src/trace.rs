@@ -72,8 +72,11 @@ fn items() -> Result<BTreeSet<String>> {
     for row in table(&safety, "| limit | value | source and reason |")? {
         items.insert(format!("limit {}", row[0]));
     }
-    for row in table(&safety, "| fault | class | declared after |")? {
-        items.extend(row[0].split(", ").map(|name| format!("fault {name}")));
+    for row in table(
+        &read("docs/reference/bus.md")?,
+        "| bit | fault | class | declared after |",
+    )? {
+        items.insert(format!("fault {}", row[1]));
     }
     let modes = "| mode | BootPassed | Engage | Faded | Disengage | InputLost | BootRejected | Critical |";
     let events: Vec<&str> = modes.split('|').map(str::trim).skip(2).collect();
@@ -108,7 +111,7 @@ fn items() -> Result<BTreeSet<String>> {
 fn table(text: &str, head: &str) -> Result<Vec<Vec<String>>> {
     let (_, rest) = text
         .split_once(head)
-        .with_context(|| format!("docs/safety.md has no table {head}"))?;
+        .with_context(|| format!("no document has the table {head}"))?;
     let rows = rest.lines().skip(2).take_while(|line| line.starts_with('|'));
     let cells = |line: &str| {
         line.trim_matches('|')
