@@ -6,7 +6,7 @@
 
 use crate::quantity::{Instant, Micros};
 
-/// What a fault leads to (`docs/safety.md`).
+/// What a fault leads to (`docs/explanation/behaviour.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Class {
