@@ -89,7 +89,7 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
     );
     let background = golden("mps2-an386 worst background step");
     has(
-        "docs/numerics.md",
+        "docs/explanation/live-estimate.md",
         format!("at most {background} instructions on the target"),
     );
     let per_ms = golden("host_simulated_second")
@@ -99,11 +99,11 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
         / 1000.0;
     let thousands = format!("{},{:03}", per_ms as u64 / 1000, per_ms as u64 % 1000);
     has(
-        "docs/numerics.md",
+        "docs/explanation/speed.md",
         format!("A simulated millisecond takes {thousands} instructions."),
     );
     has(
-        "docs/numerics.md",
+        "docs/explanation/speed.md",
         format!("The ECU's step takes {} of them.", golden("host_step_mean")),
     );
 }
