@@ -105,7 +105,7 @@ fn page(text: &str, folder: &Path, outside: &mut BTreeSet<PathBuf>) -> String {
     lines
 }
 
-/// A line whose links out of `docs/` lead to the copies, and those to a README to where mdBook puts it.
+/// A line whose links out of `docs/` lead to the copies, and those to a README or the summary to where mdBook puts them.
 fn links(line: &str, folder: &Path, outside: &mut BTreeSet<PathBuf>) -> String {
     let mut parts = line.split("](");
     let mut text = parts.next().unwrap_or("").to_owned();
@@ -119,9 +119,12 @@ fn links(line: &str, folder: &Path, outside: &mut BTreeSet<PathBuf>) -> String {
                 text.push_str(part.strip_prefix(link).unwrap_or(""));
                 outside.insert(name);
             }
-            // mdBook calls that page index.html, and does not follow.
-            None if !link.contains(':') => text.push_str(&part.replacen("README.md", "index.md", 1)),
-            None => text.push_str(part),
+            None if link.contains(':') => text.push_str(part),
+            // So mdBook calls these two, and does not follow.
+            None => {
+                let part = part.replacen("README.md", "index.md", 1);
+                text.push_str(&part.replacen("SUMMARY.md", "toc.html", 1));
+            }
         }
     }
     text
