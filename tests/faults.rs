@@ -132,10 +132,10 @@ fn names_are_unique_and_every_group_is_there() {
 
 #[test]
 fn the_document_has_the_table_of_faults() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/safety.md");
-    let text = std::fs::read_to_string(path).expect("docs/safety.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/reference/fault-campaign.md");
+    let text = std::fs::read_to_string(path).expect("docs/reference/fault-campaign.md");
     assert!(
         text.contains(&document::table_of_faults()),
-        "docs/safety.md is not what `host-sim faults --list` prints"
+        "docs/reference/fault-campaign.md is not what `host-sim faults --list` prints"
     );
 }

@@ -91,7 +91,7 @@ pub struct Situation {
 /// Growth per [`WINDOW`].
 const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
 /// How many times as fast a distrusted torque falls. At 8 N.m/s a lie of 5 N.m moves the vehicle by 0.25 m beyond where it
-/// goes without any torque, at 16 by 0.12 m, at 32 by 0.06 m (docs/safety.md). At once it would be a blow.
+/// goes without any torque, at 16 by 0.12 m, at 32 by 0.06 m (docs/decisions). At once it would be a blow.
 const DISTRUSTED: i32 = 4;
 /// Opposing driver torque at which the bound begins to shrink.
 const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);

@@ -2,11 +2,11 @@
 //!
 //! [`faults!`](self) below is the one list of faults. One more fault is one more line of it, with the next free code;
 //! its class decides what the ECU does. `core/tests/dbc.rs` then asks for its names in `core/haptic.dbc`, and
-//! `core/tests/faults.rs` for its row in `docs/safety.md`.
+//! `core/tests/faults.rs` for its row in `docs/reference/bus.md`.
 
 use crate::quantity::{Instant, Micros};
 
-/// What a fault leads to (`docs/safety.md`).
+/// What a fault leads to (`docs/explanation/behaviour.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Class {

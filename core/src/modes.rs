@@ -2,7 +2,7 @@
 //!
 //! Torque is zero outside Active, Fade and Handover. Nothing re-engages by itself: the only way into Active
 //! is `Engage`, which the controller raises on a rising edge of the request after 500 ms of valid data in
-//! Standby. `docs/safety.md` draws this table, and a test holds the drawing to it.
+//! Standby. `docs/explanation/behaviour.md` draws this table, and a test holds the drawing to it.
 //!
 //! Not here: what raises an event, and what the torque does in a mode.
 

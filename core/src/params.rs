@@ -82,7 +82,7 @@ macro_rules! parameters {
 
         impl $Set {
             /// The defaults: table 8 of the paper, its 5 N.m limit, and a 10 Hz corner for the rates
-            /// (`docs/numerics.md` says why).
+            /// (`docs/explanation/simulation-numerics.md` says why).
             pub const PAPER: Self = Self {
                 $($field: $default,)*
                 $group: $Group { $($g_field: $g_default,)* },

@@ -1,7 +1,7 @@
 //! Torques that end by themselves: the last trusted torque, and its way to zero.
 //!
 //! A sudden loss of guidance in a curve takes a relying driver 0.44 to 0.62 m off the centreline; the same
-//! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/safety.md has the
+//! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/decisions has the
 //! table). Where the driver pushes against the torque there is nothing left to keep, and it goes faster. Neither ramp
 //! ever grows.
 

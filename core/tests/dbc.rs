@@ -534,7 +534,7 @@ fn the_dbc_file_names_every_code() {
     assert_eq!(named("Rejection_Message"), messages);
 }
 
-/// Names, identifiers, senders and periods: the DBC file, the table in docs/design.md and the list in the code.
+/// Names, identifiers, senders and periods: the DBC file, the table in docs/reference/bus.md and the list in the code.
 #[test]
 fn the_dbc_file_and_the_documents_list_every_message() {
     let dbc = dbc();
@@ -546,7 +546,7 @@ fn the_dbc_file_and_the_documents_list_every_message() {
     let in_file: Vec<_> = dbc.messages.iter().map(|m| row(&m.id, &m.name)).collect();
     let in_code: Vec<_> = MESSAGES.iter().map(|m| (m.id, m.name.to_owned())).collect();
     assert_eq!(in_file, in_code);
-    let document = include_str!("../../docs/design.md");
+    let document = include_str!("../../docs/reference/bus.md");
     let rows = document.lines().filter_map(|line| line.strip_prefix("| 0x"));
     let in_document: Vec<_> = rows
         .map(|row| {

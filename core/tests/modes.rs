@@ -1,21 +1,22 @@
-//! The transition table of the code against the table and the drawing in docs/safety.md, written by hand.
+//! The transition table of the code against the table and the drawing in docs/explanation/behaviour.md, written
+//! by hand.
 
 use haptic_core::modes::{Event, Events, Mode};
 use std::collections::BTreeSet;
 
-const SAFETY: &str = include_str!("../../docs/safety.md");
+const BEHAVIOUR: &str = include_str!("../../docs/explanation/behaviour.md");
 
 fn mode(name: &str) -> Mode {
     let named = |mode: &Mode| format!("{mode:?}") == name;
     Mode::ALL
         .into_iter()
         .find(named)
-        .unwrap_or_else(|| panic!("docs/safety.md: no mode {name}"))
+        .unwrap_or_else(|| panic!("docs/explanation/behaviour.md: no mode {name}"))
 }
 
 /// The table as rows of cells, its head first.
 fn table() -> Vec<Vec<&'static str>> {
-    SAFETY
+    BEHAVIOUR
         .lines()
         .skip_while(|line| !line.starts_with("| mode | BootPassed"))
         .take_while(|line| line.starts_with('|'))
@@ -43,7 +44,7 @@ fn every_transition_is_the_one_in_the_table() {
 #[test]
 fn the_drawing_shows_the_table() {
     let mut drawn = BTreeSet::new();
-    for line in SAFETY
+    for line in BEHAVIOUR
         .lines()
         .filter(|line| line.contains("-->") && line.contains(": "))
     {
@@ -62,7 +63,7 @@ fn the_drawing_shows_the_table() {
         }
     }
     assert_eq!(drawn, tabled);
-    assert!(SAFETY.contains("[*] --> Boot"));
+    assert!(BEHAVIOUR.contains("[*] --> Boot"));
 }
 
 #[test]

@@ -218,7 +218,7 @@ fn honest_driving_is_never_declared() {
                     "{name} {kmh}"
                 );
             }
-            // As docs/safety.md has it.
+            // As docs/explanation/plausibility.md has it.
             let documented = match course {
                 Course::Curve(_) => 0.16,
                 Course::LaneChange => 0.31,

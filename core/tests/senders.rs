@@ -1,4 +1,5 @@
-//! What the receivers let pass, and for how long a silent sender is waited for: three of its periods (`docs/safety.md`).
+//! What the receivers let pass, and for how long a silent sender is waited for: three of its periods
+//! (`docs/explanation/plausibility.md`).
 //!
 //! The period is the longest time between two messages lately. It grows at once and falls by a sixty-fourth of the way with
 //! each message; it is no less than 10 ms and no more than the slowest sender's. The expected times are worked out here in

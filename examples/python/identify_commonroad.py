@@ -4,7 +4,7 @@
 
 The vehicle is one of the package commonroad-vehicle-models with its BMW 320i: `st`, the single-track model (7 states), or
 `mb`, the multi-body model (29 states: roll, pitch, four wheels, a tyre after the magic formula). Road, column, guidance,
-driver and remnant are written here from the equations of docs/numerics.md, with none of the workbench's code: steps of
+driver and remnant are written here from the equations of docs/explanation, with none of the workbench's code: steps of
 1 ms by Runge-Kutta, T_h decided once a millisecond, rows at 60 Hz with the resolution of the paper's sensors.
 
 With --csv the drive is only recorded: so tests/data/driver-logs/commonroad-*.csv were made.

@@ -14,7 +14,7 @@ import sys
 from e2e.p02 import e2e_p02_check
 
 BASE = bytes.fromhex("D9ADC10B75F8E07C7AE6AE929B3EEA5E")
-# By identifier, what the message's list is XORed with (docs/design.md, the bus).
+# By identifier, what the message's list is XORed with (docs/reference/bus.md).
 CONSTANTS = {
     0x100: 0x11,
     0x110: 0x22,

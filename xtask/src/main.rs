@@ -6,6 +6,7 @@ mod account;
 mod bench;
 mod bindings_agree;
 mod boards;
+mod book;
 mod by_hand;
 mod c_library;
 mod callgrind;
@@ -116,6 +117,8 @@ enum Command {
         #[arg(long)]
         bless: bool,
     },
+    /// The documents as a book to browse, in target/book/html (needs mdbook). Exit code 1 if a link leads nowhere.
+    Book,
     /// Runs an image in QEMU and prints its log.
     Qemu(qemu::Options),
     /// Decodes a log that `host-sim ecu pil` left behind.
@@ -176,6 +179,7 @@ fn main() -> ExitCode {
             Err(error) => Err(error),
         },
         Command::Trace { bless } => trace::run(bless),
+        Command::Book => book::build(),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),
     };

@@ -67,17 +67,21 @@ fn read(path: &str) -> Result<String> {
 
 /// What needs a requirement, as `kind name`.
 fn items() -> Result<BTreeSet<String>> {
-    let safety = read("docs/safety.md")?;
+    let behaviour = read("docs/explanation/behaviour.md")?;
+    let campaign = read("docs/reference/fault-campaign.md")?;
     let mut items = BTreeSet::new();
-    for row in table(&safety, "| limit | value | source and reason |")? {
+    for row in table(&behaviour, "| limit | value | source and reason |")? {
         items.insert(format!("limit {}", row[0]));
     }
-    for row in table(&safety, "| fault | class | declared after |")? {
-        items.extend(row[0].split(", ").map(|name| format!("fault {name}")));
+    for row in table(
+        &read("docs/reference/bus.md")?,
+        "| bit | fault | class | declared after |",
+    )? {
+        items.insert(format!("fault {}", row[1]));
     }
     let modes = "| mode | BootPassed | Engage | Faded | Disengage | InputLost | BootRejected | Critical |";
     let events: Vec<&str> = modes.split('|').map(str::trim).skip(2).collect();
-    for row in table(&safety, modes)? {
+    for row in table(&behaviour, modes)? {
         for (next, event) in row[1..].iter().zip(&events) {
             if next != "." {
                 items.insert(format!("transition {} {event}", row[0]));
@@ -85,7 +89,7 @@ fn items() -> Result<BTreeSet<String>> {
         }
     }
     // Every table of the campaign has names in its first column.
-    let rows = safety
+    let rows = campaign
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "));
     items.extend(rows.map(|(name, _)| format!("row {name}")));
@@ -108,7 +112,7 @@ fn items() -> Result<BTreeSet<String>> {
 fn table(text: &str, head: &str) -> Result<Vec<Vec<String>>> {
     let (_, rest) = text
         .split_once(head)
-        .with_context(|| format!("docs/safety.md has no table {head}"))?;
+        .with_context(|| format!("no document has the table {head}"))?;
     let rows = rest.lines().skip(2).take_while(|line| line.starts_with('|'));
     let cells = |line: &str| {
         line.trim_matches('|')
@@ -165,7 +169,7 @@ fn exists(
 ) -> Result<(), &'static str> {
     match evidence.split_once(' ') {
         Some(("row", _)) if items.contains(evidence) => Ok(()),
-        Some(("row", _)) => Err("docs/safety.md has no such row"),
+        Some(("row", _)) => Err("docs/reference/fault-campaign.md has no such row"),
         Some(("gate", name)) if GATES.contains(&name) => Ok(()),
         Some(("gate", _)) => Err("no such gate"),
         Some(("test", place)) => {

@@ -115,7 +115,7 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
             Integer,
             Output,
             "",
-            "Why the guidance left: 0 while it is there, or was never; as in a time series (docs/files.md)",
+            "Why the guidance left: 0 while it is there, or was never; as in a time series (docs/reference/formats.md)",
         ),
         variable(
             "unguided_s",

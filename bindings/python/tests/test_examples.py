@@ -29,7 +29,7 @@ def test_a_plant_of_ones_own(vehicle):
         print(guided, np.abs(error_m).max(), faults, mode)
         assert mode == ("Active" if guided else "Standby")
         # A driver model without noise holds the wheel quite still in a steady bend: to the ECU as good as no hand, which it
-        # warns of before it would fade (docs/safety.md).
+        # warns of before it would fade (docs/explanation/behaviour.md).
         faults.pop("HandsOff", None)
         # Before the first frames have come, every input is silent: those are no false faults.
         assert all(time_s < 0.6 for time_s in faults.values()), faults

@@ -1,4 +1,4 @@
-//! The oracle of the live estimate, in f64: the rule of docs/numerics.md, "Live reliance", worked out from the whole record of
+//! The oracle of the live estimate, in f64: the rule of docs/explanation/live-estimate.md, worked out from the whole record of
 //! a drive, with a sum over each block's samples and the list of all readings.
 
 pub(crate) mod drive;

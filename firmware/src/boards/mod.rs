@@ -37,7 +37,7 @@ compile_error!(
 );
 
 /// The watchdog resets the processor when it was not fed for so long. Feeding is a millisecond apart; what
-/// becomes of the torque meanwhile is in `docs/safety.md`, board by board.
+/// becomes of the torque meanwhile is in `docs/explanation/monitor-and-memory.md`, board by board.
 pub const WATCHDOG: Micros = Micros::from_ms(16);
 
 /// What the images need of a board.

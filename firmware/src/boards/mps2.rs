@@ -7,7 +7,8 @@
 //! - CMSDK watchdog: a non-maskable interrupt after half its time, the reset after all of it.
 //!
 //! Registers as in ARM DAI 0386 (AN386) and the Cortex-M System Design Kit's UART, timer and watchdog. The actuator
-//! sits on the bus and takes silence as zero torque, so zero torque here is a silent bus (`docs/safety.md`: how soon).
+//! sits on the bus and takes silence as zero torque, so zero torque here is a silent bus (how soon:
+//! `docs/explanation/monitor-and-memory.md`).
 
 use core::convert::Infallible;
 use core::mem::MaybeUninit;

@@ -4,8 +4,8 @@
 //! in which what arrives contradicts itself. This file decides that moment without the core: the change of the
 //! near-point error that speed, yaw error and yaw rate predict against the change seen, and the column's
 //! torques against its movement, each through a memory of 1 s. Vehicle and margins are the documented ones
-//! (`docs/safety.md`), from table 9. A sample further away than a vehicle can move is passed over; when there is
-//! nothing else for 30 ms, that is seen.
+//! (`docs/explanation/plausibility.md`), from table 9. A sample further away than a vehicle can move is passed over;
+//! when there is nothing else for 30 ms, that is seen.
 
 use std::collections::VecDeque;
 

@@ -6,7 +6,7 @@
 //! The channels are one list, [`channels!`](self) below: one more channel is one more entry of it. From it follow the
 //! fields of [`Sample`], the table [`CHANNELS`], the columns of a CSV file, writing it and reading it back. What else wants a decision
 //! says so itself: the compiler refuses the simulator's sample until it has a value for the new field, and
-//! `tests/channels.rs` asks for its row in `docs/files.md`.
+//! `tests/channels.rs` asks for its row in `docs/reference/formats.md`.
 
 use std::fmt;
 use std::io::{self, Read, Write};
@@ -243,7 +243,7 @@ impl Trace {
     }
 }
 
-/// The channels as a Markdown table, as `docs/files.md` holds it.
+/// The channels as a Markdown table, as `docs/reference/formats.md` holds it.
 #[must_use]
 pub fn table_of_channels() -> String {
     let mut text = String::from("| column | unit | digits | of | meaning |\n|---|---|---|---|---|\n");

@@ -117,8 +117,11 @@ fn a_name_ends_with_its_unit() {
 
 #[test]
 fn the_document_has_the_table_of_channels() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/files.md");
-    let text = std::fs::read_to_string(path).expect("docs/files.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/formats.md");
+    let text = std::fs::read_to_string(path).expect("docs/reference/formats.md");
     let table = table_of_channels();
-    assert!(text.contains(&table), "docs/files.md lacks this table:\n{table}");
+    assert!(
+        text.contains(&table),
+        "docs/reference/formats.md lacks this table:\n{table}"
+    );
 }

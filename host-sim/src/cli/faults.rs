@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     /// Run in QEMU: the image takes the ECU's place, for the rows marked Q
     #[arg(long)]
     target: bool,
-    /// Print the table of faults, as docs/safety.md has it, and run nothing
+    /// Print the table of faults, as docs/reference/fault-campaign.md has it, and run nothing
     #[arg(long, conflicts_with_all = ["rows", "world", "drivers", "seeds", "seed", "target", "json", "out"])]
     list: bool,
     /// Print the results as one JSON object instead of a table

@@ -10,7 +10,7 @@
 //!   `python hardware` only has to be Python.
 //! - `rust` runs as a doctest of `host-sim`. `rust file=PATH` and `python file=PATH` are a part of that file.
 //! - `text output`: lines that the commands before it printed; how many blanks lie between words does not matter.
-//! - `text`, `mermaid` and blocks without a word are not for running.
+//! - `text`, `mermaid`, `math` and blocks without a word are not for running.
 //!
 //! Commands that take long run shorter here: [`SHORTER`].
 
@@ -253,7 +253,7 @@ fn run_examples(name: &Path, text: &str) {
                     assert!(printed.contains(&line), "{at}: nothing printed {line:?}");
                 }
             }
-            "text" | "mermaid" | "" => {}
+            "text" | "mermaid" | "math" | "" => {}
             other => panic!("{at}: nobody runs {other}"),
         }
     }

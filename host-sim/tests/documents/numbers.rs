@@ -89,7 +89,7 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
     );
     let background = golden("mps2-an386 worst background step");
     has(
-        "docs/numerics.md",
+        "docs/explanation/live-estimate.md",
         format!("at most {background} instructions on the target"),
     );
     let per_ms = golden("host_simulated_second")
@@ -99,17 +99,17 @@ fn instruction_counts_in_documents_are_those_of_the_goldens() {
         / 1000.0;
     let thousands = format!("{},{:03}", per_ms as u64 / 1000, per_ms as u64 % 1000);
     has(
-        "docs/numerics.md",
+        "docs/explanation/speed.md",
         format!("A simulated millisecond takes {thousands} instructions."),
     );
     has(
-        "docs/numerics.md",
+        "docs/explanation/speed.md",
         format!("The ECU's step takes {} of them.", golden("host_step_mean")),
     );
 }
 
 #[test]
-fn the_load_of_the_bus_in_the_design_is_what_the_command_prints() {
+fn the_load_of_the_bus_on_its_page_is_what_the_command_prints() {
     let place = place();
     let mut bus = Command::new(env!("CARGO_BIN_EXE_host-sim"));
     let (_, out, err) = run(
@@ -120,8 +120,11 @@ fn the_load_of_the_bus_in_the_design_is_what_the_command_prints() {
     let load: serde_json::Value = serde_json::from_str(&out).expect(&err);
     let percent = |name: &str| format!("{:.0} %", 100.0 * load[name].as_f64().unwrap());
     let sentence = format!(": {}, of {} allowed.", percent("load"), percent("max_load"));
-    let design = &documents()[Path::new("docs/design.md")];
-    assert!(design.contains(&sentence), "docs/design.md should say{sentence}");
+    let page = &documents()[Path::new("docs/reference/bus.md")];
+    assert!(
+        page.contains(&sentence),
+        "docs/reference/bus.md should say{sentence}"
+    );
 }
 
 /// Peak lateral errors of the slowest driver, in the order of the sentence.

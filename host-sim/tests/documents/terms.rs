@@ -45,11 +45,14 @@ fn a_term_is_defined_before_its_use() {
     let headings = anchors(&glossary);
     let mut wrong = Vec::new();
     for (name, text) in documents() {
-        // The second and the third: one line a change, and a table made by a tool.
-        if ["docs/glossary.md", "CHANGELOG.md", "docs/requirements.md"]
-            .iter()
-            .any(|own| name == Path::new(own))
-        {
+        // All but the first: one line a change, a table made by a tool, and the titles of pages.
+        let own = [
+            "docs/glossary.md",
+            "CHANGELOG.md",
+            "docs/requirements.md",
+            "docs/SUMMARY.md",
+        ];
+        if own.iter().any(|own| name == Path::new(own)) {
             continue;
         }
         let text = words_of(&text);

@@ -78,8 +78,8 @@ macro_rules! messages {
 }
 
 // The one list of messages. One more is one more line, its struct with its bits (`inputs`, `outputs`, `service`), and
-// its signals in `core/haptic.dbc`; `core/tests/dbc.rs` holds the three and the table in `docs/design.md` together. The
-// monitor decodes torque, mode, lane and column by itself.
+// its signals in `core/haptic.dbc`; `core/tests/dbc.rs` holds the three and the table in `docs/reference/bus.md`
+// together. The monitor decodes torque, mode, lane and column by itself.
 messages! {
     0x0C0 Guidance, 0x5A, 14, Ecu, 1.0;
     0x0D0 Warning, 0x66, 14, Ecu, 100.0;

@@ -1,0 +1,239 @@
+//! The documents as a book that can be browsed: mdBook makes it of a copy of `docs/`.
+//!
+//! In the copy a block of mathematics is set for MathJax, and a link out of `docs/` leads to a copy of its file. What the
+//! book then links to has to be there.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::tool::{self, command, root, run};
+
+const MDBOOK: &str = "mdbook";
+const INSTALL: &str = "cargo install mdbook --version 0.5.4";
+/// Files from outside `docs/` that pages lead to, below the pages.
+const OUTSIDE: &str = "repository";
+
+/// Makes the book in `target/book/html`; an error names links that lead nowhere.
+pub(crate) fn build() -> Result<()> {
+    if !tool::exists(MDBOOK) {
+        return Err(tool::Usage(format!("mdbook is missing: {INSTALL}")).into());
+    }
+    let place = root().join("target/book");
+    if place.exists() {
+        fs::remove_dir_all(&place).with_context(|| place.display().to_string())?;
+    }
+    let pages = place.join("docs");
+    copy(&pages)?;
+    run(command(MDBOOK)
+        .args(["build", &pages.to_string_lossy(), "--dest-dir"])
+        .arg(place.join("html")))?;
+    let broken = broken_links(&place.join("html"))?;
+    for link in &broken {
+        eprintln!("{link}");
+    }
+    ensure!(broken.is_empty(), "{} links lead nowhere", broken.len());
+    println!("{}", place.join("html/index.html").display());
+    Ok(())
+}
+
+/// Copies `docs/`, and what its pages lead to outside of it.
+fn copy(to: &Path) -> Result<()> {
+    let docs = root().join("docs");
+    let mut outside = BTreeSet::new();
+    for file in files(&docs)? {
+        let name = file.strip_prefix(&docs)?;
+        let target = to.join(name);
+        fs::create_dir_all(target.parent().unwrap_or(to))?;
+        if file.extension() == Some(OsStr::new("md")) && !file.ends_with("SUMMARY.md") {
+            let folder = name.parent().unwrap_or(Path::new(""));
+            fs::write(target, page(&fs::read_to_string(&file)?, folder, &mut outside))?;
+        } else {
+            fs::copy(&file, target)?;
+        }
+    }
+    for name in outside {
+        let target = to.join(OUTSIDE).join(shown(&name));
+        fs::create_dir_all(target.parent().unwrap_or(to))?;
+        fs::copy(root().join(&name), target).with_context(|| name.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// All files of a folder and of those in it.
+fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.is_dir() {
+            found.extend(files(&path)?);
+        } else {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+/// A page as mdBook shows it; `folder` is its place in `docs/`. Adds the files outside that it leads to, by their names from the
+/// repository's root.
+fn page(text: &str, folder: &Path, outside: &mut BTreeSet<PathBuf>) -> String {
+    let mut lines = String::new();
+    let (mut inside, mut is_math) = (false, false);
+    for line in text.lines() {
+        let fence = line.trim_start().strip_prefix("```");
+        match fence {
+            Some("math") => {
+                (inside, is_math) = (true, true);
+                lines.push_str("<div>\n\\[");
+            }
+            Some(_) if is_math => {
+                (inside, is_math) = (false, false);
+                lines.push_str("\\]\n</div>");
+            }
+            Some(_) => {
+                inside = !inside;
+                lines.push_str(line);
+            }
+            None if inside => lines.push_str(line),
+            None => lines.push_str(&links(line, folder, outside)),
+        }
+        lines.push('\n');
+    }
+    lines
+}
+
+/// A line whose links out of `docs/` lead to the copies, and those to a README or the summary to where mdBook puts them.
+fn links(line: &str, folder: &Path, outside: &mut BTreeSet<PathBuf>) -> String {
+    let mut parts = line.split("](");
+    let mut text = parts.next().unwrap_or("").to_owned();
+    for part in parts {
+        text.push_str("](");
+        let link = part.split(')').next().unwrap_or("");
+        match name_outside(link, folder) {
+            Some(name) => {
+                let up = "../".repeat(folder.components().count());
+                text.push_str(&format!("{up}{OUTSIDE}/{}", shown(&name)));
+                text.push_str(part.strip_prefix(link).unwrap_or(""));
+                outside.insert(name);
+            }
+            None if link.contains(':') => text.push_str(part),
+            // So mdBook calls these two, and does not follow.
+            None => {
+                let part = part.replacen("README.md", "index.md", 1);
+                text.push_str(&part.replacen("SUMMARY.md", "toc.html", 1));
+            }
+        }
+    }
+    text
+}
+
+/// The name of a copy. mdBook leaves out Markdown that is no page.
+fn shown(name: &Path) -> String {
+    let is_markdown = name.extension() == Some(OsStr::new("md"));
+    let shown = if is_markdown {
+        name.with_extension("txt")
+    } else {
+        name.into()
+    };
+    shown.display().to_string()
+}
+
+/// The name from the repository's root of a file that is not in `docs/`.
+fn name_outside(link: &str, folder: &Path) -> Option<PathBuf> {
+    let link = link.split('#').next().unwrap_or(link);
+    if link.is_empty() || link.contains(':') {
+        return None;
+    }
+    let name = normal(&Path::new("docs").join(folder).join(link));
+    (!name.starts_with("docs")).then_some(name)
+}
+
+/// A path without `..`.
+fn normal(path: &Path) -> PathBuf {
+    let mut parts = PathBuf::new();
+    for part in path.components() {
+        if part == Component::ParentDir {
+            parts.pop();
+        } else {
+            parts.push(part);
+        }
+    }
+    parts
+}
+
+/// Links of the book's pages to a file or a heading that is not there.
+fn broken_links(html: &Path) -> Result<Vec<String>> {
+    let mut broken = Vec::new();
+    for file in files(html)? {
+        if file.extension() != Some(OsStr::new("html")) || file.ends_with("404.html") {
+            continue;
+        }
+        let text = fs::read_to_string(&file)?;
+        for link in values(&text, "href") {
+            if link.contains(':') {
+                continue;
+            }
+            let (name, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = match name {
+                "" => file.clone(),
+                _ => normal(&file.with_file_name("").join(name)),
+            };
+            let found = match anchor {
+                "" => target.is_file(),
+                _ => fs::read_to_string(&target).is_ok_and(|text| values(&text, "id").any(|id| id == anchor)),
+            };
+            if !found {
+                broken.push(format!("{}: {link}", file.display()));
+            }
+        }
+    }
+    Ok(broken)
+}
+
+/// Values of an attribute in a page.
+fn values<'a>(html: &'a str, attribute: &str) -> impl Iterator<Item = &'a str> {
+    let start = format!(" {attribute}=\"");
+    let after: Vec<&str> = html.split(start.as_str()).skip(1).collect();
+    after.into_iter().filter_map(|rest| rest.split('"').next())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page that is not in the summary is not in the book.
+    #[test]
+    fn the_summary_names_every_page() {
+        let docs = root().join("docs");
+        let summary = fs::read_to_string(docs.join("SUMMARY.md")).unwrap();
+        for file in files(&docs).unwrap() {
+            let name = file.strip_prefix(&docs).unwrap().to_string_lossy().into_owned();
+            let is_page = name.ends_with(".md") && name != "SUMMARY.md";
+            assert!(
+                !is_page || summary.contains(&format!("({name})")),
+                "docs/SUMMARY.md: no {name}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_link_out_of_the_documents_leads_to_a_copy() {
+        let mut outside = BTreeSet::new();
+        let text = "[a](../glossary.md#x) [b](../../core/haptic.dbc), `c`\n```sh\n[d](../../e)\n```\n";
+        let copied = page(text, Path::new("reference"), &mut outside);
+        assert_eq!(
+            copied,
+            text.replace("../../core/haptic.dbc", "../repository/core/haptic.dbc")
+        );
+        assert_eq!(outside, [PathBuf::from("core/haptic.dbc")].into());
+    }
+
+    #[test]
+    fn mathematics_is_set_by_the_browser() {
+        let copied = page("```math\na_1\n```\n", Path::new(""), &mut BTreeSet::new());
+        assert_eq!(copied, "<div>\n\\[\na_1\n\\]\n</div>\n");
+    }
+}
