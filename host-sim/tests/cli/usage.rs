@@ -30,7 +30,10 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
             &["reliance", "--amplitude", "9"],
             "--amplitude = 9 N.m is outside 0 to 0.3 N.m",
         ),
-        (&["validate", "--coverage", "--probe", "-1"], "--probe = -1 N.m"),
+        (
+            &["validate", "--coverage", "1", "--probe", "-1"],
+            "--probe = -1 N.m",
+        ),
         (
             &["experiment", "--participant", "0"],
             "'--participant <LIST>': 0 is outside 1 to 14",
