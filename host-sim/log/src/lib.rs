@@ -29,6 +29,8 @@ pub mod candump;
 mod event;
 #[cfg(feature = "formats")]
 pub mod formats;
+#[cfg(feature = "formats")]
+pub mod guard;
 pub mod recording;
 pub mod table;
 pub mod trace;

@@ -4,7 +4,6 @@
 mod nesting;
 mod pages;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -21,6 +20,7 @@ use serde_json::{Value, json};
 
 use self::pages::Pages;
 use super::bytes::Room;
+use crate::guard::guarded;
 use crate::recording::{Group, RecordingError, Series};
 
 const KEY: &str = "haptic.channels";
@@ -31,8 +31,7 @@ fn refuse(e: impl std::fmt::Display) -> RecordingError {
 
 pub(super) fn read(file: Vec<u8>) -> Result<Vec<Series>, RecordingError> {
     // The reader is safe code, but not written for files that lie.
-    catch_unwind(AssertUnwindSafe(|| columns(file.into())))
-        .unwrap_or_else(|_| Err(refuse("the file is damaged")))
+    guarded(|| columns(file.into())).unwrap_or_else(|| Err(refuse("the file is damaged")))
 }
 
 fn columns(file: Bytes) -> Result<Vec<Series>, RecordingError> {
