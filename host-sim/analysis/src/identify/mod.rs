@@ -11,6 +11,7 @@
 
 mod balance;
 mod bus_trace;
+mod change;
 mod diagnostics;
 mod drivers;
 mod lane;
@@ -30,6 +31,7 @@ mod wide;
 
 pub use balance::Balance;
 pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};
+pub use change::{Change, Constancy};
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use drivers::{Difference, Population, differences, population};
 pub use lane::LaneNoise;
