@@ -7,7 +7,8 @@ use serde::Serialize;
 /// How constant the driver of a record was.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Constancy {
-    /// The most that a change of one parameter at one instant adds to twice the log likelihood.
+    /// The most that a change of one parameter at one instant adds to twice the log likelihood, less where the scores scatter more
+    /// than the prediction errors say.
     pub deviance: f64,
     /// What that has to exceed before the driver is said to have changed.
     pub level: f64,

@@ -19,6 +19,7 @@ mod log;
 mod noise_model;
 mod options;
 mod paper;
+mod pieces;
 mod prepare;
 mod recording;
 mod result;
@@ -41,6 +42,7 @@ pub use noise_model::{
 };
 pub use options::{FixError, Options};
 pub use paper::{TABLE_4, identify as identify_as_published};
+pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Mapping, of_bytes, of_table, open as open_mapped};
 pub use result::{

@@ -264,7 +264,8 @@ pub(crate) fn of_changed_sensor(change: &Change, before: &Balance, after: &Balan
 }
 
 /// What no record of these columns can show.
-pub(crate) const ASSUMED: [&str; 4] = [
+pub(crate) const ASSUMED: [&str; 5] = [
+    "e_y_m and e_theta_rad have no offset that drifts",
     "e_y_m and e_theta_rad are not late: a late camera adds to t_p",
     "e_y_m and e_theta_rad are at scale: another scale divides gain_1, gain_2 or gain_3",
     "driver_torque_nm, guidance_torque_nm and the column have one scale: a scale that all share is not seen",

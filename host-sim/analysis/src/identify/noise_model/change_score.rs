@@ -242,38 +242,60 @@ impl Fitted<'_> {
         let drift = drift.filter(|d| d.1.deviance > step.deviance + BEYOND_STEP * wider);
         let (ends, found) = drift.copied().unwrap_or(([at, at], step));
         let enough = found.deviance - WITHIN_95 * wider;
+        let known: Vec<usize> = (0..steps.len()).filter(|&k| steps[k].is_some()).collect();
+        let ends_of_known = [
+            known.first().copied().unwrap_or(at),
+            known.last().copied().unwrap_or(at),
+        ];
         let within = |end: usize| {
-            let drifts = tried
-                .iter()
-                .filter(|_| drift.is_some())
-                .map(|(e, f)| (e[end], f.deviance));
-            let steps = steps.iter().enumerate().filter(|_| drift.is_none());
+            let drifts = tried.iter().map(|(ends, f)| (ends[end], f.deviance));
+            let steps = steps.iter().enumerate();
             let steps = steps.filter_map(|(k, s)| Some((k, (*s)?.deviance)));
             let near = drifts.chain(steps).filter(|x| x.1 >= enough).map(|x| x.0);
             let (low, high) = near.fold((ends[end], ends[end]), |(l, h), k| (l.min(k), h.max(k)));
-            [self.before(low), self.after(high)]
+            [
+                if low > ends_of_known[0] {
+                    self.before(low)
+                } else {
+                    self.blocks[0].from_s
+                },
+                if high < ends_of_known[1] {
+                    self.after(high)
+                } else {
+                    self.blocks[self.blocks.len() - 1].to_s
+                },
+            ]
         };
         Change {
             parameter,
-            at_s: ends.map(|k| self.blocks[k].from_s),
+            at_s: ends.map(|k| self.instant(k)),
             at_95_s: [within(0), within(1)],
             by: found.by,
-            deviance: found.deviance / wider,
+            deviance: found.deviance,
         }
     }
 
-    /// The earliest instant that a change at the beginning of this block may stand for, s: half a block before, or the end of
-    /// the stretch before.
+    /// The end of the block before, and the beginning of this one, s: they differ where rows were left out.
+    fn between(&self, k: usize) -> [f64; 2] {
+        let begin = self.blocks[k].from_s;
+        let end = k.checked_sub(1).map_or(begin, |k| self.blocks[k].to_s);
+        [end.min(begin), begin]
+    }
+
+    /// The instant of a change at the beginning of this block, s.
+    fn instant(&self, k: usize) -> f64 {
+        let [from, to] = self.between(k);
+        0.5 * (from + to)
+    }
+
+    /// The earliest instant that it may stand for, s.
     fn before(&self, k: usize) -> f64 {
-        let earlier = k
-            .checked_sub(1)
-            .map_or(self.blocks[k].from_s, |k| self.blocks[k].to_s);
-        earlier.min(self.blocks[k].from_s) - 0.5 * BLOCK_S
+        self.between(k)[0] - 0.5 * BLOCK_S
     }
 
     /// The latest one, s.
     fn after(&self, k: usize) -> f64 {
-        self.blocks[k].from_s + 0.5 * BLOCK_S
+        self.between(k)[1] + 0.5 * BLOCK_S
     }
 }
 

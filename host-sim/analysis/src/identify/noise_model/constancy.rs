@@ -66,10 +66,9 @@ impl Problem<'_> {
         best
     }
 
-    /// What the torques on the column say of the sensors before and after a change.
+    /// What the torques on the column say of the sensors before and after the middle of a change.
     pub(super) fn changed_sensor(&self, change: &Change, manual: bool) -> Option<Refutation> {
-        let within = change.within_s();
-        let row = |s: f64| ((s - self.log.start_s) / self.log.dt_s).max(0.0) as usize;
+        let middle_s = 0.5 * (change.at_s[0] + change.at_s[1]);
         let side = |rows: Range<usize>| {
             let cut = |s: &Range<usize>| s.start.max(rows.start)..s.end.min(rows.end);
             let stretches: Vec<Range<usize>> = self
@@ -80,7 +79,8 @@ impl Problem<'_> {
                 .collect();
             balance(self.log, &stretches, manual)
         };
-        let sides = [side(0..row(within[0])), side(row(within[1])..self.log.len())];
+        let middle = ((middle_s - self.log.start_s) / self.log.dt_s).max(0.0) as usize;
+        let sides = [side(0..middle), side(middle..self.log.len())];
         let [Some(before), Some(after)] = sides else {
             return None;
         };
