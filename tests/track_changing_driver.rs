@@ -33,6 +33,10 @@ impl Noise {
 }
 
 fn changing_driver() -> DriveLog {
+    driver_of(K_HG)
+}
+
+fn driver_of(k_hg_before_and_after: [f64; 2]) -> DriveLog {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/driver-logs/guided-probe.csv");
     let mut log = DriveLog::open(&path, false).unwrap();
     let dt = log.dt_s / 10.0;
@@ -58,7 +62,7 @@ fn changing_driver() -> DriveLog {
                 + GAIN[1] * at(&integral, seen)
                 + GAIN[2] * at(&log.e_theta_rad, seen)
                 - at(&log.wheel_angle_rad, t);
-            let k_hg = K_HG[usize::from(k >= STEP)];
+            let k_hg = k_hg_before_and_after[usize::from(k >= STEP)];
             arm += dt / 0.1 * (target - k_hg * log.guidance_torque_nm[k] - arm);
         }
     }
@@ -122,4 +126,52 @@ fn the_constant_driver_of_a_changing_one_is_in_between() {
         .optimum
         .unwrap();
     assert!(K_HG[0] + 0.1 < k_hg && k_hg < K_HG[1] - 0.1, "{k_hg}");
+}
+
+/// A driver who changed is refuted with the instant and the size of the change; one who did not is not.
+#[test]
+fn a_changed_driver_is_refuted_with_the_instant() {
+    let log = changing_driver();
+    let found = identify_with_noise_model(&log, &Options::default());
+    let change = found.constancy.unwrap().change.unwrap();
+    let truth_s = log.time_s(STEP);
+    assert_eq!(change.parameter, "k_hg");
+    assert!((change.at_s[0] - truth_s).abs() < 5.0, "{change}");
+    assert!(
+        change.within_s()[0] < truth_s && truth_s < change.within_s()[1],
+        "{change}"
+    );
+    assert!((change.by - 0.7).abs() < 0.1, "{change}");
+    let [only] = &found.refuted[..] else {
+        panic!("{:?}", found.refuted)
+    };
+    assert!(only.cause.starts_with("the driver changed at 11"), "{only:?}");
+    assert!(only.cure.contains("--pieces"), "{only:?}");
+    assert!(found.parameters.list().iter().all(|p| !p.2.identified));
+    let constant = identify_with_noise_model(&driver_of([0.8; 2]), &Options::default());
+    assert!(constant.refuted.is_empty(), "{:?}", constant.refuted);
+    assert!(constant.parameters.k_hg.identified);
+}
+
+/// A driver of this kind whose torque sensor loses half of its scale is no driver who changed.
+#[test]
+fn a_torque_sensor_that_changes_is_named_as_one() {
+    let mut log = driver_of([0.8; 2]);
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/driver-logs/guided-probe.csv");
+    let whole = DriveLog::open(&path, false).unwrap();
+    // The recorded driver's own torque, for it moved the column.
+    log.driver_torque_nm = whole.driver_torque_nm;
+    for torque in &mut log.driver_torque_nm[STEP..] {
+        *torque *= 0.5;
+    }
+    let found = identify_with_noise_model(&log, &Options::default());
+    assert!(!found.refuted.is_empty());
+    for refutation in &found.refuted {
+        assert!(!refutation.cause.contains("driver changed"), "{refutation:?}");
+    }
+    assert!(
+        found.refuted[0].cause.contains("driver_torque_nm"),
+        "{:?}",
+        found.refuted
+    );
 }

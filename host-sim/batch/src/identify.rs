@@ -7,9 +7,9 @@ use super::RunRecord;
 use super::experiment::identified_driver;
 use super::record::default_window;
 use haptic_analysis::identify::{
-    Difference, DriveLog, FixError, Identification, Options, Population, SingleTrack, Tracking, differences,
-    identify_and_track, identify_as_published, identify_together_and_track, identify_with_noise_model,
-    population, track,
+    Difference, DriveLog, FixError, Identification, Options, Pieces, Population, SingleTrack, Tracking,
+    differences, identify_and_track, identify_as_published, identify_in_pieces, identify_together_and_track,
+    identify_with_noise_model, population, track,
 };
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Scenario};
@@ -57,6 +57,9 @@ pub struct IdentificationResults {
     /// The identification.
     #[serde(flatten)]
     pub identification: Identification,
+    /// The driver of each piece, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pieces: Option<Pieces>,
     /// The identified driver on the course asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drives_again: Option<RunRecord>,
@@ -84,9 +87,20 @@ pub fn identify(
         tracking,
         results: IdentificationResults {
             identification,
+            pieces: None,
             drives_again: None,
         },
     })
+}
+
+/// Identifies the driver of `log` as of one driver, and of each piece between two changes.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_pieces(name: &str, log: &DriveLog, options: &Options) -> Result<IdentifiedDrive, FixError> {
+    let mut drive = identify(name, log, options, Method::NoiseModel)?;
+    drive.results.pieces = Some(identify_in_pieces(log, options));
+    Ok(drive)
 }
 
 /// One driver in several drives, in one fit.
@@ -101,6 +115,7 @@ pub fn identify_several(name: &str, logs: &[DriveLog], options: &Options) -> Res
         tracking,
         results: IdentificationResults {
             identification,
+            pieces: None,
             drives_again: None,
         },
     })

@@ -439,6 +439,13 @@ impl<G: Guidance> Simulation<G> {
         })
     }
 
+    /// From the next step on the driver is that of another scenario in weights, delay and gains of the arm. Muscle, remnant
+    /// and look-ahead stay what they were.
+    pub fn change_driver(&mut self, to: &Scenario) {
+        self.plan.relying = relying(to);
+        self.vision.change(to.driver());
+    }
+
     /// How the run ended, if it has.
     pub fn ending(&self) -> Option<Ending> {
         self.ending
@@ -490,7 +497,7 @@ impl Plan {
             speed: scenario.changes_speed().then(|| scenario.speed_profile().clone()),
             ahead_s: [scenario.longest_look_ahead_s(), driver.t_f],
             duration_s: scenario.duration_s(),
-            relying: transition(scenario.gains()),
+            relying: relying(scenario),
             manual: transition(scenario.manual_gains()),
             changed: scenario
                 .driver_change()
@@ -539,6 +546,17 @@ impl Plan {
             _ => &self.relying,
         }
     }
+}
+
+/// How the arm of a driver moves who has guidance.
+fn relying(scenario: &Scenario) -> Transition {
+    let vehicle = &scenario.car().vehicle;
+    Transition::new(
+        scenario.speed_m_per_s(),
+        vehicle,
+        scenario.driver(),
+        scenario.gains(),
+    )
 }
 
 /// The sensors of a world that is not the paper's.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use haptic_analysis::identify::Options;
-use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_several};
-use haptic_report::studies::identify as files;
+use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_pieces, identify_several};
+use haptic_report::studies::{identify as files, pieces};
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
@@ -25,6 +25,9 @@ pub(super) struct Arguments {
     /// missing
     #[arg(long)]
     manual: bool,
+    /// Find when the driver changed, and fit each stretch between two changes as a driver of its own
+    #[arg(long, conflicts_with = "also")]
+    pieces: bool,
     /// Prediction errors with a disturbance model, or the published way
     #[arg(long, value_enum, default_value_t = MethodArgument::NoiseModel)]
     method: MethodArgument,
@@ -90,7 +93,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let output = Output::begin(&arguments.out, "identify")?;
     let (log, converted) = arguments.recording.open(arguments.manual, &options.stretches)?;
     let name = arguments.recording.log.display().to_string();
-    let mut drive = if arguments.also.is_empty() {
+    let mut drive = if arguments.pieces {
+        if method == Method::Paper {
+            return Err("--pieces: the published method has none".into());
+        }
+        identify_pieces(&name, &log, &options)?
+    } else if arguments.also.is_empty() {
         identify(&name, &log, &options, method)?
     } else {
         if method == Method::Paper {
@@ -140,6 +148,9 @@ fn readable(drive: &IdentifiedDrive) -> String {
         text.push_str(&format!("\n{sentence}"));
     }
     text.push('\n');
+    for table in drive.results.pieces.iter().flat_map(pieces::tables) {
+        text.push_str(&format!("\n{}", table.to_text()));
+    }
     if let Some(in_the_log) = files::in_the_log(found) {
         text.insert_str(0, &format!("{}\n", in_the_log.to_text()));
     }

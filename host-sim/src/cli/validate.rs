@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use haptic_batch::experiment::{POPULATION, Plan, corruptions, methods, repeat};
+use haptic_batch::experiment::{POPULATION, Plan, changes, corruptions, methods, repeat};
 use haptic_report::studies::validation::Validation;
 
 use super::output::Output;
@@ -22,12 +22,17 @@ pub(super) struct Arguments {
     /// if lane noise costs too much
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     corruptions: Option<u32>,
+    /// Let N drives of each participant hold a change of the driver (steps and drifts of K_hg, K_d and t_p) or of something else, one
+    /// kind after the other: is it seen, when, and is a value called identified that is false? Exit code 1 if more than 1 of
+    /// 1,000 is, if an instant of ten is missed by 5 s, or if a constant driver is said to have changed in more than 2 %
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
+    changes: Option<u32>,
     /// Put more and more camera noise on N drives of each participant, and compare the ways to treat it (none, a plain
     /// smoother, the default, the published method) with the information bound
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     methods: Option<u32>,
-    /// Of --corruptions: only those whose name holds this
-    #[arg(long, value_name = "TEXT", default_value = "", requires = "corruptions")]
+    /// Of --corruptions and --changes: only those whose name holds this
+    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods"])]
     only: String,
     #[command(flatten)]
     participants: Participants,
@@ -56,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .iter()
         .filter(|(name, _)| name.contains(&arguments.only));
     let ways = ways.count() as u64;
-    if ways == 0 {
+    if ways == 0 && arguments.changes.is_none() {
         let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
         return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
     }
@@ -69,6 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .coverage
         .or(arguments.corruptions)
         .or(arguments.methods)
+        .or(arguments.changes)
         .unwrap_or(1);
     let fits = if arguments.corruptions.is_some() { ways } else { 1 };
     let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
@@ -78,6 +84,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Validation::Coverage(repeat(&plan, seeds, done)?)
     } else if arguments.corruptions.is_some() {
         Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, done)?))
+    } else if arguments.changes.is_some() {
+        Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, done)?))
     } else {
         Validation::Methods(methods(&plan, seeds, done)?)
     };

@@ -11,6 +11,7 @@
 
 mod balance;
 mod bus_trace;
+mod change;
 mod diagnostics;
 mod drivers;
 mod lane;
@@ -18,6 +19,7 @@ mod log;
 mod noise_model;
 mod options;
 mod paper;
+mod pieces;
 mod prepare;
 mod recording;
 mod result;
@@ -30,6 +32,7 @@ mod wide;
 
 pub use balance::Balance;
 pub use bus_trace::{HAPTIC_DBC, Recording, SingleTrack, open_recording, open_recording_with};
+pub use change::{Change, Constancy};
 pub use diagnostics::{autocorrelation, fit_percent};
 pub use drivers::{Difference, Population, differences, population};
 pub use lane::LaneNoise;
@@ -39,6 +42,7 @@ pub use noise_model::{
 };
 pub use options::{FixError, Options};
 pub use paper::{TABLE_4, identify as identify_as_published};
+pub use pieces::{Piece, Pieces, identify_in_pieces};
 pub use prepare::{ColumnFaults, LeftOut, Preflight, Reason};
 pub use recording::{Mapping, of_bytes, of_table, open as open_mapped};
 pub use result::{

@@ -239,6 +239,7 @@ impl<'a> Problem<'a> {
             input_correlation: diagnostics::input_correlation(&residual, &inputs, self.log.dt_s),
             preflight: None,
             balance: None,
+            constancy: None,
             delay_profile: Vec::new(),
             refuted: Vec::new(),
             assumed: Vec::new(),

@@ -17,10 +17,11 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::balance::Balance;
+use super::change::{Change, Constancy};
 use super::prepare::Preflight;
 use super::search::{Bounds, Termination};
 use super::signals::Muscle;
-use super::verdict::Refutation;
+use super::verdict::{Refutation, SAME_DRIVER};
 
 /// One parameter of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -341,6 +342,8 @@ pub struct Identification {
     pub preflight: Option<Preflight>,
     /// The torques on the column against its motion.
     pub balance: Option<Balance>,
+    /// Whether the driver was the same throughout; none for the published method, which does not ask.
+    pub constancy: Option<Constancy>,
     /// The loss over t_p with all else at its best, as minus twice the log likelihood above the optimum.
     pub delay_profile: Vec<[f64; 2]>,
     /// What is usually taken as known and was estimated: k_nms, t_nms, t_h_late, t_d_late.
@@ -365,6 +368,12 @@ pub struct Identification {
 }
 
 impl Identification {
+    /// How the driver changed, if that is what refutes one driver.
+    pub fn changed(&self) -> Option<&Change> {
+        let refuted = self.refuted.iter().any(|r| r.assumption == SAME_DRIVER);
+        self.constancy.as_ref()?.change.as_ref().filter(|_| refuted)
+    }
+
     /// The muscle that the estimate rests on: `assumed`, with what was estimated of it in its place.
     pub fn muscle(&self, assumed: Muscle) -> Muscle {
         let found = |name: &str| {

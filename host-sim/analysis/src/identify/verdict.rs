@@ -8,6 +8,7 @@
 use serde::Serialize;
 
 use super::balance::Balance;
+use super::change::Change;
 use super::result::{InputCorrelation, Whiteness};
 
 /// An assumption that the record refutes.
@@ -43,6 +44,9 @@ const ALL_BUT_PERFECT: f64 = 98.0;
 
 /// The assumption that a swapped sign refutes.
 pub(crate) const SIGNS: &str = "all torques and angles are positive to the left";
+
+/// The assumption that a driver who changed refutes.
+pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
 
 /// What the balance of torques on the column refutes.
 #[expect(
@@ -149,19 +153,19 @@ pub(crate) fn of_balance(b: &Balance) -> Vec<Refutation> {
     out
 }
 
-/// What the residuals refute.
+/// What the residuals refute, each with what it adds to twice the log likelihood.
 pub(crate) fn of_residuals(
     fit_percent: f64,
     white: &Whiteness,
     inputs: &[InputCorrelation],
     unexplained_autocorrelation: f64,
-) -> Vec<Refutation> {
+) -> Vec<(f64, Refutation)> {
     let mut out = Vec::new();
     if fit_percent > ALL_BUT_PERFECT {
         return out;
     }
     if white.p_value < 1e-6 && unexplained_autocorrelation.abs() > WHITE_ENOUGH {
-        out.push(Refutation {
+        let refutation = Refutation {
             assumption: "the disturbance is a low-passed remnant and white sensor noise",
             evidence: format!(
                 "the prediction errors are not white: autocorrelation {unexplained_autocorrelation:.3}{}",
@@ -174,10 +178,11 @@ pub(crate) fn of_residuals(
             cause: "a part of the drive is no driving, a sensor filters, or the driver is another one"
                 .to_owned(),
             cure: "look at the residuals over time; leave out stretches with --from and --to".to_owned(),
-        });
+        };
+        out.push((white.statistic, refutation));
     }
     for test in inputs.iter().filter(|i| i.largest_z.abs() > INDEPENDENT_ENOUGH) {
-        out.push(Refutation {
+        let refutation = Refutation {
             assumption: "the driver reacts to the inputs as equations (7) and (8) say",
             evidence: format!(
                 "the prediction errors hold more of {}: {:.1} standard deviations",
@@ -188,13 +193,79 @@ pub(crate) fn of_residuals(
                 test.input
             ),
             cure: "--estimate t_nms, k_nms, t_h_late or t_d_late".to_owned(),
-        });
+        };
+        out.push((test.largest_z.powi(2), refutation));
     }
     out
 }
 
+/// What a driver who changed refutes.
+pub(crate) fn of_change(change: &Change) -> Refutation {
+    let [from, to] = change.at_s;
+    let when = if change.is_drift() {
+        format!("from {from:.0} to {to:.0} s")
+    } else {
+        format!("at {from:.0} s")
+    };
+    let cause = match change.parameter {
+        "k_d" => format!("the driver changed {when}, or the scale of the lane signals did"),
+        _ => format!("the driver changed {when}"),
+    };
+    Refutation {
+        assumption: SAME_DRIVER,
+        evidence: evidence_of(change),
+        cause,
+        cure: cure_of(change),
+    }
+}
+
+fn evidence_of(change: &Change) -> String {
+    format!(
+        "{change}; that adds {:.0} to twice the log likelihood",
+        change.deviance
+    )
+}
+
+fn cure_of(change: &Change) -> String {
+    let [from, to] = change.within_s();
+    format!("--pieces, or one part alone: --to {from:.0}, or --from {to:.0}")
+}
+
+/// A change that the balance of torques shows in the sensors, from the one before and the one after it.
+pub(crate) fn of_changed_sensor(change: &Change, before: &Balance, after: &Balance) -> Option<Refutation> {
+    if before.explained.min(after.explained) < BALANCE_SEEN {
+        return None;
+    }
+    let moved = |[was, error_was]: [f64; 2], [is, error]: [f64; 2]| {
+        let sure = (is - was).abs() > CERTAIN * error.hypot(error_was);
+        (sure && (is / was - 1.0).abs() > SMALL_SCALE).then(|| is / was)
+    };
+    let refutation = |what: &str, how: String| Refutation {
+        assumption: "the sensors are the same throughout",
+        evidence: format!("{}, and there {how}", evidence_of(change)),
+        cause: format!("{what} changed at {:.0} s", change.at_s[0]),
+        cure: cure_of(change).replace("--pieces, or ", ""),
+    };
+    if let Some((was, is)) = before.scale.zip(after.scale)
+        && let Some(factor) = moved(was, is)
+    {
+        let how = format!("driver_torque_nm goes to {factor:.3} times its scale against guidance_torque_nm");
+        return Some(refutation(
+            "the scale of driver_torque_nm or guidance_torque_nm",
+            how,
+        ));
+    }
+    let factor = moved(before.stiffness, after.stiffness)?;
+    let how = format!("the column's torque goes to {factor:.3} times that of the same wheel angle");
+    Some(refutation(
+        "the scale of wheel_angle_rad or driver_torque_nm",
+        how,
+    ))
+}
+
 /// What no record of these columns can show.
-pub(crate) const ASSUMED: [&str; 4] = [
+pub(crate) const ASSUMED: [&str; 5] = [
+    "e_y_m and e_theta_rad have no offset that drifts",
     "e_y_m and e_theta_rad are not late: a late camera adds to t_p",
     "e_y_m and e_theta_rad are at scale: another scale divides gain_1, gain_2 or gain_3",
     "driver_torque_nm, guidance_torque_nm and the column have one scale: a scale that all share is not seen",

@@ -6,6 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
 use super::Plan;
+use super::PublishedDriver;
+use super::kinds::{Drawn, Kind};
 
 /// One way to corrupt a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,10 +48,12 @@ pub enum Corruption {
     SumOfTorques,
     /// The driver's t_nms, s, where 0.1 is assumed.
     OtherMuscle(f64),
+    /// The driver changes.
+    Driver(Kind),
 }
 
 /// The ways of the population with their names: each alone, then mixtures.
-pub const POPULATION: [(&str, &[Corruption]); 29] = [
+pub const POPULATION: [(&str, &[Corruption]); 34] = [
     ("clean", &[]),
     ("one e_theta sample off by 0.05 rad", &[Corruption::Outlier]),
     (
@@ -124,12 +128,46 @@ pub const POPULATION: [(&str, &[Corruption]); 29] = [
             Corruption::OtherMuscle(0.15),
         ],
     ),
+    ("K_hg steps by 0.5", &[Corruption::Driver(Kind::KHgSteps(0.5))]),
+    (
+        "K_hg drifts by 0.5 in 60 s",
+        &[Corruption::Driver(Kind::KHgDrifts(0.5))],
+    ),
+    ("K_d steps by half", &[Corruption::Driver(Kind::KDSteps)]),
+    (
+        "t_p steps from 0.1 to 0.3 s",
+        &[Corruption::Driver(Kind::TPSteps)],
+    ),
+    (
+        "noise 10 mm, K_hg steps by 0.5",
+        &[
+            Corruption::LaneNoise(1e-2, 1e-3, 1),
+            Corruption::Driver(Kind::KHgSteps(0.5)),
+        ],
+    ),
 ];
+
+/// The drive in which the driver changes, if one of the ways is that; the same for the same plan and participant.
+pub(super) fn changing(
+    ways: &[Corruption],
+    truth: &PublishedDriver,
+    plan: &Plan,
+    number: u32,
+) -> Option<Drawn> {
+    let mut random = random_of(plan, number);
+    ways.iter().find_map(|way| match way {
+        Corruption::Driver(kind) => Some(kind.drawn(truth, &mut random)),
+        _ => None,
+    })
+}
+
+fn random_of(plan: &Plan, number: u32) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)))
+}
 
 /// `log` as these ways leave it; the same for the same plan and participant.
 pub(super) fn corrupted_log(log: &DriveLog, ways: &[Corruption], plan: &Plan, number: u32) -> DriveLog {
-    let mut random =
-        Xoshiro256PlusPlus::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)));
+    let mut random = random_of(plan, number);
     let mut log = log.clone();
     for way in ways {
         corrupt(&mut log, *way, &mut random);
@@ -203,7 +241,7 @@ fn corrupt(log: &mut DriveLog, way: Corruption, random: &mut Xoshiro256PlusPlus)
             }
         }
         // Not in the log: in what is said of it, or in the driver.
-        Corruption::CalledManual | Corruption::OtherMuscle(_) => {}
+        Corruption::CalledManual | Corruption::OtherMuscle(_) | Corruption::Driver(_) => {}
     }
 }
 

@@ -9,7 +9,8 @@ use haptic_analysis::identify::{DriveLog, Identification, Options, Traces, ident
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::corruption::{Corruption, POPULATION, corrupted_log};
+use super::changing::driver_at;
+use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
 use super::drives::driven_by;
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
 use super::{Plan, PublishedDriver, chosen};
@@ -29,7 +30,7 @@ impl Held {
         (self.identified > 0).then(|| self.held as f64 / self.identified as f64)
     }
 
-    fn of<'a>(values: impl Iterator<Item = &'a Compared>) -> Self {
+    pub(super) fn of<'a>(values: impl Iterator<Item = &'a Compared>) -> Self {
         values
             .filter(|v| v.1.identified)
             .fold(Self::default(), |sum, v| Self {
@@ -96,7 +97,7 @@ pub struct Corruptions {
     pub identified: usize,
     /// False identifications in all.
     pub false_identifications: usize,
-    /// 95 % intervals in all, by parameter as in the lines.
+    /// 95 % intervals in all, by parameter as in the lines, but of drivers who change: these have no one truth.
     pub intervals: [Held; COMPARED],
     /// The same of the drivers whose t_nms is what is assumed. Intervals hold arms of all kinds 95 times in 100, those at
     /// the edge of the range of arms less often.
@@ -138,6 +139,7 @@ pub fn corruptions(
             let mut clean: Vec<(f64, DriveLog)> = Vec::new();
             let mut fits = Vec::with_capacity(ways.len());
             for (_, ways) in &ways {
+                let changing = changing(ways, &truth, &plan, number);
                 let mut driver = truth.parameters();
                 for way in *ways {
                     if let Corruption::OtherMuscle(t_nms) = way {
@@ -150,14 +152,35 @@ pub fn corruptions(
                 let Some((_, log)) = clean.iter().find(|c| c.0 == driver.t_nms) else {
                     unreachable!("it was driven")
                 };
-                let log = corrupted_log(log, ways, &plan, number);
+                let changed = changing
+                    .as_ref()
+                    .map(|drawn| drawn.log(&plan, number))
+                    .transpose()?;
+                let log = corrupted_log(changed.as_ref().unwrap_or(log), ways, &plan, number);
                 let options = Options {
                     manual: ways.contains(&Corruption::CalledManual),
                     ..Options::default()
                 };
                 let mut fit = identify_with_noise_model(&log, &options);
                 fit.traces = Traces::default();
-                fits.push((compared(&truth, &fit.parameters), fit));
+                let mut values = compared(&truth, &fit.parameters);
+                if let Some(drawn) = changing {
+                    // Nobody has one value throughout: held against the one before or the one after, whichever is nearer.
+                    let ends = [
+                        drawn.first,
+                        driver_at(&drawn.first, &drawn.changes, f64::INFINITY),
+                    ];
+                    let [before, after] = ends.map(|driver| compared(&driver, &fit.parameters));
+                    let miss = |v: &Compared| (v.1.optimum.unwrap_or(v.2) - v.2).abs();
+                    values = std::array::from_fn(|i| {
+                        if miss(&before[i]) < miss(&after[i]) {
+                            before[i]
+                        } else {
+                            after[i]
+                        }
+                    });
+                }
+                fits.push((values, fit));
                 done();
             }
             let bound = clean.first().map(|(_, log)| bound_of(log, &truth));
@@ -181,7 +204,7 @@ pub fn corruptions(
 }
 
 /// How far from the truth a value may be without being wrong.
-fn tolerance(parameter: &str, truth: f64) -> f64 {
+pub(super) fn tolerance(parameter: &str, truth: f64) -> f64 {
     match parameter {
         "t_p" => 0.015,
         "k_hg" => 0.05,
@@ -261,11 +284,16 @@ impl Corruptions {
             };
             std::array::from_fn(of)
         };
-        let other_muscle = |l: &CorruptionLine| {
+        let has = |l: &CorruptionLine, wanted: &dyn Fn(&Corruption) -> bool| {
             let way = POPULATION.iter().find(|(name, _)| *name == l.corrupted_by);
-            way.is_some_and(|(_, ways)| ways.iter().any(|w| matches!(w, Corruption::OtherMuscle(_))))
+            way.is_some_and(|(_, ways)| ways.iter().any(wanted))
         };
-        let (intervals, intervals_at_t_nms) = (together(&|_| true), together(&|l| !other_muscle(l)));
+        let other_muscle = |l: &CorruptionLine| has(l, &|w| matches!(w, Corruption::OtherMuscle(_)));
+        let changes = |l: &CorruptionLine| has(l, &|w| matches!(w, Corruption::Driver(_)));
+        let (intervals, intervals_at_t_nms) = (
+            together(&|l| !changes(l)),
+            together(&|l| !other_muscle(l) && !changes(l)),
+        );
         let line = |name: &str| lines.iter().find(|l| l.corrupted_by == name);
         if let (Some(clean), Some(noisy)) = (line("clean"), line("lane noise 10 mm, 1 mrad")) {
             if noisy.k_hg_read * 14 < 13 * noisy.drives {

@@ -12,9 +12,12 @@
 //!
 //! Not here: the estimators (`identify`), tables and figures (`experiment_files`), options (the command line).
 
+mod changes;
+mod changing;
 mod corruption;
 mod corruptions;
 mod drives;
+mod kinds;
 mod methods;
 mod recorder;
 mod repetitions;
@@ -22,8 +25,11 @@ mod repetitions;
 use rayon::prelude::*;
 use serde::Serialize;
 
+pub use changes::{Changes, ChangesLine, changes};
+pub use changing::{Changed, DriverChanges, driver_at};
 pub use corruption::{Corruption, POPULATION};
 pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
+pub use kinds::{KINDS, Kind};
 pub use methods::{METHODS, MethodLine, Methods, methods};
 pub use recorder::Recorder;
 pub use repetitions::{Repeated, Repetitions, repeat};

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::OutputError;
 use super::files::{write_figure, write_report};
+use super::pieces;
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
 use haptic_analysis::identify::{History, Identification, Reason, autocorrelation};
@@ -31,6 +32,7 @@ pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputErro
     let where_known = [
         ("delay_profile", delay_profile(found)),
         ("intervals", intervals(found)),
+        ("pieces", pieces::figure(drive)),
     ];
     let known = where_known
         .iter()
@@ -302,10 +304,10 @@ fn verdict_blocks(
     verdict
 }
 
-fn report(drive: &IdentifiedDrive, always: [Figure; 4], where_known: [Option<Figure>; 2]) -> Report {
+fn report(drive: &IdentifiedDrive, always: [Figure; 4], where_known: [Option<Figure>; 3]) -> Report {
     let found = &drive.results.identification;
     let [torque, residuals, correlogram, over_time] = always;
-    let [delay_profile, intervals] = where_known;
+    let [delay_profile, intervals, in_pieces] = where_known;
     let verdict = verdict_blocks(found, delay_profile, intervals);
     let mut sections: Vec<Section> = in_the_log(found)
         .map(|table| Section {
@@ -348,6 +350,17 @@ fn report(drive: &IdentifiedDrive, always: [Figure; 4], where_known: [Option<Fig
             )],
         },
     ]);
+    if let Some((pieces, picture)) = drive.results.pieces.as_ref().zip(in_pieces) {
+        let mut blocks = vec![figure(picture, pieces::CAPTION)];
+        blocks.extend(pieces::tables(pieces).into_iter().map(Block::Table));
+        sections.insert(
+            0,
+            Section {
+                heading: "Pieces".into(),
+                blocks,
+            },
+        );
+    }
     if let Some(again) = drives_again(drive) {
         sections.push(Section {
             heading: "The identified driver on the course".into(),

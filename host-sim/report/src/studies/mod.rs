@@ -3,6 +3,7 @@
 
 pub mod availability;
 pub mod bus;
+mod changes;
 pub mod course;
 mod curves;
 pub mod design;
@@ -13,6 +14,7 @@ pub mod faults;
 mod files;
 pub mod handover;
 pub mod identify;
+pub mod pieces;
 pub mod reliance;
 pub mod run;
 pub mod stability;

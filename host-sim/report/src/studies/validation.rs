@@ -5,14 +5,15 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::OutputError;
+use super::changes;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::experiment::{
-    CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
+    Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
 };
 
-/// One of the three questions that the validation asks, answered.
+/// One of the four questions that the validation asks, answered.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Validation {
@@ -20,6 +21,8 @@ pub enum Validation {
     Coverage(Repetitions),
     /// Is anything wrong called identified on corrupted logs?
     Corruptions(Box<Corruptions>),
+    /// Is a driver who changes seen, when, and is anybody called identified who was not there?
+    Changes(Box<Changes>),
     /// What is each way to treat camera noise worth?
     Methods(Methods),
 }
@@ -35,6 +38,7 @@ impl Validation {
         match self {
             Self::Coverage(result) => off_coverage(result),
             Self::Corruptions(result) => result.broken.clone(),
+            Self::Changes(result) => result.broken.clone(),
             Self::Methods(_) => Vec::new(),
         }
     }
@@ -62,6 +66,11 @@ impl Validation {
                 r.identified,
                 r.bound.map(|b| format!("{b:.4}")).join(", ")
             ),
+            Self::Changes(r) => format!(
+                "{}. {}",
+                rests_on(r.drives, &r.participants, r.probe_nm, r.seed),
+                changes::summary(r)
+            ),
             Self::Methods(r) => format!("{}.", rests_on(r.seeds, &r.participants, r.probe_nm, r.seed)),
         }
     }
@@ -71,6 +80,7 @@ impl Validation {
         match self {
             Self::Coverage(result) => vec![repetitions_table(result)],
             Self::Corruptions(result) => vec![corruptions_table(result), held_table(result)],
+            Self::Changes(result) => vec![changes::table(result)],
             Self::Methods(result) => vec![methods_table(&result.lines)],
         }
     }
@@ -92,6 +102,12 @@ impl Validation {
                 "What is identified from corrupted logs?",
                 "By corruption: how many of the values are called identified, and how many of their 95 % intervals hold the \
                  truth.",
+            ),
+            Self::Changes(_) => (
+                "changes",
+                "Is a driver who changes seen?",
+                "By what changes: drives whose driver is said to have changed, and the 95 % intervals of identified values that hold \
+                 the truth, in whole drives and in pieces.",
             ),
             Self::Methods(_) => (
                 "methods",
@@ -126,13 +142,14 @@ impl Validation {
         match self {
             Self::Coverage(result) => coverage_figure(result),
             Self::Corruptions(result) => corruptions_figure(result),
+            Self::Changes(result) => changes::figure(result),
             Self::Methods(result) => methods_figure(&result.lines),
         }
     }
 }
 
 /// Place of a row in a figure of rows.
-fn place(row: usize) -> f64 {
+pub(super) fn place(row: usize) -> f64 {
     row as f64 + 1.0
 }
 

@@ -112,6 +112,12 @@ impl Vision {
         }
     }
 
+    /// From here on with the weights and the delay of other parameters; what was seen stays seen.
+    pub fn change(&mut self, to: &DriverParameters) {
+        (self.a_1, self.a_2, self.a_3) = (to.a_1, to.a_2, to.a_3);
+        self.delay.change(to.t_p);
+    }
+
     /// Takes the errors of this step; returns phi_target at the end of the step, rad.
     #[inline]
     pub fn step(&mut self, e_y_m: f64, e_theta_rad: f64) -> f64 {
@@ -146,6 +152,19 @@ impl Delay {
             whole,
             fraction: steps - steps.floor(),
         }
+    }
+
+    /// From here on by another time. What lies farther back than was kept is the oldest that was.
+    fn change(&mut self, delay_s: f64) {
+        let mut other = Self::new(delay_s);
+        let oldest = self.ring.len();
+        for back in 1..=other.ring.len() {
+            let value = self.ring[self.next.wrapping_sub(back.min(oldest)) & self.mask];
+            let place = self.next.wrapping_sub(back) & other.mask;
+            other.ring[place] = value;
+        }
+        other.next = self.next;
+        *self = other;
     }
 
     /// Takes the input at this step, returns the output one step later: so a delay of one step returns it.
@@ -217,6 +236,25 @@ mod tests {
                     );
                 } else if expected <= 0.0 {
                     assert_eq!(output, 0.0, "{delay_s} s, step {k}");
+                }
+            }
+        }
+    }
+
+    /// A line comes out later or sooner by the difference of the delays, once the longer one has filled.
+    #[test]
+    fn a_delay_that_changes_keeps_what_it_has_seen() {
+        for [before, after] in [[0.3, 0.1], [0.1, 0.1207], [0.1, 0.3]] {
+            let mut delay = Delay::new(before);
+            for k in 0..1000_u32 {
+                if k == 500 {
+                    delay.change(after);
+                }
+                let output = delay.step(f64::from(k) + 1.0);
+                let now = if k < 500 { before } else { after };
+                let expected = f64::from(k) + 2.0 - now / STEP_S;
+                if k > 300 && (k < 500 || after < before || k > 720) {
+                    assert!((output - expected).abs() < 1e-9, "{after} s, step {k}: {output}");
                 }
             }
         }

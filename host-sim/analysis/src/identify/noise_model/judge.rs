@@ -105,51 +105,32 @@ impl Problem<'_> {
                 cure: "leave --manual out".to_owned(),
             });
         }
-        refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
-        refuted.extend(verdict::of_residuals(
+        let change = found.constancy.as_ref().and_then(|c| c.change.clone());
+        let sensor = change
+            .as_ref()
+            .and_then(|c| self.changed_sensor(c, options.manual));
+        if sensor.is_none() {
+            refuted.extend(found.balance.iter().flat_map(verdict::of_balance));
+        }
+        // Where a sensor is wrong, all that follows from it looks like another driver too.
+        let change = change.filter(|_| refuted.is_empty());
+        let mut others = verdict::of_residuals(
             found.fit_percent,
             &found.whiteness,
             &found.input_correlation,
             diagnostics::unexplained_autocorrelation(&found.traces.residual_nm, &self.log.resampling),
-        ));
-        refuted.extend(self.beside_nothing(optimum));
-        let p = &optimum.point;
-        let likeliest = alternatives
-            .iter()
-            .filter(|a| a.z.abs() > verdict::CERTAIN && self.matters(a, p, errors))
-            .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
-        if let Some(a) = likeliest {
-            let name = NAMES[a.place].unwrap_or_default();
-            let (assumed, drawn) = (p[a.place], p[a.place] + a.step);
-            refuted.push(Refutation {
-                assumption: "muscle and sensors are as given (k_nms, t_nms, t_h_late, t_d_late)",
-                evidence: format!(
-                    "freed, {name} would move from {assumed:.3} by {:.1} standard errors",
-                    a.z
-                ),
-                cause: format!("{name} is near {drawn:.3}, not {assumed:.3}"),
-                cure: format!("--estimate {name}, or --fix {name}=VALUE if it is known"),
-            });
+        );
+        others.extend(self.beside_nothing(optimum).map(|r| (f64::INFINITY, r)));
+        others.extend(self.of_muscle(found, &optimum.point, alternatives, errors));
+        // What the change explains better is no cause of its own, and a change is none where something else explains more: a fit
+        // with the cure of the first is judged again.
+        let change = change.filter(|c| sensor.is_some() || others.iter().all(|o| o.0 <= c.deviance));
+        if let Some(change) = &change {
+            others.clear();
+            refuted.push(sensor.unwrap_or_else(|| verdict::of_change(change)));
         }
-        if self.t_nms_prior_s.is_some() {
-            let [low, high] = T_NMS_RANGE_S;
-            let (assumed, drawn, error) = (self.assumed_t_nms_s, p[T_NMS], errors[(T_NMS, T_NMS)].sqrt());
-            found.notes.push(format!(
-                "the record draws t_nms from the {assumed} s that are assumed to {drawn:.3} +- {error:.3} s: it was \
-                 estimated, held near {assumed} s by {T_NMS_SD_S} s. --fix t_nms={assumed} keeps it."
-            ));
-            let beyond = (low - drawn).max(drawn - high);
-            if beyond > 0.01 + verdict::CERTAIN * error {
-                refuted.push(Refutation {
-                    assumption: "t_nms is that of an arm",
-                    evidence: format!(
-                        "it would have to be {drawn:.3} +- {error:.3} s; arms have {low} to {high} s"
-                    ),
-                    cause: "a torque sensor is filtered or late, or the driver is another one".to_owned(),
-                    cure: "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known".to_owned(),
-                });
-            }
-        }
+        others.sort_by(|a, b| b.0.total_cmp(&a.0));
+        refuted.extend(others.into_iter().map(|o| o.1));
         if refuted.iter().any(|r| r.assumption == verdict::SIGNS) {
             // All else that is wrong follows from it.
             refuted.retain(|r| r.assumption == verdict::SIGNS);
@@ -158,6 +139,7 @@ impl Problem<'_> {
             found.parameters.take_back();
         }
         found.refuted = refuted;
+        let p = &optimum.point;
         found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
         if !self.is_free(T_NMS) {
             let [low, high] = T_NMS_RANGE_S;
@@ -173,6 +155,56 @@ impl Problem<'_> {
         if !self.is_free(K_NMS) {
             found.assumed.push(format!("K_nms is {} N.m/rad", p[K_NMS]));
         }
+    }
+
+    /// What the record refutes of the muscle and of the sensors' delays, each with what it adds to twice the log likelihood.
+    fn of_muscle(
+        &self,
+        found: &mut Identification,
+        p: &[f64],
+        alternatives: &[Alternative],
+        errors: &DMatrix<f64>,
+    ) -> Vec<(f64, Refutation)> {
+        let likeliest = alternatives
+            .iter()
+            .filter(|a| a.z.abs() > verdict::CERTAIN && self.matters(a, p, errors))
+            .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()));
+        let mut out = Vec::new();
+        if let Some(a) = likeliest {
+            let name = NAMES[a.place].unwrap_or_default();
+            let (assumed, drawn) = (p[a.place], p[a.place] + a.step);
+            let refutation = Refutation {
+                assumption: "muscle and sensors are as given (k_nms, t_nms, t_h_late, t_d_late)",
+                evidence: format!(
+                    "freed, {name} would move from {assumed:.3} by {:.1} standard errors",
+                    a.z
+                ),
+                cause: format!("{name} is near {drawn:.3}, not {assumed:.3}"),
+                cure: format!("--estimate {name}, or --fix {name}=VALUE if it is known"),
+            };
+            out.push((a.z * a.z, refutation));
+        }
+        if self.t_nms_prior_s.is_some() {
+            let [low, high] = T_NMS_RANGE_S;
+            let (assumed, drawn, error) = (self.assumed_t_nms_s, p[T_NMS], errors[(T_NMS, T_NMS)].sqrt());
+            found.notes.push(format!(
+                "the record draws t_nms from the {assumed} s that are assumed to {drawn:.3} +- {error:.3} s: it was \
+                 estimated, held near {assumed} s by {T_NMS_SD_S} s. --fix t_nms={assumed} keeps it."
+            ));
+            let beyond = (low - drawn).max(drawn - high);
+            if beyond > 0.01 + verdict::CERTAIN * error {
+                let refutation = Refutation {
+                    assumption: "t_nms is that of an arm",
+                    evidence: format!(
+                        "it would have to be {drawn:.3} +- {error:.3} s; arms have {low} to {high} s"
+                    ),
+                    cause: "a torque sensor is filtered or late, or the driver is another one".to_owned(),
+                    cure: "--estimate t_d_late or t_h_late; --fix t_nms=VALUE if it is known".to_owned(),
+                };
+                out.push(((beyond / error).powi(2), refutation));
+            }
+        }
+        out
     }
 
     /// Whether freeing an assumption would move a parameter by its standard error and by a share of what counts as right.

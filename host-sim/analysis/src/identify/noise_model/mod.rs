@@ -19,6 +19,8 @@
 //! Jacobian; the gradient is exact. What is not here: reading logs, the search itself, and the verdict on where it
 //! ended ([`report`]).
 
+mod change_score;
+mod constancy;
 mod delays;
 mod doubts;
 mod evidence;

@@ -151,6 +151,7 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
+        let constancy = self.constancy(p, &kept, error_variance);
         let (traces, predicted) = self.traces(log, kept);
         let fit = |model: &[f64]| diagnostics::fit_percent(&traces.measured_nm, model.iter().copied());
         let filtered = |u: &[f64]| self.filtered(p, u);
@@ -179,6 +180,7 @@ impl Problem<'_> {
             ),
             preflight: Some(prepared.preflight.clone()),
             balance,
+            constancy,
             delay_profile,
             refuted: Vec::new(),
             assumed: Vec::new(),

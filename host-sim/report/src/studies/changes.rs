@@ -1,0 +1,107 @@
+//! What is shown of drivers who change while they drive.
+
+use haptic_batch::experiment::{Changes, ChangesLine};
+
+use super::validation::place;
+use crate::document::{Cell, Table};
+use crate::plot::{Axis, Figure, Panel, Series};
+
+/// What came out, in a sentence or two.
+pub(super) fn summary(found: &Changes) -> String {
+    let all = &found.all;
+    let identified: usize = all.identified.iter().sum();
+    let wrong: usize = all.false_identifications.iter().sum();
+    let share = |held: haptic_batch::experiment::Held| {
+        held.share().map_or("-".into(), |x| format!("{:.1} %", 100.0 * x))
+    };
+    format!(
+        "{wrong} of {identified} identified values are false. Instants of steps of K_hg: within 5 s in {} of {} seen. The 95 % intervals \
+         of begin and end of a change hold the truth in {} of {}.",
+        all.within_5_s,
+        all.steps_seen,
+        share(all.instants),
+        all.instants.identified
+    )
+}
+
+pub(super) fn table(found: &Changes) -> Table {
+    let row = |l: &ChangesLine| {
+        let count = |n: usize| Cell::number(n as f64, 0);
+        let share = |held: haptic_batch::experiment::Held| Cell::Number {
+            value: held.share(),
+            decimals: 3,
+        };
+        vec![
+            Cell::Text(l.kind.into()),
+            count(l.drives),
+            count(l.seen),
+            count(l.refuted_otherwise),
+            count(l.steps_seen),
+            count(l.within_5_s),
+            share(l.instants),
+            count(l.identified[0]),
+            count(l.false_identifications[0]),
+            share(l.intervals[0]),
+            count(l.identified[1]),
+            count(l.false_identifications[1]),
+            share(l.intervals[1]),
+        ]
+    };
+    Table {
+        caption: "Seen: the driver is refuted for having changed. False: called identified, and for more than half of the time more than 4 \
+                  standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. In pieces: of the drives that are seen to change."
+            .into(),
+        columns: [
+            "What changes",
+            "Drives",
+            "Seen",
+            "Refuted otherwise",
+            "Steps of K_hg seen",
+            "within 5 s",
+            "Instants held by 95 %",
+            "Identified",
+            "False",
+            "Held by 95 %",
+            "In pieces: identified",
+            "False",
+            "Held by 95 %",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: found.lines.iter().chain([&found.all]).map(row).collect(),
+    }
+}
+
+pub(super) fn figure(found: &Changes) -> Figure {
+    let panel = |label: &str, series: Vec<Series>| Panel {
+        title: String::new(),
+        y: Axis {
+            label: label.into(),
+            limits: Some((-2.0, 102.0)),
+            ..Axis::default()
+        },
+        series,
+    };
+    let dots = |label: &str, style, share: &dyn Fn(&ChangesLine) -> Option<f64>| {
+        let lines = found.lines.iter().enumerate();
+        let points = lines.filter_map(|(row, line)| Some((place(row), 100.0 * share(line)?)));
+        Series::dots(label, style, points.collect())
+    };
+    Figure {
+        rows: found.lines.iter().map(|l| l.kind.into()).collect(),
+        panels: vec![
+            panel(
+                "Drives seen to change (%)",
+                vec![dots("", 1, &|l| Some(l.seen as f64 / l.drives.max(1) as f64))],
+            ),
+            panel(
+                "95 % intervals that hold (%)",
+                vec![
+                    dots("whole drives", 1, &|l| l.intervals[0].share()),
+                    dots("pieces", 2, &|l| l.intervals[1].share()),
+                ],
+            ),
+        ],
+        ..Figure::default()
+    }
+}

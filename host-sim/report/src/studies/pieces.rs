@@ -1,0 +1,139 @@
+//! A driver in pieces: the parameters of each stretch, the instants between them, and a figure that shows both.
+
+use haptic_analysis::identify::{Change, History, Parameter, Piece, Pieces};
+use haptic_batch::identify::IdentifiedDrive;
+
+use crate::document::{Cell, Table};
+use crate::plot::{Axis, Band, Figure, Panel, Series, Shade};
+
+/// What the figure shows.
+pub(super) const CAPTION: &str = "Each piece with its 95 % intervals, and the same drive followed by the Kalman filter. Shaded: where a \
+                                  change lies (95 %), which is of no piece.";
+
+/// What a torque can tell, in order.
+const SHOWN: [&str; 5] = ["k_hg", "gain_1", "gain_2", "gain_3", "t_p"];
+
+fn parameter<'a>(piece: &'a Piece, name: &str) -> Option<&'a Parameter> {
+    let list = piece.identification.parameters.list();
+    list.into_iter().find(|l| l.0 == name).map(|l| l.2)
+}
+
+/// Every piece and every change.
+pub fn tables(pieces: &Pieces) -> Vec<Table> {
+    let mut out = vec![each(&pieces.pieces)];
+    if !pieces.changes.is_empty() {
+        out.push(changes(&pieces.changes));
+    }
+    out
+}
+
+fn each(pieces: &[Piece]) -> Table {
+    let row = |piece: &Piece| {
+        let mut cells = vec![Cell::number(piece.from_s, 1), Cell::number(piece.to_s, 1)];
+        for name in SHOWN {
+            let p = parameter(piece, name);
+            let number = |value| Cell::Number { value, decimals: 4 };
+            cells.push(number(p.and_then(|p| p.estimate)));
+            let [low, high] = p.and_then(|p| p.interval_95).map_or([None; 2], |i| i.map(Some));
+            cells.extend([number(low), number(high)]);
+        }
+        let refuted = piece.identification.refuted.first();
+        cells.push(Cell::Text(refuted.map_or_else(String::new, |r| r.cause.clone())));
+        cells
+    };
+    let mut columns = vec!["From (s)".to_owned(), "to (s)".to_owned()];
+    for name in SHOWN {
+        columns.extend([name.to_owned(), "95 % from".to_owned(), "to".to_owned()]);
+    }
+    columns.push("Refuted".to_owned());
+    Table {
+        caption: "Each piece is a driver of its own. A dash: not identified in it.".into(),
+        columns,
+        rows: pieces.iter().map(row).collect(),
+    }
+}
+
+fn changes(changes: &[Change]) -> Table {
+    let row = |change: &Change| {
+        let mut cells = vec![Cell::Text(change.parameter.into()), Cell::number(change.by, 3)];
+        for (at, [low, high]) in change.at_s.iter().zip(change.at_95_s) {
+            cells.extend([*at, low, high].map(|s| Cell::number(s, 1)));
+        }
+        cells.push(Cell::number(change.deviance, 1));
+        cells
+    };
+    Table {
+        caption: "What changed most, and when: begin and end are the same for a step. Of k_d the share of all gains. Evidence: what the \
+                  change adds to twice the log likelihood."
+            .into(),
+        columns: [
+            "Changed",
+            "by",
+            "Begin (s)",
+            "95 % from",
+            "to",
+            "End (s)",
+            "95 % from",
+            "to",
+            "Evidence",
+        ]
+        .map(String::from)
+        .to_vec(),
+        rows: changes.iter().map(row).collect(),
+    }
+}
+
+/// The parameters of each piece over time; none if there are no pieces.
+pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
+    let pieces = drive.results.pieces.as_ref()?;
+    let tracking = &drive.tracking;
+    let histories: [(&str, &str, &History); 5] = [
+        ("k_hg", "-", &tracking.k_hg),
+        ("gain_1", "N.m/m", &tracking.gain[0]),
+        ("gain_2", "N.m/(m.s)", &tracking.gain[1]),
+        ("gain_3", "N.m/rad", &tracking.gain[2]),
+        ("t_p", "s", &tracking.t_p),
+    ];
+    let panel = |(name, unit, history): (&str, &str, &History)| {
+        let (mut x, mut ends, mut middles) = (Vec::new(), Vec::new(), Vec::new());
+        for piece in &pieces.pieces {
+            let p = parameter(piece, name);
+            let interval = p.and_then(|p| p.interval_95).unwrap_or([f64::NAN; 2]);
+            let estimate = p.and_then(|p| p.estimate).unwrap_or(f64::NAN);
+            x.extend([piece.from_s, piece.to_s, piece.to_s]);
+            ends.extend([interval, interval, [f64::NAN; 2]]);
+            middles.extend([estimate, estimate, f64::NAN]);
+        }
+        let followed = tracking
+            .time_s
+            .iter()
+            .copied()
+            .zip(history.estimate.iter().copied());
+        let points = x.iter().copied().zip(middles).collect();
+        Panel {
+            title: String::new(),
+            y: Axis::of(name, unit),
+            series: vec![
+                Series::interval("95 % interval of a piece", 5, &x, &ends),
+                Series::line("followed", 4, followed.collect()),
+                Series::line("identified in a piece", 1, points),
+            ],
+        }
+    };
+    let band = |change: &Change| {
+        let [from, to] = change.within_s();
+        Band {
+            label: "the driver changes".into(),
+            from,
+            to,
+            shade: Shade::Dark,
+            panel: None,
+        }
+    };
+    Some(Figure {
+        x: Axis::of("Time", "s"),
+        panels: histories.into_iter().map(panel).collect(),
+        bands: pieces.changes.iter().map(band).collect(),
+        ..Figure::default()
+    })
+}
