@@ -7,8 +7,11 @@
 //! interval of the mean by Knapp and Hartung with Student's t, and each driver's value is the conditional mean: drawn
 //! towards the group the more, the less its own drive says.
 
+use std::f64::consts::SQRT_2;
+
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::function::erf::erfc;
 
 use super::result::{Identification, Parameter, STANDARD_NORMAL_95};
 
@@ -23,18 +26,21 @@ pub struct Difference {
     pub difference: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// Its 95 % interval.
+    /// Its 95 % interval, of this parameter alone.
     pub interval_95: [f64; 2],
-    /// Whether the interval leaves zero out.
+    /// How probable such a difference is between equal drivers, times what Holm's method (1979) takes for the number of
+    /// parameters compared; 1 at most.
+    pub p_holm: f64,
+    /// Whether the drivers differ: `p_holm` is below 0.05, so that with equal drivers one pair in twenty has any such parameter.
     pub real: bool,
 }
 
-/// What tells two drivers apart: the parameters that are identified in both.
+/// What tells two drivers apart: the parameters that both records tell something of, identified or not.
 pub fn differences(first: &Identification, second: &Identification) -> Vec<Difference> {
     let pairs = first.parameters.list().into_iter().zip(second.parameters.list());
-    pairs
+    let mut found: Vec<Difference> = pairs
         .filter_map(|((parameter, unit, a), (_, _, b))| {
-            let ((a, a_error), (b, b_error)) = (estimated(a)?, estimated(b)?);
+            let ((a, a_error), (b, b_error)) = (told(a)?, told(b)?);
             let (difference, standard_error) = (a - b, a_error.hypot(b_error));
             let margin = STANDARD_NORMAL_95 * standard_error;
             Some(Difference {
@@ -43,17 +49,36 @@ pub fn differences(first: &Identification, second: &Identification) -> Vec<Diffe
                 difference,
                 standard_error,
                 interval_95: [difference - margin, difference + margin],
-                real: difference.abs() > margin,
+                p_holm: erfc(difference.abs() / standard_error / SQRT_2),
+                real: false,
             })
         })
-        .collect()
+        .collect();
+    let corrected = holm(&found.iter().map(|d| d.p_holm).collect::<Vec<_>>());
+    for (d, p_holm) in found.iter_mut().zip(corrected) {
+        (d.p_holm, d.real) = (p_holm, p_holm < 0.05);
+    }
+    found
 }
 
-fn estimated(p: &Parameter) -> Option<(f64, f64)> {
-    if p.fixed {
-        return None;
+/// Probabilities of several tests, so that the least of them is wrongly below a level in no more than that share.
+fn holm(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
+    let (mut corrected, mut last) = (vec![1.0; p.len()], 0.0_f64);
+    for (rank, &i) in order.iter().enumerate() {
+        last = last.max((p.len() - rank) as f64 * p[i]).min(1.0);
+        corrected[i] = last;
     }
-    Some((p.estimate?, p.standard_error.filter(|&e| e > 0.0)?))
+    corrected
+}
+
+/// What a record tells of a parameter, however little: value and standard error. Nothing of one that was given, that lies on a
+/// bound of the search, or whose model is refuted.
+pub fn told(p: &Parameter) -> Option<(f64, f64)> {
+    let value = p.estimate.or(p.optimum.filter(|_| !p.on_bound))?;
+    let error = p.standard_error.filter(|&error| error > 0.0 && !p.fixed)?;
+    Some((value, error))
 }
 
 /// One parameter of a group of drivers.
@@ -63,7 +88,7 @@ pub struct Population {
     pub parameter: &'static str,
     /// Unit.
     pub unit: &'static str,
-    /// Drivers in whom it is identified.
+    /// Drivers whose records tell something of it; those that tell little weigh little.
     pub drivers: usize,
     /// Mean of the group.
     pub mean: f64,
@@ -73,11 +98,11 @@ pub struct Population {
     pub spread: f64,
     /// 95 % interval of the spread.
     pub spread_interval_95: [f64; 2],
-    /// Each driver's value given the group, in the order given; none where it is not identified.
+    /// Each driver's value given the group, in the order given; none where the record tells nothing of it.
     pub each: Vec<Option<f64>>,
 }
 
-/// What the group is like, for each parameter that is identified in at least three drivers.
+/// What the group is like, for each parameter that the records of at least three drivers tell something of.
 pub fn population(found: &[&Identification]) -> Vec<Population> {
     let Some(first) = found.first() else {
         return Vec::new();
@@ -88,10 +113,7 @@ pub fn population(found: &[&Identification]) -> Vec<Population> {
         .into_iter()
         .enumerate()
         .filter_map(|(i, (parameter, unit, _))| {
-            let all: Vec<Option<(f64, f64)>> = found
-                .iter()
-                .map(|f| estimated(f.parameters.list()[i].2))
-                .collect();
+            let all: Vec<Option<(f64, f64)>> = found.iter().map(|f| told(f.parameters.list()[i].2)).collect();
             let known: Vec<(f64, f64)> = all.iter().copied().flatten().collect();
             let effects = RandomEffects::of(&known)?;
             Some(Population {
@@ -212,6 +234,38 @@ fn restricted_variance(values: &[(f64, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// R: `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`.
+    #[test]
+    fn several_tests_are_corrected_as_r_does() {
+        let corrected = holm(&[0.01, 0.04, 0.03, 0.005]);
+        for (found, expected) in corrected.iter().zip([0.03, 0.06, 0.06, 0.02]) {
+            assert!((found - expected).abs() < 1e-12, "{corrected:?}");
+        }
+    }
+
+    /// A driver who is not identified counts with what the drive tells; one on a bound, or refuted, does not.
+    #[test]
+    fn an_imprecise_drive_counts() {
+        let p = Parameter {
+            estimate: None,
+            standard_error: Some(0.2),
+            interval_95: Some([0.1, 0.9]),
+            identified: false,
+            on_bound: false,
+            fixed: false,
+            optimum: Some(0.5),
+        };
+        assert_eq!(told(&p), Some((0.5, 0.2)));
+        assert_eq!(told(&Parameter { on_bound: true, ..p }), None);
+        assert_eq!(
+            told(&Parameter {
+                standard_error: None,
+                ..p
+            }),
+            None
+        );
+    }
 
     /// The trials of the BCG vaccine (log relative risks and variances as printed by R's metafor for `dat.bcg`), whose
     /// documented results are tau^2 0.3132 with the Q-profile's interval 0.1197 to 1.1115, and the mean -0.7145.

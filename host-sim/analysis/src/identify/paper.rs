@@ -193,7 +193,7 @@ impl<'a> Problem<'a> {
         let free: Vec<usize> = (0..COUNT).filter(|&i| !self.bounds[i].touches(p[i])).collect();
         let variance = 2.0 * optimum.quadratic.loss / (2 * self.log.len() - free.len()) as f64;
         let errors = covariance(&optimum.quadratic.hessian, &free) * variance;
-        let parameters = self.parameters(options, p, &free, &errors);
+        let mut parameters = self.parameters(options, p, &free, &errors);
         let mut residual = Vec::with_capacity(self.log.len());
         let mut target = Vec::with_capacity(self.log.len());
         self.rows(p, |k, e, _| {
@@ -214,11 +214,18 @@ impl<'a> Problem<'a> {
             .filter(|(_, _, p)| p.on_bound)
             .map(|(n, ..)| *n)
             .collect();
-        let mut notes = vec![
-            "The paper's method takes the noise as white; where the whiteness test fails, its standard errors are \
-             too small and its estimates biased by the closed loop."
-                .to_owned(),
-        ];
+        let whiteness = diagnostics::whiteness(&residual, 0);
+        let input_correlation = diagnostics::input_correlation(&residual, &inputs, self.log.dt_s);
+        let mut notes = Vec::new();
+        if !whiteness.white || input_correlation.iter().any(|input| !input.independent) {
+            parameters.disown();
+            notes.push(
+                "The published method takes its residuals as white and independent of the inputs, and they are not: its standard \
+                 errors are too small, and its values biased by the closed loop. They are shown as it prints them; nothing is \
+                 identified."
+                    .to_owned(),
+            );
+        }
         if !on_bound.is_empty() {
             notes.push(format!("on a bound of table 4: {}", on_bound.join(", ")));
         }
@@ -235,8 +242,8 @@ impl<'a> Problem<'a> {
             combinations: Vec::new(),
             correlation: Correlation::new(&NAMES, &errors, &free),
             remnant: None,
-            whiteness: diagnostics::whiteness(&residual, 0),
-            input_correlation: diagnostics::input_correlation(&residual, &inputs, self.log.dt_s),
+            whiteness,
+            input_correlation,
             preflight: None,
             balance: None,
             constancy: None,

@@ -26,7 +26,7 @@ use super::verdict::{Refutation, SAME_DRIVER};
 /// One parameter of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Parameter {
-    /// The estimate; none where the data do not identify the parameter.
+    /// The estimate; none where the data do not identify the parameter, and of a t_p on a bound, where the search was stopped.
     pub estimate: Option<f64>,
     /// Standard error; none where the data put no bound on it at all, or contradict the model.
     pub standard_error: Option<f64>,
@@ -155,25 +155,46 @@ pub struct Parameters {
 impl Parameters {
     /// Takes the verdict from all that was estimated: the model that it was estimated with does not hold.
     pub(crate) fn take_back(&mut self) {
-        for p in [
-            &mut self.a_1,
-            &mut self.a_2,
-            &mut self.a_3,
-            &mut self.t_p,
-            &mut self.k_d,
-            &mut self.k_hg,
+        for p in self.list_mut().into_iter().filter(|p| !p.fixed) {
+            *p = Parameter {
+                on_bound: p.on_bound,
+                optimum: p.optimum,
+                ..Parameter::ABSENT
+            };
+        }
+    }
+
+    /// Calls nothing identified that was estimated; the method's errors and intervals stay to be seen.
+    pub(crate) fn disown(&mut self) {
+        for p in self.list_mut().into_iter().filter(|p| !p.fixed) {
+            (p.identified, p.estimate) = (false, None);
+        }
+    }
+
+    /// Widens each interval so that it holds the one that is true if t_nms is as assumed.
+    pub(crate) fn hold(&mut self, at_t_nms: &AtTNms) {
+        let names = self.list().map(|(name, ..)| name);
+        for (name, p) in names.into_iter().zip(self.list_mut()) {
+            let narrow = at_t_nms.intervals_95.iter().find(|own| own.0 == name);
+            if let (Some(wide), Some((_, narrow))) = (&mut p.interval_95, narrow) {
+                *wide = [wide[0].min(narrow[0]), wide[1].max(narrow[1])];
+            }
+        }
+    }
+
+    /// In the order of [`Parameters::list`].
+    fn list_mut(&mut self) -> [&mut Parameter; 9] {
+        [
             &mut self.gain_1,
             &mut self.gain_2,
             &mut self.gain_3,
-        ] {
-            if !p.fixed {
-                *p = Parameter {
-                    on_bound: p.on_bound,
-                    optimum: p.optimum,
-                    ..Parameter::ABSENT
-                };
-            }
-        }
+            &mut self.t_p,
+            &mut self.k_hg,
+            &mut self.k_d,
+            &mut self.a_1,
+            &mut self.a_2,
+            &mut self.a_3,
+        ]
     }
 
     /// Every parameter with its key and unit, in the order of print.

@@ -6,7 +6,7 @@ use super::OutputError;
 use super::files::{write_figure, write_report};
 use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_analysis::identify::{Difference, Population};
+use haptic_analysis::identify::{Difference, Population, told};
 use haptic_batch::identify::Drivers;
 
 /// Parameters that a torque record can carry.
@@ -22,9 +22,11 @@ pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
     write_json(&directory.join("results.json"), &stamped(found))?;
     let mut blocks = vec![Block::Figure {
         figure,
-        caption: "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. A driver \
-                  without a dot: the drive does not identify the parameter."
-            .into(),
+        caption: format!(
+            "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. Drives \
+             too imprecise to name a value count with what they tell. {}",
+            gaps(found)
+        ),
     }];
     blocks.extend(tables(found).into_iter().map(Block::Table));
     write_report(
@@ -57,9 +59,29 @@ pub fn tables(found: &Drivers) -> Vec<Table> {
         out.push(differences(&found.differences));
     }
     if !found.population.is_empty() {
-        out.push(population(&found.population));
+        out.push(population(&found.population, &gaps(found)));
     }
     out
+}
+
+/// Who is missing where.
+fn gaps(found: &Drivers) -> String {
+    let of = |wanted: &str| {
+        let missing = found.drivers.iter().enumerate().filter(|(_, (_, fit))| {
+            let list = fit.parameters.list();
+            list.iter().any(|l| l.0 == wanted && told(l.2).is_none())
+        });
+        let numbers: Vec<String> = missing.map(|(i, _)| (i + 1).to_string()).collect();
+        (!numbers.is_empty()).then(|| format!("{wanted} of {}", numbers.join(", ")))
+    };
+    let gaps: Vec<String> = SHOWN.iter().filter_map(|wanted| of(wanted)).collect();
+    if gaps.is_empty() {
+        return "No driver is missing.".into();
+    }
+    format!(
+        "Missing, because a model is refuted or the search ended on a bound: {}.",
+        gaps.join("; ")
+    )
 }
 
 fn each(found: &Drivers) -> Table {
@@ -97,11 +119,16 @@ fn differences(found: &[Difference]) -> Table {
             number(Some(d.standard_error)),
             number(Some(low)),
             number(Some(high)),
+            number(Some(d.p_holm)),
             Cell::Text(if d.real { "they differ" } else { "not told apart" }.into()),
         ]
     };
     Table {
-        caption: "The first driver less the second.".into(),
+        caption: format!(
+            "The first driver less the second. Each interval is that of its parameter alone; the verdict is on all {} together, at \
+             5 % (Holm's method).",
+            found.len()
+        ),
         columns: [
             "",
             "Unit",
@@ -109,6 +136,7 @@ fn differences(found: &[Difference]) -> Table {
             "Standard error",
             "95 % from",
             "to",
+            "p (Holm)",
             "Verdict",
         ]
         .map(String::from)
@@ -117,7 +145,7 @@ fn differences(found: &[Difference]) -> Table {
     }
 }
 
-fn population(found: &[Population]) -> Table {
+fn population(found: &[Population], gaps: &str) -> Table {
     let row = |p: &Population| {
         vec![
             Cell::Text(p.parameter.into()),
@@ -132,7 +160,9 @@ fn population(found: &[Population]) -> Table {
         ]
     };
     Table {
-        caption: "The group: its mean, and the standard deviation between drivers (random effects).".into(),
+        caption: format!(
+            "The group: its mean, and the standard deviation between drivers (random effects). {gaps}"
+        ),
         columns: [
             "",
             "Unit",
@@ -163,23 +193,26 @@ fn figure(found: &Drivers) -> Figure {
                 &[p.mean_interval_95; 2],
             ));
         }
-        let (mut points, mut intervals, mut unit) = (Vec::new(), Vec::new(), "-");
+        let (mut points, mut intervals, mut unit) =
+            ([const { Vec::new() }; 2], [const { Vec::new() }; 2], "-");
         for (i, (_, fit)) in found.drivers.iter().enumerate() {
             let list = fit.parameters.list();
             let named = list.iter().find(|l| l.0 == wanted);
             unit = named.map_or(unit, |l| l.1);
-            let p = named.map(|l| l.2);
-            if let Some((x, interval)) = p.and_then(|p| Some((p.estimate?, p.interval_95?))) {
-                points.push(((i + 1) as f64, x));
-                intervals.push(interval);
+            let Some(p) = named.map(|l| l.2) else { continue };
+            if let (Some((x, _)), Some(interval)) = (told(p), p.interval_95) {
+                let place = usize::from(!p.identified);
+                points[place].push(((i + 1) as f64, x));
+                intervals[place].push(interval);
             }
         }
-        series.push(Series::with_mark(
-            "own drive",
-            1,
-            Mark::Whiskers(intervals),
-            points,
-        ));
+        let labels = ["own drive", "own drive, not identified"];
+        for (place, (points, intervals)) in points.into_iter().zip(intervals).enumerate() {
+            if !points.is_empty() {
+                let mark = Mark::Whiskers(intervals);
+                series.push(Series::with_mark(labels[place], [1, 3][place], mark, points));
+            }
+        }
         Panel {
             title: String::new(),
             y: Axis::of(wanted, unit),

@@ -429,6 +429,15 @@ pub fn verdicts(found: &Identification) -> Vec<String> {
             .map(|[low, high]| format!("between {low:.4} and {high:.4}{unit} (95 %)"));
         Some(match (p.estimate, within) {
             (Some(x), Some(within)) => format!("{name}, {what}, is {x:.4}{unit}: {within}."),
+            (None, Some(_)) if is_published(found) => {
+                format!(
+                    "{name}, {what}, comes out as {:.4}{unit}; the residuals refute it.",
+                    p.optimum?
+                )
+            }
+            (None, Some(within)) if p.identified => {
+                format!("{name}, {what}, lies on a bound of the search, which is no value: {within}.")
+            }
             (_, Some(within)) => {
                 format!("{name}, {what}, is not identified: {within}, which is too wide to name a value.")
             }
@@ -440,6 +449,11 @@ pub fn verdicts(found: &Identification) -> Vec<String> {
         })
     })
     .collect()
+}
+
+/// Whether the values are those of the published method.
+fn is_published(found: &Identification) -> bool {
+    found.method == "paper"
 }
 
 /// How the identified driver drives a course, if asked.
@@ -490,15 +504,25 @@ pub fn parameters(found: &Identification) -> Table {
             let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
             let verdict = match (p.fixed, p.identified, p.on_bound) {
                 (true, ..) => "given",
+                _ if is_published(found) && p.optimum.is_none() => "no part of the method",
+                (_, true, true) if is_published(found) => "as published, on a bound",
+                (_, true, false) if is_published(found) => "as published",
+                (_, false, true) if is_published(found) => "as published, on a bound, refuted",
+                (_, false, false) if is_published(found) => "as published, refuted",
                 (_, true, true) => "identified, on a bound",
                 (_, true, false) => "identified",
                 (_, false, true) => "not identified, on a bound",
                 (_, false, false) => "not identified",
             };
+            let estimate = if is_published(found) {
+                p.optimum
+            } else {
+                p.estimate
+            };
             vec![
                 Cell::Text(name.into()),
                 Cell::Text(unit.into()),
-                number(p.estimate),
+                number(estimate),
                 number(p.standard_error),
                 number(low),
                 number(high),
@@ -508,7 +532,12 @@ pub fn parameters(found: &Identification) -> Table {
             ]
         });
     Table {
-        caption: "An estimate is given only where the data identify the parameter.".into(),
+        caption: if is_published(found) {
+            "The values of the published method as it prints them, whether the record holds them or not."
+        } else {
+            "An estimate is given only where the data identify the parameter."
+        }
+        .into(),
         columns: [
             "",
             "Unit",

@@ -124,17 +124,23 @@ impl Problem<'_> {
         } else {
             parameter(K_HG)
         };
-        let parameters = Parameters {
+        // Where the search was stopped is no delay; the interval says how long it is at most.
+        let mut t_p = parameter(T_P);
+        t_p.estimate = t_p.estimate.filter(|_| t_p.fixed || !t_p.on_bound);
+        let mut parameters = Parameters {
             a_1: a[0],
             a_2: a[1],
             a_3: a[2],
-            t_p: parameter(T_P),
+            t_p,
             k_d,
             k_hg,
             gain_1: gains[0],
             gain_2: gains[1],
             gain_3: gains[2],
         };
+        if let Some(at_t_nms) = &at_t_nms {
+            parameters.hold(at_t_nms);
+        }
         let balance = balance(log, &prepared.stretches, options.manual);
         let mut notes = self.notes(log, options, &parameters, &trim, &starts);
         notes.extend(split.err());
