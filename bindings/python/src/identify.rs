@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use haptic_analysis::identify::{DriveLog, FixError, Mapping, Options, Recording, of_table, open_mapped};
-use haptic_batch::identify::{Method, identify as one, identify_several as several, single_track};
+use haptic_batch::identify::{
+    Method, identify as one, identify_pieces, identify_several as several, single_track,
+};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -29,6 +31,7 @@ pub(crate) struct How<'py> {
     estimate: Vec<String>,
     between: Vec<[f64; 2]>,
     as_published: bool,
+    pieces: bool,
     max_gap: f64,
     preprocessing: bool,
     lane_smoothing: bool,
@@ -94,7 +97,11 @@ pub(crate) fn identify<'py>(
     } else {
         Method::NoiseModel
     };
+    let in_pieces = how.pieces;
     let drive = interruptible(py, None, move |_| match logs.len() {
+        1 if in_pieces => {
+            identify_pieces("drive", &logs.remove(0), &options).map_err(|error| error.to_string())
+        }
         1 => one("drive", &logs.remove(0), &options, method).map_err(|error| error.to_string()),
         _ => several("drives", &logs, &options),
     })?
@@ -104,6 +111,7 @@ pub(crate) fn identify<'py>(
     found.notes.splice(0..0, converted);
     let made = PyDict::new(py);
     made.set_item("results", python(py, &found)?)?;
+    made.set_item("pieces", python(py, &drive.results.pieces)?)?;
     let units = PyDict::new(py);
     for (name, unit, _) in found.parameters.list() {
         units.set_item(name, unit)?;

@@ -230,3 +230,26 @@ def test_what_cannot_be_fixed_is_refused():
         hg.identify(LOGS / "manual.csv", fix={"k_x": 1.0})
     with pytest.raises(hg.InputError, match="no-such"):
         hg.identify("no-such.csv")
+
+
+def test_a_driver_who_changes_is_fitted_in_pieces():
+    run = hg.simulate(
+        hg.Scenario(
+            driver={"t_p": 0.2, "K_d": 3.0, "K_hg": 0.9, "remnant_sd": 0.072},
+            guidance={"probe": True},
+            driver_change={"time": 90.0, "K_d": 3.0, "K_hg": 0.4},
+        )
+    )
+    whole = hg.identify(run)
+    assert whole["k_hg"].estimate is None and whole.refuted[0]["cause"].startswith("the driver changed at")
+    assert whole.pieces == [] and whole.changes == []
+    fit = hg.identify(run, pieces=True)
+    (change,) = fit.changes
+    assert change.parameter == "k_hg" and abs(change.at_s[0] - 90.0) < 5.0
+    assert change.at_95_s[0][0] < 90.0 < change.at_95_s[1][1]
+    before, after = fit.pieces
+    assert before.to_s < 90.0 < after.from_s
+    for piece, truth in ((before, 0.9), (after, 0.4)):
+        assert abs(piece["k_hg"].estimate - truth) < 0.06
+    with pytest.raises(hg.InputError, match="pieces"):
+        hg.identify(run, pieces=True, as_published=True)

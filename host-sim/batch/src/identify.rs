@@ -7,9 +7,9 @@ use super::RunRecord;
 use super::experiment::identified_driver;
 use super::record::default_window;
 use haptic_analysis::identify::{
-    Difference, DriveLog, FixError, Identification, Options, Pieces, Population, SingleTrack, Tracking,
-    differences, identify_and_track, identify_as_published, identify_in_pieces, identify_together_and_track,
-    identify_with_noise_model, population, track,
+    Difference, DriveLog, FixError, Identification, Options, Piece, Pieces, Population, SingleTrack,
+    Tracking, differences, identify_and_track, identify_as_published, identify_in_pieces,
+    identify_together_and_track, identify_with_noise_model, population, track,
 };
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{Condition, Scenario};
@@ -132,26 +132,55 @@ pub struct Drivers {
     pub population: Vec<Population>,
 }
 
-/// Identifies the driver of each log, and compares them; `done` is called after each, from any thread.
-pub fn compare_drivers(logs: Vec<(String, DriveLog)>, options: &Options, done: impl Fn() + Sync) -> Drivers {
-    let drivers: Vec<(String, Identification)> = logs
+/// Identifies the driver of each log, and compares them; `done` is called after each, from any thread. With `pieces` a driver who
+/// changes is every piece, and the longest one is compared.
+pub fn compare_drivers(
+    logs: Vec<(String, DriveLog)>,
+    options: &Options,
+    pieces: bool,
+    done: impl Fn() + Sync,
+) -> Drivers {
+    let found: Vec<Vec<(String, Identification)>> = logs
         .into_par_iter()
         .map(|(name, log)| {
-            let found = identify_with_noise_model(&log, options);
+            let found = if pieces {
+                in_pieces(&name, &log, options)
+            } else {
+                vec![(name, identify_with_noise_model(&log, options))]
+            };
             done();
-            (name, found)
+            found
         })
         .collect();
-    let fits: Vec<&Identification> = drivers.iter().map(|d| &d.1).collect();
+    let longest = |of: &'_ Vec<(String, Identification)>| {
+        let each = of.iter().enumerate();
+        each.max_by_key(|(_, d)| d.1.rows).map_or(0, |(i, _)| i)
+    };
+    let fits: Vec<&Identification> = found.iter().filter_map(|d| Some(&d.get(longest(d))?.1)).collect();
     let (differences, population) = match fits[..] {
         [first, second] => (differences(first, second), Vec::new()),
         _ => (Vec::new(), population(&fits)),
     };
     Drivers {
-        drivers,
+        drivers: found.into_iter().flatten().collect(),
         differences,
         population,
     }
+}
+
+/// A driver of each piece; of a drive without one, the whole of it.
+fn in_pieces(name: &str, log: &DriveLog, options: &Options) -> Vec<(String, Identification)> {
+    let pieces = identify_in_pieces(log, options).pieces;
+    if pieces.len() < 2 {
+        return vec![(name.to_owned(), identify_with_noise_model(log, options))];
+    }
+    let named = |p: Piece| {
+        (
+            format!("{name}, {:.0} to {:.0} s", p.from_s, p.to_s),
+            p.identification,
+        )
+    };
+    pieces.into_iter().map(named).collect()
 }
 
 impl IdentifiedDrive {

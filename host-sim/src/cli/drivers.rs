@@ -18,6 +18,9 @@ pub(super) struct Arguments {
     /// Drives without guidance: there is no K_hg
     #[arg(long)]
     manual: bool,
+    /// Take a driver who changed in pieces, as identify --pieces: each is listed, and the longest one is compared
+    #[arg(long)]
+    pieces: bool,
     /// A known parameter, the same for all; as for identify
     #[arg(long, value_name = "NAME=VALUE")]
     fix: Vec<String>,
@@ -53,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .map(|place| Output::begin(place, "drivers"))
         .transpose()?;
     let bar = progress::bar(logs.len() as u64, "drives");
-    let found: Drivers = compare_drivers(logs, &options, || bar.inc(1));
+    let found: Drivers = compare_drivers(logs, &options, arguments.pieces, || bar.inc(1));
     bar.finish_and_clear();
     if let Some(output) = output {
         output.finish(|place| files::write(&found, place))?;

@@ -12,7 +12,7 @@ Examples
 """
 
 from ._errors import InputError, RangeError, UnknownNameError
-from ._identify import Fit, Parameter, identify
+from ._identify import Change, Fit, Parameter, Piece, identify
 from ._native import (
     Action,
     Bus,
@@ -34,11 +34,13 @@ __all__ = [
     "Ecu",
     "Evaluation",
     "Experiment",
+    "Change",
     "Fit",
     "Frame",
     "InputError",
     "Outcome",
     "Parameter",
+    "Piece",
     "RangeError",
     "Run",
     "Scenario",

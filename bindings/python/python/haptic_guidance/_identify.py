@@ -47,6 +47,56 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Piece:
+    """A stretch of a drive with one driver.
+
+    Attributes
+    ----------
+    from_s, to_s : float
+        Where it begins and ends.
+    parameters : dict of str to Parameter
+        As those of a `Fit`. ``piece["k_hg"]`` is short for one.
+    results : dict
+        All that was found in it.
+    """
+
+    from_s: float
+    to_s: float
+    parameters: dict[str, Parameter]
+    results: dict[str, Any] = field(repr=False)
+
+    def __getitem__(self, name: str) -> Parameter:
+        if name not in self.parameters:
+            raise unknown("parameters of the driver", name, self.parameters)
+        return self.parameters[name]
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the driver.
+
+    Attributes
+    ----------
+    parameter : str
+        What changed most: ``k_hg``, ``t_p``, or ``k_d``, all gains by one factor.
+    at_s : (float, float)
+        First and last instant; the same for a step.
+    at_95_s : ((float, float), (float, float))
+        95 % intervals of these.
+    by : float
+        By how much; of ``k_d`` the share of the gains.
+    deviance : float
+        What the change adds to twice the log likelihood.
+    """
+
+    parameter: str
+    at_s: tuple[float, float]
+    at_95_s: tuple[tuple[float, float], tuple[float, float]]
+    by: float
+    deviance: float
+
+
+@dataclass(frozen=True)
 class Fit:
     """An identified driver.
 
@@ -58,11 +108,17 @@ class Fit:
         What ``host-sim identify --json`` prints.
     traces : dict of str to numpy.ndarray
         Measured and simulated torque and the residuals, over time.
+    pieces : list of Piece
+        The driver between one change and the next, if asked for.
+    changes : list of Change
+        What lies between them.
     """
 
     parameters: dict[str, Parameter]
     results: dict[str, Any] = field(repr=False)
     traces: dict[str, np.ndarray] = field(repr=False)
+    pieces: list[Piece] = field(default_factory=list)
+    changes: list[Change] = field(default_factory=list)
 
     def __getitem__(self, name: str) -> Parameter:
         if name not in self.parameters:
@@ -111,6 +167,7 @@ def identify(
     estimate: Optional[Mapping[str, Optional[tuple[float, float]]]] = None,
     between_s: Sequence[tuple[float, float]] = (),
     as_published: bool = False,
+    pieces: bool = False,
     max_gap: float = 0.3,
     preprocessing: bool = True,
     lane_smoothing: bool = True,
@@ -139,6 +196,8 @@ def identify(
         Stretches of the drive to use, s; all of it if not given.
     as_published : bool, optional
         The paper's method instead of prediction errors with a noise model.
+    pieces : bool, optional
+        Find when the driver changed, and fit each stretch between two changes as a driver of its own.
     max_gap : float, optional
         Pauses of a signal (lost rows, NaN, a stuck sensor) up to so long are bridged, s, 0 to 1; longer ones cut the drive.
     preprocessing : bool, optional
@@ -170,6 +229,8 @@ def identify(
         raise InputError("also: a list of drives is wanted")
     if also and as_published:
         raise InputError("also: the published method takes one drive")
+    if pieces and (also or as_published):
+        raise InputError("pieces: one drive and no as_published is wanted")
     drives = [drive, *also]
     files = [isinstance(each, (str, os.PathLike)) for each in drives]
     for name, given in (("dbc", dbc), ("vehicle", vehicle)):
@@ -181,6 +242,7 @@ def identify(
         estimate=wanted,
         between=[list(stretch) for stretch in between_s],
         as_published=as_published,
+        pieces=pieces,
         max_gap=max_gap,
         preprocessing=preprocessing,
         lane_smoothing=lane_smoothing,
@@ -190,14 +252,35 @@ def identify(
     )
     given = [os.fspath(each) if file else _columns(each) for each, file in zip(drives, files)]
     made = _native.identify(given, how)
+    found = made["pieces"] or {"pieces": [], "changes": []}
+    return Fit(
+        _parameters(made["results"], made["units"]),
+        made["results"],
+        made["traces"],
+        [Piece(each["from_s"], each["to_s"], _parameters(each, made["units"]), each) for each in found["pieces"]],
+        [
+            Change(
+                parameter=each["parameter"],
+                at_s=tuple(each["at_s"]),
+                at_95_s=tuple(tuple(ends) for ends in each["at_95_s"]),
+                by=each["by"],
+                deviance=each["deviance"],
+            )
+            for each in found["changes"]
+        ],
+    )
+
+
+def _parameters(results: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Parameter]:
+    """The parameters of one driver."""
     parameters = {}
-    for name, unit in made["units"].items():
-        found = dict(made["results"]["parameters"][name])
+    for name, unit in units.items():
+        found = dict(results["parameters"][name])
         interval = found.pop("interval_95")
         parameters[name] = Parameter(
             name=name, unit=unit, interval_95=None if interval is None else tuple(interval), **found
         )
-    return Fit(parameters, made["results"], made["traces"])
+    return parameters
 
 
 def _columns(drive: Any) -> dict[str, np.ndarray]:
