@@ -50,6 +50,9 @@ fn what_is_no_driver_is_not_called_one() {
             "{l:?}"
         );
     }
-    let l = line(vec![4, 7], 2, "scale of T_d");
-    assert_eq!((l.seen, l.refuted_otherwise), (0, 4), "{l:?}");
+    // A sensor is named in their place.
+    for kind in ["scale of T_d", "T_d drifts by"] {
+        let l = line(vec![4, 7], 2, kind);
+        assert_eq!((l.seen, l.refuted_otherwise), (0, 4), "{l:?}");
+    }
 }

@@ -4,6 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
+/// The name of a change that is the torque sensor's.
+pub(crate) const OFFSET: &str = "driver_torque_nm";
+
 /// How constant the driver of a record was.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Constancy {
@@ -19,7 +22,7 @@ pub struct Constancy {
 /// A change of the driver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
-    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p.
+    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p; driver_torque_nm for the offset of its sensor.
     pub parameter: &'static str,
     /// First and last instant of the change, s: the same for a step.
     pub at_s: [f64; 2],
@@ -47,11 +50,13 @@ impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = match self.parameter {
             "k_d" => "k_d (all gains)",
+            OFFSET => "the offset of driver_torque_nm",
             name => name,
         };
         let by = match self.parameter {
             "k_d" => format!("{:+.0} %", 100.0 * self.by),
             "t_p" => format!("{:+.3} s", self.by),
+            OFFSET => format!("{:+.3} N.m", self.by),
             _ => format!("{:+.2}", self.by),
         };
         let [from, to] = self.at_s;

@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::balance::Balance;
-use super::change::Change;
+use super::change::{Change, OFFSET};
 use super::result::{InputCorrelation, Whiteness};
 
 /// An assumption that the record refutes.
@@ -45,6 +45,8 @@ const ALL_BUT_PERFECT: f64 = 98.0;
 /// The assumption that a swapped sign refutes.
 pub(crate) const SIGNS: &str = "all torques and angles are positive to the left";
 
+/// The assumption that a sensor that changed refutes.
+const SAME_SENSORS: &str = "the sensors are the same throughout";
 /// The assumption that a driver who changed refutes.
 pub(crate) const SAME_DRIVER: &str = "the driver is the same throughout";
 
@@ -209,13 +211,19 @@ pub(crate) fn of_change(change: &Change) -> Refutation {
     };
     let cause = match change.parameter {
         "k_d" => format!("the driver changed {when}, or the scale of the lane signals did"),
+        OFFSET => format!("the torque sensor's offset changed {when}"),
         _ => format!("the driver changed {when}"),
     };
+    let (assumption, cure) = if change.parameter == OFFSET {
+        (SAME_SENSORS, cure_of_sensor(change))
+    } else {
+        (SAME_DRIVER, cure_of(change))
+    };
     Refutation {
-        assumption: SAME_DRIVER,
+        assumption,
         evidence: evidence_of(change),
         cause,
-        cure: cure_of(change),
+        cure,
     }
 }
 
@@ -227,8 +235,12 @@ fn evidence_of(change: &Change) -> String {
 }
 
 fn cure_of(change: &Change) -> String {
+    format!("--pieces, or {}", cure_of_sensor(change))
+}
+
+fn cure_of_sensor(change: &Change) -> String {
     let [from, to] = change.within_s();
-    format!("--pieces, or one part alone: --to {from:.0}, or --from {to:.0}")
+    format!("one part alone: --to {from:.0}, or --from {to:.0}")
 }
 
 /// A change that the balance of torques shows in the sensors, from the one before and the one after it.
@@ -241,10 +253,10 @@ pub(crate) fn of_changed_sensor(change: &Change, before: &Balance, after: &Balan
         (sure && (is / was - 1.0).abs() > SMALL_SCALE).then(|| is / was)
     };
     let refutation = |what: &str, how: String| Refutation {
-        assumption: "the sensors are the same throughout",
+        assumption: SAME_SENSORS,
         evidence: format!("{}, and there {how}", evidence_of(change)),
         cause: format!("{what} changed at {:.0} s", change.at_s[0]),
-        cure: cure_of(change).replace("--pieces, or ", ""),
+        cure: cure_of_sensor(change),
     };
     if let Some((was, is)) = before.scale.zip(after.scale)
         && let Some(factor) = moved(was, is)

@@ -32,11 +32,24 @@ pub(super) struct Block {
 }
 
 /// A block's part in a change along one direction.
-pub(super) struct Along {
+struct Part {
     score: f64,
     /// Products with all regressors.
     with: Local,
     square: f64,
+}
+
+/// Every block's part in a change along one direction.
+pub(super) struct Along {
+    parts: Vec<Part>,
+    direction: Local,
+}
+
+impl Along {
+    /// Whether an offset of T_d may change beside it: not if it is that offset itself.
+    fn beside_offset(&self) -> bool {
+        self.direction[OWN] == 0.0
+    }
 }
 
 /// What is fitted whatever changes.
@@ -56,6 +69,18 @@ pub(super) struct Shaped {
     with: [DVector<f64>; 2],
     /// The change's square, its product with the offset, the offset's square.
     products: [f64; 3],
+    beside_offset: bool,
+}
+
+impl Shaped {
+    /// What of the offset a change takes along, from what is left of the products.
+    fn slope(&self, [_, mixed, offset]: [f64; 3]) -> f64 {
+        if self.beside_offset && offset > 1e-9 * self.products[2] {
+            mixed / offset
+        } else {
+            0.0
+        }
+    }
 }
 
 /// What freeing a change does.
@@ -87,20 +112,24 @@ pub(super) fn largest(steps: &[Option<Freed>]) -> Option<(usize, Freed)> {
 }
 
 impl Fitted<'_> {
-    pub(super) fn along(&self, direction: &[f64; OWN]) -> Vec<Along> {
+    pub(super) fn along(&self, direction: Local) -> Along {
         let one = |b: &Block| {
-            let with: Local = std::array::from_fn(|i| times_own(&b.gram[i], direction));
-            Along {
-                score: times_own(&b.score, direction),
-                square: times_own(&with, direction),
+            let with: Local = std::array::from_fn(|i| times(&b.gram[i], &direction));
+            Part {
+                score: times(&b.score, &direction),
+                square: times(&with, &direction),
                 with,
             }
         };
-        self.blocks.iter().map(one).collect()
+        Along {
+            parts: self.blocks.iter().map(one).collect(),
+            direction,
+        }
     }
 
-    fn nothing(&self) -> Shaped {
+    fn nothing(&self, along: &Along) -> Shaped {
         Shaped {
+            beside_offset: along.beside_offset(),
             score: [0.0; 2],
             with: [DVector::zeros(self.size), DVector::zeros(self.size)],
             products: [0.0; 3],
@@ -108,7 +137,7 @@ impl Fitted<'_> {
     }
 
     fn add(&self, sum: &mut Shaped, number: usize, along: &Along, share: f64) {
-        let block = &self.blocks[number];
+        let (block, along) = (&self.blocks[number], &along.parts[number]);
         sum.score[0] += share * along.score;
         sum.score[1] += share * block.score[OWN];
         for i in 0..LOCAL {
@@ -131,12 +160,8 @@ impl Fitted<'_> {
 
     /// What freeing the change does beside the offset.
     fn freed(&self, sum: &Shaped) -> Option<Freed> {
-        let (score, [square, mixed, offset]) = self.left(sum);
-        let slope = if offset > 1e-9 * sum.products[2] {
-            mixed / offset
-        } else {
-            0.0
-        };
+        let (score, left) = self.left(sum);
+        let ([square, mixed, _], slope) = (left, sum.slope(left));
         let (score, information) = (score[0] - slope * score[1], square - slope * mixed);
         (information > 1e-6 * sum.products[0]).then(|| Freed {
             by: score / information,
@@ -146,11 +171,11 @@ impl Fitted<'_> {
     }
 
     /// A step at the beginning of each block.
-    pub(super) fn steps(&self, along: &[Along]) -> Vec<Option<Freed>> {
-        let mut sum = self.nothing();
+    pub(super) fn steps(&self, along: &Along) -> Vec<Option<Freed>> {
+        let mut sum = self.nothing(along);
         let mut out = vec![None; self.blocks.len()];
         for k in (1..self.blocks.len()).rev() {
-            self.add(&mut sum, k, &along[k], 1.0);
+            self.add(&mut sum, k, along, 1.0);
             out[k] = self.freed(&sum);
         }
         let most = out.iter().flatten().map(|f| f.information).fold(0.0, f64::max);
@@ -174,9 +199,9 @@ impl Fitted<'_> {
         (0..self.blocks.len()).map(share).collect()
     }
 
-    fn shaped(&self, along: &[Along], shares: &[f64]) -> Shaped {
-        let mut sum = self.nothing();
-        for (k, (along, &share)) in along.iter().zip(shares).enumerate().filter(|x| *x.1.1 != 0.0) {
+    fn shaped(&self, along: &Along, shares: &[f64]) -> Shaped {
+        let mut sum = self.nothing(along);
+        for (k, &share) in shares.iter().enumerate().filter(|x| *x.1 != 0.0) {
             self.add(&mut sum, k, along, share);
         }
         sum
@@ -184,14 +209,10 @@ impl Fitted<'_> {
 
     /// The factor by which the scatter of the blocks' scores, less what the change explains, is wider than the prediction errors
     /// say.
-    pub(super) fn wider(&self, along: &[Along], direction: &[f64; OWN], shares: &[f64], found: Freed) -> f64 {
+    pub(super) fn wider(&self, along: &Along, shares: &[f64], found: Freed) -> f64 {
         let sum = self.shaped(along, shares);
-        let (score, [_, mixed, offset]) = self.left(&sum);
-        let slope = if offset > 1e-9 * sum.products[2] {
-            mixed / offset
-        } else {
-            0.0
-        };
+        let (score, left) = self.left(&sum);
+        let ([_, mixed, offset], slope) = (left, sum.slope(left));
         let by = [
             found.by,
             if slope == 0.0 {
@@ -206,7 +227,9 @@ impl Fitted<'_> {
             let [change, offset] = [0, 1].map(|i| {
                 let mut own = block.own(&taken[i]).map(|x| -x);
                 if i == 0 {
-                    own.iter_mut().zip(direction).for_each(|(o, d)| *o += share * d);
+                    own.iter_mut()
+                        .zip(along.direction)
+                        .for_each(|(o, d)| *o += share * d);
                 } else {
                     own[OWN] += share;
                 }
@@ -225,7 +248,7 @@ impl Fitted<'_> {
     pub(super) fn change(
         &self,
         parameter: &'static str,
-        along: &[Along],
+        along: &Along,
         steps: &[Option<Freed>],
         (at, step): (usize, Freed),
         wider: f64,
@@ -297,8 +320,4 @@ impl Fitted<'_> {
     fn after(&self, k: usize) -> f64 {
         self.between(k)[1] + 0.5 * BLOCK_S
     }
-}
-
-fn times_own(a: &Local, direction: &[f64; OWN]) -> f64 {
-    a.iter().zip(direction).map(|(a, d)| a * d).sum()
 }

@@ -3,7 +3,7 @@
 //! With the regressors x_t of a row (the negative derivatives of its prediction error e_t by gains, K_hg, t_p and the constants),
 //! a change by delta along the direction d, of which the share r_t has come at row t, is one more regressor,
 //! `z_t = r_t d' x_t`. What the other parameters take up of it is taken out, and so is an offset of T_d that changes with it:
-//! a sensor that drifts is no driver who changes. With `H = sum x x'` and z the rest, freeing delta adds
+//! a sensor that drifts is no driver who changes. Such an offset is also tried alone. With `H = sum x x'` and z the rest, freeing delta adds
 //! `(sum e_t z_t)^2/(s^2 sum z_t^2)` to twice the log likelihood, to first order (Andrews, "Tests for parameter instability and
 //! structural change with unknown change point", Econometrica 61, 1993). The largest over instants and directions is held
 //! against [`LEVEL`]. Sums over blocks of [`BLOCK_S`] hold all that this takes.
@@ -15,11 +15,11 @@ use nalgebra::{DMatrix, DVector};
 
 use std::ops::Range;
 
-use super::change_score::{BLOCK_S, Block, Fitted, LOCAL, OWN, largest};
+use super::change_score::{BLOCK_S, Block, Fitted, LOCAL, Local, OWN, largest};
 use super::sums::Rows;
 use super::{K_HG, Problem, T_P};
 use crate::identify::balance::balance;
-use crate::identify::change::{Change, Constancy};
+use crate::identify::change::{Change, Constancy, OFFSET};
 use crate::identify::search::covariance;
 use crate::identify::verdict::{self, Refutation};
 
@@ -32,25 +32,28 @@ impl Problem<'_> {
         let blocks = self.blocks_in_time(kept);
         let fitted = self.fitted(&blocks, variance);
         let free = |i: usize| if self.is_free(i) { 1.0 } else { 0.0 };
-        let mut directions: Vec<(&'static str, f64, [f64; OWN])> = Vec::new();
-        let mut gains = [0.0; OWN];
+        let mut directions: Vec<(&'static str, f64, Local)> = Vec::new();
+        let mut gains = [0.0; LOCAL];
         for i in 0..3 {
             gains[i] = free(i) * p[i];
         }
         directions.push(("k_d", 0.1, gains));
         for (name, place, enough) in [("k_hg", K_HG, 0.05), ("t_p", T_P, 0.015)] {
-            let mut one = [0.0; OWN];
+            let mut one = [0.0; LOCAL];
             one[place] = free(place);
             directions.push((name, enough, one));
         }
+        let mut offset = [0.0; LOCAL];
+        offset[OWN] = 1.0;
+        directions.push((OFFSET, 0.02, offset));
         let mut best: Option<Constancy> = None;
         for (parameter, enough, direction) in directions.iter().filter(|d| d.2.iter().any(|&x| x != 0.0)) {
-            let along = fitted.along(direction);
+            let along = fitted.along(*direction);
             let steps = fitted.steps(&along);
             let Some((at, step)) = largest(&steps) else {
                 continue;
             };
-            let wider = fitted.wider(&along, direction, &fitted.shares([at, at]), step);
+            let wider = fitted.wider(&along, &fitted.shares([at, at]), step);
             let deviance = step.deviance / wider;
             if best.as_ref().is_some_and(|b| b.deviance >= deviance) {
                 continue;
