@@ -10,7 +10,7 @@ use haptic_report::studies::course as files;
 
 use super::output::Output;
 use super::road::LaneArguments;
-use super::{BadInput, Outcome, print, print_json, print_notes};
+use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
 /// Columns and rows of the picture in the terminal; a character holds 2 by 4 dots.
 const PICTURE: [usize; 2] = [72, 20];
@@ -67,7 +67,7 @@ fn readable(survey: &Survey) -> String {
     }
     format!(
         "{text}\n\n{}\n{}",
-        files::table(survey).to_text(),
+        files::table(survey).to_text(width()),
         picture(survey)
     )
 }

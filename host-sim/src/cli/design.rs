@@ -9,7 +9,7 @@ use haptic_sim::models::road::{Course, LaneChoice};
 
 use super::output::Output;
 use super::participants::Participants;
-use super::{BadInput, Outcome, print, print_json, progress, road};
+use super::{BadInput, Outcome, print, print_json, progress, road, width};
 
 #[derive(Debug, Args)]
 #[command(mut_arg("participant", |which| which.default_value("2,5,9")))]
@@ -96,7 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
 }
 
 fn readable(answer: &Answer) -> String {
-    let mut text = files::table(answer).to_text();
+    let mut text = files::table(answer).to_text(width());
     for sentence in files::sentences(answer) {
         text.push_str(&format!("\n{sentence}"));
     }

@@ -7,7 +7,7 @@ use haptic_batch::handover::{HandoverResults, HandoverRow, ROWS, study};
 use haptic_report::studies::handover as files;
 
 use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -48,7 +48,7 @@ fn readable(results: &HandoverResults) -> String {
     format!(
         "{}\n\n{}\n{}",
         files::SUMMARY,
-        files::table(results).to_text(),
+        files::table(results).to_text(width()),
         files::judgement(results)
     )
 }

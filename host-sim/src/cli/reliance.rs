@@ -9,7 +9,7 @@ use haptic_sim::input::in_range;
 
 use super::output::Output;
 use super::participants::{Participants, check_probe};
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -74,8 +74,8 @@ fn readable(results: &RelianceResults) -> String {
         results.amplitude_nm,
         results.frequency_hz,
         results.seeds,
-        files::participants_table(results).to_text(),
-        files::pooled_table(results).to_text(),
+        files::participants_table(results).to_text(width()),
+        files::pooled_table(results).to_text(width()),
         files::settling(results),
     )
 }

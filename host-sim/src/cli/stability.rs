@@ -7,7 +7,7 @@ use haptic_batch::stability::{PLACES, map, shares};
 use haptic_report::studies::stability::{self as files, Map};
 
 use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 use haptic_sim::Scenario;
 use haptic_sim::input::InputError;
 
@@ -53,9 +53,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         print(&format!(
             "{}\n\n{}\n{}\n{}\n{}",
             files::SUMMARY,
-            files::growth_table(&map).to_text(),
-            files::peak_table(&map).to_text(),
-            files::shares(&map).to_text(),
+            files::growth_table(&map).to_text(width()),
+            files::peak_table(&map).to_text(width()),
+            files::shares(&map).to_text(width()),
             files::judgement(&map)
         ))?;
     }

@@ -141,7 +141,7 @@ fn a_sign_can_be_read_off_a_number_however_small() {
         rows: vec![vec![Cell::Signed(-0.0004)]],
         ..Table::default()
     };
-    assert!(table.to_text().ends_with("-0.0004\n"));
+    assert!(table.to_text(None).ends_with("-0.0004\n"));
     assert!(report_of(vec![Block::Table(table)]).contains("<td class=\"number\">-0.0004</td>"));
 }
 

@@ -193,6 +193,7 @@ pub fn table(results: &Availability) -> Table {
         vec![
             Cell::Text(row.world.into()),
             Cell::Text(row.road.into()),
+            Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
             Cell::number(row.hours, 2),
             Cell::number(row.declarations.count as f64, 0),
             Cell::Text(finding(&row.declarations, row.hours)),
@@ -203,7 +204,6 @@ pub fn table(results: &Availability) -> Table {
             Cell::number(row.diverged as f64, 0),
             Cell::number(row.lost_by_hand.legs as f64, 0),
             Cell::number(row.sdlp_m, 2),
-            Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
         ]
     };
     Table {
@@ -211,6 +211,7 @@ pub fn table(results: &Availability) -> Table {
         columns: [
             "World",
             "Road",
+            "Judged",
             "Hours",
             "False declarations",
             "Rate, 95 % confidence",
@@ -221,7 +222,6 @@ pub fn table(results: &Availability) -> Table {
             "Off the road",
             "Lost by hand",
             "SDLP (m)",
-            "",
         ]
         .map(String::from)
         .to_vec(),
@@ -414,7 +414,7 @@ mod tests {
             "{:?}",
             none.points
         );
-        let text = table(&results).to_text();
+        let text = table(&results).to_text(None);
         assert!(
             text.contains("no event in 0.08 h: at most 35.9 an hour"),
             "{text}"

@@ -98,6 +98,7 @@ pub fn table(campaign: &Campaign) -> Table {
         vec![
             Cell::Text(row.name.into()),
             Cell::Text(row.class.to_string()),
+            Cell::Text(verdict),
             count(row.runs),
             count(row.seen),
             count(row.cycles),
@@ -115,7 +116,6 @@ pub fn table(campaign: &Campaign) -> Table {
             metres(row.excess_m),
             count(row.left_lane),
             count(row.off_road),
-            Cell::Text(verdict),
         ]
     };
     Table {
@@ -123,6 +123,7 @@ pub fn table(campaign: &Campaign) -> Table {
         columns: [
             "Fault",
             "Class",
+            "Verdict",
             "Runs",
             "Seen",
             "Cycles",
@@ -137,7 +138,6 @@ pub fn table(campaign: &Campaign) -> Table {
             "Excess (m)",
             "Left lane",
             "Off road",
-            "Verdict",
         ]
         .map(String::from)
         .to_vec(),

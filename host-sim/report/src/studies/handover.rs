@@ -80,10 +80,10 @@ pub fn table(results: &HandoverResults) -> Table {
             Cell::number(row.speed_kmh, 0),
             Cell::number(row.t_p, 1),
             Cell::Text(row.condition.to_string()),
+            Cell::Text(verdict.into()),
         ];
-        cells.extend(peaks.map(|value| Cell::Number { value, decimals: 3 }));
         cells.extend(ratios.map(|value| Cell::Number { value, decimals: 2 }));
-        cells.push(Cell::Text(verdict.into()));
+        cells.extend(peaks.map(|value| Cell::Number { value, decimals: 3 }));
         cells
     };
     Table {
@@ -92,13 +92,13 @@ pub fn table(results: &HandoverResults) -> Table {
             "Speed (km/h)",
             "t_p (s)",
             "Reliance",
+            "Verdict",
+            "Handover ratio",
+            "Sudden loss ratio",
             "Manual (m)",
             "No failure (m)",
             "Handover (m)",
             "Sudden loss (m)",
-            "Handover ratio",
-            "Sudden loss ratio",
-            "Verdict",
         ]
         .map(String::from)
         .to_vec(),

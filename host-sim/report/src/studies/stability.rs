@@ -300,7 +300,7 @@ mod tests {
             [(worse, "+0.0003", (20.0, 0.1)), (grows, "+0.200", (30.0, 0.1))]
         );
         assert_eq!(figure.panels[0].title, "manual");
-        let text = growth_table(&map).to_text();
+        let text = growth_table(&map).to_text(None);
         assert!(
             text.contains("-0.0004  +0.0004") && text.contains("+0.0003   +0.200"),
             "{text}"

@@ -7,7 +7,7 @@ use haptic_batch::bus_load::table;
 use haptic_report::studies::bus::Load;
 
 use super::super::output::Output;
-use super::super::{BadInput, Outcome, print, print_json};
+use super::super::{BadInput, Outcome, print, print_json, width};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -33,7 +33,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.json {
         print_json(&load.stamped())?;
     } else {
-        print(&format!("{}\n{}", load.table().to_text(), load.judgement()))?;
+        print(&format!(
+            "{}\n{}",
+            load.table().to_text(width()),
+            load.judgement()
+        ))?;
     }
     Ok(if load.load <= load.max_load {
         Outcome::Good

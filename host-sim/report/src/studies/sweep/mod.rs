@@ -99,7 +99,7 @@ pub fn headline(summary: &Summary) -> String {
 }
 
 /// What a sweep plans.
-pub fn plan(sweep: &Sweep) -> String {
+pub fn plan(sweep: &Sweep, width: Option<usize>) -> String {
     let columns = ["drive", "seed"]
         .into_iter()
         .chain(sweep.columns())
@@ -120,7 +120,7 @@ pub fn plan(sweep: &Sweep) -> String {
         sweep.drives(),
         sweep.chunks(),
         sweep.design(),
-        table.to_text()
+        table.to_text(width)
     )
 }
 

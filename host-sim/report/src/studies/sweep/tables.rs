@@ -128,7 +128,7 @@ fn indices(summary: &Summary) -> Table {
 /// The metric that judges along each field; which level is best is said where one is told apart from another.
 fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
     let (name, unit) = metric(summary.judge);
-    let mut columns = ["Field", "Value", "Unit", "Drives", "Diverged"]
+    let mut columns = ["Field", "Value", "Unit", "Verdict", "Drives", "Diverged"]
         .map(String::from)
         .to_vec();
     columns.extend([
@@ -139,12 +139,16 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
     if summary.limit.is_some() {
         columns.extend(["Bad (%)", "95 % from", "to"].map(String::from));
     }
-    columns.push(String::new());
     let digits = decimals(summary.judge);
     let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
         let drives = &level.drives;
         let unit = effect.unit.as_deref().unwrap_or(OWN_UNIT);
-        let mut cells = [&effect.field, &level.label, unit]
+        let verdict = match effect.best.contains(&level.label) {
+            true if effect.best.len() > 1 => "among the best",
+            true => "best",
+            false => "",
+        };
+        let mut cells = [&effect.field, &level.label, unit, verdict]
             .map(|text| Cell::Text(text.into()))
             .to_vec();
         cells.extend([drives.count, drives.diverged].map(|count| Cell::number(count as f64, 0)));
@@ -161,12 +165,6 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
                 2,
             );
         }
-        let verdict = match effect.best.contains(&level.label) {
-            true if effect.best.len() > 1 => "among the best",
-            true => "best",
-            false => "",
-        };
-        cells.push(Cell::Text(verdict.into()));
         cells
     };
     let effects = by_weight(summary);
