@@ -25,6 +25,7 @@ mod participants;
 mod progress;
 mod recording;
 mod reliance;
+mod results;
 mod road;
 mod run;
 mod series;

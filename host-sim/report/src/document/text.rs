@@ -1,9 +1,11 @@
-//! Tables for a terminal: columns as wide as their widest cell, long headings on several lines.
+//! A report for a terminal. A table has columns as wide as their widest cell, long headings on several lines.
 //!
 //! A table that is wider than the terminal breaks headings and long cells between words. What is still too wide loses
 //! columns from the right, and a line below names them: so the first columns of a table are those that matter most.
 
-use super::{Cell, Table, html, signed};
+use haptic_log::Event;
+
+use super::{Block, Cell, Report, Table, html, signed};
 
 /// A heading may be as wide as this, or as its column's widest cell.
 const HEADING: usize = 11;
@@ -13,6 +15,43 @@ const WORDS: usize = 24;
 
 /// Blanks between two columns.
 const GAP: &str = "  ";
+
+impl Report {
+    /// What a terminal shows of it: all but the figures and what is for the page alone. Lines are at most `width` long if there
+    /// is one.
+    pub fn to_text(&self, width: Option<usize>) -> String {
+        let shown = self.sections.iter().map(|section| {
+            let blocks = section.blocks.iter().filter_map(|block| block_text(block, width));
+            (section.heading.as_str(), blocks.collect::<Vec<_>>())
+        });
+        let shown: Vec<_> = shown.filter(|(_, blocks)| !blocks.is_empty()).collect();
+        let mut parts = vec![wrapped(&self.title, width), wrapped(&self.summary, width)];
+        let has_several = shown.len() > 1;
+        for (heading, blocks) in shown {
+            if has_several {
+                parts.push(format!("{heading}\n{}\n", "-".repeat(heading.chars().count())));
+            }
+            parts.extend(blocks);
+        }
+        parts.retain(|part| !part.is_empty());
+        parts.join("\n")
+    }
+}
+
+fn block_text(block: &Block, width: Option<usize>) -> Option<String> {
+    let text = match block {
+        Block::Text(text) => wrapped(text, width),
+        Block::Table(table) if table.rows.is_empty() => return None,
+        Block::Table(table) => table.to_text(width),
+        Block::Events(events) => {
+            let line = |event: &Event| format!("{:9.3} s  {}\n", event.time_s, event.what);
+            events.iter().map(line).collect()
+        }
+        Block::OnTerminal(block) => return block_text(block, width),
+        Block::Figure { .. } | Block::OnPage(_) => return None,
+    };
+    Some(text)
+}
 
 impl Table {
     /// The table as text: caption, headings, rows, each line ended. Lines are at most `width` long if there is one.
