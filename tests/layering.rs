@@ -73,7 +73,7 @@ const OUTSIDERS: &[(&str, &[&str])] = &[
 ];
 
 /// The command line's own: nothing beside `cli` uses them.
-const COMMAND_LINE: &[&str] = &["clap", "indicatif", "ctrlc"];
+const COMMAND_LINE: &[&str] = &["clap", "indicatif", "ctrlc", "terminal_size"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -12,7 +12,7 @@ use haptic_sim::worlds::WORLDS;
 
 use super::checkpoint::Checkpoint;
 use super::output::{self, Output};
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -53,7 +53,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.list {
-        print(&files::worlds().to_text())?;
+        print(&files::worlds().to_text(width()))?;
         return Ok(Outcome::Good);
     }
     let plan = plan(arguments)?;
@@ -192,11 +192,11 @@ fn readable(results: &Balance) -> String {
     let mut text = format!(
         "{}\n\n{}",
         files::SUMMARY,
-        files::table(&results.availability).to_text()
+        files::table(&results.availability).to_text(width())
     );
     let mut add = |table: Table| {
         if !table.rows.is_empty() {
-            text.push_str(&format!("\n{}", table.to_text()));
+            text.push_str(&format!("\n{}", table.to_text(width())));
         }
     };
     add(files::causes(&results.availability));

@@ -9,7 +9,7 @@ use haptic_log::recording::{Recording, RecordingError};
 use haptic_report::document::{Cell, Table};
 use serde::Serialize;
 
-use super::{BadInput, Outcome, output, print, print_json};
+use super::{BadInput, Outcome, output, print, print_json, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             });
             print_json(&channels.collect::<Vec<_>>())?;
         } else {
-            print(&listed(&recording).to_text())?;
+            print(&listed(&recording).to_text(width()))?;
         }
         return Ok(Outcome::Good);
     };

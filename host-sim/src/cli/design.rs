@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::design::{Answer, Question, design, drives};
-use haptic_report::studies::design as files;
+use haptic_batch::design::{Question, design, drives};
+use haptic_report::studies::design::report;
 use haptic_sim::models::road::{Course, LaneChoice};
 
-use super::output::Output;
 use super::participants::Participants;
-use super::{BadInput, Outcome, print, print_json, progress, road};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress, road};
 
 #[derive(Debug, Args)]
 #[command(mut_arg("participant", |which| which.default_value("2,5,9")))]
@@ -40,12 +40,8 @@ pub(super) struct Arguments {
     /// Seed of the remnants
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Directory for figures, results and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -68,37 +64,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         confirmations: arguments.confirm,
         seed: arguments.seed,
     };
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| Output::begin(place, "design"))
-        .transpose()?;
-    let bar = progress::bar(drives(&question), "drives");
-    let answer = design(&question, || bar.inc(1))?;
-    bar.finish_and_clear();
-    if let Some(output) = output {
-        output.finish(|place| files::write(&answer, place))?;
-    }
-    if arguments.json {
-        print_json(&files::stamped(&answer))?;
-    } else {
-        print(&readable(&answer))?;
-    }
-    if let Some(directory) = &arguments.out {
-        eprintln!("Report: {}", directory.join("report.html").display());
-    }
+    let output = arguments.results.begin("design")?;
+    let answer = progress::over(drives(&question), "drives", |done| design(&question, done))?;
+    let report = report(&answer);
     let best = answer.best.map(|best| &answer.designs[best]);
-    Ok(if best.is_some_and(|best| best.left_by_itself == 0) {
-        Outcome::Good
-    } else {
-        Outcome::Failed
-    })
-}
-
-fn readable(answer: &Answer) -> String {
-    let mut text = files::table(answer).to_text();
-    for sentence in files::sentences(answer) {
-        text.push_str(&format!("\n{sentence}"));
-    }
-    text
+    let holds = best.is_some_and(|best| best.left_by_itself == 0);
+    output.show(&report, &report.stamp(&answer), holds)
 }

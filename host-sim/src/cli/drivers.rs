@@ -8,7 +8,7 @@ use haptic_batch::identify::{Drivers, compare_drivers};
 use haptic_report::studies::drivers as files;
 
 use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.json {
         print_json(&files::stamped(&found))?;
     } else {
-        let tables: Vec<String> = files::tables(&found).iter().map(|t| t.to_text()).collect();
+        let tables: Vec<String> = files::tables(&found).iter().map(|t| t.to_text(width())).collect();
         print(&tables.join("\n"))?;
     }
     if let Some(directory) = &arguments.out {

@@ -14,7 +14,7 @@ use haptic_sim::scenario::{DEFAULT_SPEED_KMH, Failure, SPEED_KMH, Scenario, Sens
 use super::output::Output;
 use super::road::CourseArguments;
 use super::series::SeriesArgument;
-use super::{BadInput, Outcome, print, print_json, print_notes, progress};
+use super::{BadInput, Outcome, print, print_json, print_notes, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -108,10 +108,10 @@ fn readable(evaluation: &Evaluation) -> String {
         to,
         results.course_length_m,
         results.failure_time_s,
-        files::table(results).to_text()
+        files::table(results).to_text(width())
     );
     if !results.claims.is_empty() {
-        text.push_str(&format!("\n{}", files::claims_table(results).to_text()));
+        text.push_str(&format!("\n{}", files::claims_table(results).to_text(width())));
     }
     text
 }

@@ -8,7 +8,7 @@ use haptic_report::studies::experiment as files;
 
 use super::output::Output;
 use super::participants::{Participants, check_probe};
-use super::{BadInput, Outcome, print, print_json, print_notes, progress};
+use super::{BadInput, Outcome, print, print_json, print_notes, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -80,9 +80,9 @@ fn readable(result: &Experiment) -> String {
         result.course,
         result.probe_nm,
         result.seed,
-        files::truth_table(result, false).to_text(),
-        files::truth_table(result, true).to_text(),
-        files::trajectory_table(result).to_text(),
+        files::truth_table(result, false).to_text(width()),
+        files::truth_table(result, true).to_text(width()),
+        files::trajectory_table(result).to_text(width()),
         mean(false, |d| Some(d.paper.identification.fit_percent)),
         mean(true, |d| Some(d.paper.identification.fit_percent)),
         files::FIT_IS_CALIBRATED,

@@ -11,7 +11,7 @@ use haptic_report::studies::faults as files;
 use haptic_sim::worlds::WORLDS;
 
 use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -134,7 +134,7 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, Ba
 }
 
 fn readable(campaign: &Campaign) -> String {
-    let mut text = files::table(campaign).to_text();
+    let mut text = files::table(campaign).to_text(width());
     for failure in campaign.failures() {
         text.push_str(&format!("\n{}\n", files::failure(failure)));
     }

@@ -12,7 +12,7 @@ use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 use super::output::Output;
 use super::recording::RecordingArguments;
 use super::road::CourseArguments;
-use super::{BadInput, Outcome, print, print_json};
+use super::{BadInput, Outcome, print, print_json, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -142,17 +142,17 @@ fn readable(drive: &IdentifiedDrive) -> String {
         found.method,
         found.rows,
         found.fit_percent,
-        files::parameters(found).to_text()
+        files::parameters(found).to_text(width())
     );
     for sentence in files::verdicts(found) {
         text.push_str(&format!("\n{sentence}"));
     }
     text.push('\n');
     for table in drive.results.pieces.iter().flat_map(pieces::tables) {
-        text.push_str(&format!("\n{}", table.to_text()));
+        text.push_str(&format!("\n{}", table.to_text(width())));
     }
     if let Some(in_the_log) = files::in_the_log(found) {
-        text.insert_str(0, &format!("{}\n", in_the_log.to_text()));
+        text.insert_str(0, &format!("{}\n", in_the_log.to_text(width())));
     }
     for sentence in files::refutations(found) {
         text.push_str(&format!("\n{sentence}\n"));
@@ -164,10 +164,10 @@ fn readable(drive: &IdentifiedDrive) -> String {
         }
     }
     if !found.combinations.is_empty() {
-        text.push_str(&format!("\n{}", files::combinations(found).to_text()));
+        text.push_str(&format!("\n{}", files::combinations(found).to_text(width())));
     }
-    text.push_str(&format!("\n{}", files::correlation(found).to_text()));
-    text.push_str(&format!("\n{}\n", files::input_tests(found).to_text()));
+    text.push_str(&format!("\n{}", files::correlation(found).to_text(width())));
+    text.push_str(&format!("\n{}\n", files::input_tests(found).to_text(width())));
     for (name, value) in files::facts(found) {
         text.push_str(&format!("{name}: {value}\n"));
     }
@@ -175,7 +175,7 @@ fn readable(drive: &IdentifiedDrive) -> String {
         text.push_str(&format!("\n- {note}"));
     }
     if let Some(again) = files::drives_again(drive) {
-        text.push_str(&format!("\n\n{}", again.to_text()));
+        text.push_str(&format!("\n\n{}", again.to_text(width())));
     }
     text
 }

@@ -25,6 +25,7 @@ mod participants;
 mod progress;
 mod recording;
 mod reliance;
+mod results;
 mod road;
 mod run;
 mod series;
@@ -196,6 +197,13 @@ fn print_notes(notes: &[String]) {
     for note in notes {
         eprintln!("note: {note}");
     }
+}
+
+/// How long a line on stdout may be: the terminal's width, or where there is no terminal what `COLUMNS` says.
+fn width() -> Option<usize> {
+    let terminal = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| width.0.into());
+    let asked = || std::env::var("COLUMNS").ok()?.parse().ok();
+    terminal.or_else(asked).filter(|width| *width > 0)
 }
 
 /// Text on stdout. A reader that has seen enough (`| head`) is no error.

@@ -107,6 +107,11 @@ impl Output {
         Ok(Self { files })
     }
 
+    /// Where to write the files until then.
+    pub(super) fn place(&self) -> &Path {
+        self.files.staging()
+    }
+
     /// Writes all files and puts them in place.
     pub(super) fn finish(self, write: impl FnOnce(&Path) -> Result<(), OutputError>) -> Result<(), BadInput> {
         write(self.files.staging())?;

@@ -1,15 +1,13 @@
 //! `host-sim reliance`.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use haptic_batch::reliance::{Plan, RelianceResults, study};
-use haptic_report::studies::reliance as files;
+use haptic_batch::reliance::{Plan, study};
+use haptic_report::studies::reliance::report;
 use haptic_sim::input::in_range;
 
-use super::output::Output;
 use super::participants::{Participants, check_probe};
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -27,12 +25,8 @@ pub(super) struct Arguments {
     /// The drivers' t_nms, s (0.02 to 0.5); the ECU goes on assuming 0.1
     #[arg(long, value_name = "S", default_value_t = 0.1)]
     t_nms: f64,
-    /// Directory for a figure, the results and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -45,37 +39,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         frequency_hz: arguments.frequency,
         t_nms_s: arguments.t_nms,
     };
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| Output::begin(place, "reliance"))
-        .transpose()?;
+    let output = arguments.results.begin("reliance")?;
     let drives = plan.participants.len() as u64 * u64::from(plan.seeds);
-    let bar = progress::bar(drives, "drives");
-    let results = study(&plan, || bar.inc(1))?;
-    bar.finish_and_clear();
-    if let Some(output) = output {
-        output.finish(|place| files::write(&results, place))?;
-    }
-    if arguments.json {
-        print_json(&files::stamped(&results))?;
-    } else {
-        print(&readable(&results))?;
-    }
-    if let Some(directory) = &arguments.out {
-        eprintln!("Report: {}", directory.join("report.html").display());
-    }
-    Ok(Outcome::Good)
-}
-
-fn readable(results: &RelianceResults) -> String {
-    format!(
-        "Reliance read live: probe {} N.m at {} Hz, {} seeds\n\n{}\n{}\n{}",
-        results.amplitude_nm,
-        results.frequency_hz,
-        results.seeds,
-        files::participants_table(results).to_text(),
-        files::pooled_table(results).to_text(),
-        files::settling(results),
-    )
+    let results = progress::over(drives, "drives", |done| study(&plan, done))?;
+    let report = report(&results);
+    output.show(&report, &report.stamp(&results), true)
 }

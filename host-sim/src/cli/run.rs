@@ -10,7 +10,7 @@ use haptic_sim::input::InputError;
 use super::output::Output;
 use super::road::CourseArguments;
 use super::series::SeriesArgument;
-use super::{BadInput, Outcome, print, print_json, print_notes};
+use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -73,6 +73,6 @@ fn readable(single: &SingleRun) -> String {
         record.failure,
         files::how_it_ended(single),
         results.course_length_m,
-        files::table(results).to_text(),
+        files::table(results).to_text(width()),
     )
 }

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_batch::stability::{PLACES, map, shares};
-use haptic_report::studies::stability::{self as files, Map};
+use haptic_report::studies::stability::{Map, report};
 
-use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress};
 use haptic_sim::Scenario;
 use haptic_sim::input::InputError;
 
@@ -17,12 +17,8 @@ pub(super) struct Arguments {
     /// the map's, so that a speed that changes is refused; default: the paper's
     #[arg(value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
-    /// Directory for figures, the results and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the results as one JSON object instead of a table
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -33,32 +29,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             haptic_batch::files::load_scenario(path)?,
         ),
     };
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| Output::begin(place, "stability"))
-        .transpose()?;
-    let bar = progress::bar(PLACES as u64, "places");
+    let output = arguments.results.begin("stability")?;
+    let named = |e| InputError::new(&name, e);
     let map = Map {
-        places: map(&base, || bar.inc(1)).map_err(|e| InputError::new(&name, e))?,
-        shares: shares(&base).map_err(|e| InputError::new(&name, e))?,
+        places: progress::over(PLACES as u64, "places", |done| map(&base, done)).map_err(named)?,
+        shares: shares(&base).map_err(named)?,
     };
-    bar.finish_and_clear();
-    if let Some(output) = output {
-        output.finish(|place| files::write(&map, place))?;
-    }
-    if arguments.json {
-        print_json(&files::stamped(&map))?;
-    } else {
-        print(&format!(
-            "{}\n\n{}\n{}\n{}\n{}",
-            files::SUMMARY,
-            files::growth_table(&map).to_text(),
-            files::peak_table(&map).to_text(),
-            files::shares(&map).to_text(),
-            files::judgement(&map)
-        ))?;
-    }
-    let broken = map.places.iter().any(|place| place.broken().next().is_some());
-    Ok(if broken { Outcome::Failed } else { Outcome::Good })
+    let report = report(&map);
+    let holds = map.places.iter().all(|place| place.broken().next().is_none());
+    output.show(&report, &report.stamp(&map), holds)
 }

@@ -7,7 +7,7 @@ use haptic_batch::study::{Study, StudyResults, Who};
 use haptic_report::studies::study as files;
 
 use super::output::{self, Output};
-use super::{BadInput, Outcome, print, print_json, print_notes, progress};
+use super::{BadInput, Outcome, print, print_json, print_notes, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -54,7 +54,7 @@ impl std::str::FromStr for Import {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let study = Study::load(&arguments.file)?;
     if arguments.dry_run {
-        print(&files::plan(&study.sessions).to_text())?;
+        print(&files::plan(&study.sessions).to_text(width()))?;
         print_notes(&study.notes);
         return Ok(Outcome::Good);
     }
@@ -89,11 +89,11 @@ fn readable(results: &StudyResults) -> String {
     let mut text = format!(
         "{}\n\n{}\n{}",
         results.study,
-        files::sessions(results).to_text(),
-        files::by_condition(results).to_text()
+        files::sessions(results).to_text(width()),
+        files::by_condition(results).to_text(width())
     );
     if !results.differences.is_empty() {
-        text.push_str(&format!("\n{}", files::differences(results).to_text()));
+        text.push_str(&format!("\n{}", files::differences(results).to_text(width())));
     }
     let waits = |s: &&haptic_batch::study::SessionResult| s.who == Who::Person && s.recorded.is_none();
     if let Some(session) = results.sessions.iter().find(waits) {

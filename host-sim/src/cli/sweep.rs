@@ -12,7 +12,7 @@ use haptic_report::studies::sweep as files;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{self, Output};
-use super::{BadInput, Outcome, print, print_json};
+use super::{BadInput, Outcome, print, print_json, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -48,7 +48,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let sweep = Sweep::load(&arguments.file)?;
     if arguments.dry_run {
-        print(&files::plan(&sweep))?;
+        print(&files::plan(&sweep, width()))?;
         return Ok(Outcome::Good);
     }
     if let Some(drive) = arguments.replay {
@@ -108,7 +108,7 @@ fn readable(sweep: &Sweep, summary: &Summary, file: &str) -> String {
     let mut text = format!("{}\n", files::headline(summary));
     for table in files::short_tables(sweep, summary, file) {
         if !table.rows.is_empty() {
-            text.push_str(&format!("\n{}", table.to_text()));
+            text.push_str(&format!("\n{}", table.to_text(width())));
         }
     }
     text
@@ -126,7 +126,7 @@ fn replay(arguments: &Arguments, sweep: &Sweep, drive: u64) -> Result<Outcome, B
     print(&format!(
         "{}\n{}",
         scenario.to_toml(),
-        files::drive_table(sweep, &point, &driven).to_text()
+        files::drive_table(sweep, &point, &driven).to_text(width())
     ))?;
     if let Some(directory) = &arguments.replay_out {
         write_drive(&scenario, directory)?;

@@ -8,7 +8,7 @@ use haptic_report::studies::validation::Validation;
 
 use super::output::Output;
 use super::participants::{Participants, check_probe};
-use super::{BadInput, Outcome, print, print_json, progress};
+use super::{BadInput, Outcome, print, print_json, progress, width};
 
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("question").required(true))]
@@ -96,7 +96,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.json {
         print_json(&result.stamped())?;
     } else {
-        let tables: Vec<String> = result.tables().iter().map(|table| table.to_text()).collect();
+        let tables: Vec<String> = result
+            .tables()
+            .iter()
+            .map(|table| table.to_text(width()))
+            .collect();
         print(&format!("{}\n\n{}", result.summary(), tables.join("\n")))?;
     }
     let broken = result.broken();

@@ -39,6 +39,7 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
                 header {
                     h1 { (report.title) }
                     @if !report.summary.is_empty() { p { (report.summary) } }
+                    @for note in &report.notes { p { "Note: " (note) "." } }
                     nav {
                         @for (i, section) in report.sections.iter().enumerate() {
                             a href={ "#section-" (i + 1) } { (section.heading) }
@@ -46,7 +47,7 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
                     }
                 }
                 main { @for section in &sections { (section) } }
-                @if let Some(provenance) = &report.provenance { (footer(provenance)) }
+                (footer(&report.provenance))
                 script { (PreEscaped(chart::SCRIPT)) }
             }
         }
@@ -73,9 +74,11 @@ fn section(index: usize, section: &Section) -> Result<Markup, PlotError> {
 fn block(id: &str, block: &Block) -> Result<Markup, PlotError> {
     Ok(match block {
         Block::Text(text) => html! { p { (text) } },
-        Block::Table(t) => table(t),
-        Block::Figure { figure, caption } => self::figure(id, figure, caption)?,
+        Block::Table(t) => html! { @if !t.rows.is_empty() { (table(t)) } },
+        Block::Figure { figure, caption, .. } => self::figure(id, figure, caption)?,
         Block::Events(list) => events(list),
+        Block::OnPage(block) => self::block(id, block)?,
+        Block::OnTerminal(_) => html! {},
     })
 }
 

@@ -12,34 +12,30 @@ pub fn metrics_table(
 ) -> Table {
     let shown: Vec<_> = DEFINITIONS.iter().filter(|d| shown(d)).collect();
     let row = |(key, metrics): &(Vec<Cell>, Metrics)| {
-        let values = shown.iter().map(|d| Cell::Number {
-            value: (d.value)(metrics),
-            decimals: decimals(d.unit),
-        });
+        let values = shown
+            .iter()
+            .map(|d| Cell::number((d.value)(metrics), decimals(d.unit)));
         key.iter().cloned().chain(values).collect()
     };
     let keys = keys.iter().map(|k| k.to_string());
-    Table {
-        caption: caption.into(),
-        columns: keys.chain(shown.iter().map(|d| heading(d))).collect(),
-        rows: runs.iter().map(row).collect(),
-    }
+    Table::new(
+        caption,
+        keys.chain(shown.iter().map(|d| heading(d))),
+        runs.iter().map(row),
+    )
 }
 
 /// What every metric means, in which unit, and where it comes from.
 pub fn definitions_table() -> Table {
     let row = |d: &Definition| {
         let cells = [d.label, d.name, d.unit, d.definition, d.source];
-        cells.map(|text| Cell::Text(text.into())).to_vec()
+        cells.map(|text| Cell::text(text)).to_vec()
     };
-    Table {
-        caption: "e: lateral error; T_d: driver's torque; T_h: guidance torque; v: speed; r: yaw rate."
-            .into(),
-        columns: ["Metric", "Name in JSON", "Unit", "Definition", "Source"]
-            .map(String::from)
-            .to_vec(),
-        rows: DEFINITIONS.iter().map(row).collect(),
-    }
+    Table::new(
+        "e: lateral error; T_d: driver's torque; T_h: guidance torque; v: speed; r: yaw rate.",
+        ["Metric", "Name in JSON", "Unit", "Definition", "Source"],
+        DEFINITIONS.iter().map(row),
+    )
 }
 
 fn heading(definition: &Definition) -> String {

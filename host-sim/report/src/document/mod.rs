@@ -1,7 +1,7 @@
 //! What a study hands over: one self-contained HTML report, time series as CSV, results as JSON.
 //!
-//! A [`Table`] is one value, shown on a page and on a terminal ([`Table::to_text`]). A [`Report`] is a title and sections; a [`Section`] is a heading and blocks: text, tables, figures, events.
-//! Everything in it is data and is escaped when it is written, so a name from a scenario file can hold any
+//! A [`Report`] is one value, drawn as a page ([`Report::to_html`]) and for a terminal ([`Report::to_text`]). It has a title and sections; a
+//! [`Section`] is a heading and blocks: text, tables, figures, events. A terminal shows no figures. Everything in it is data and is escaped when it is written, so a name from a scenario file can hold any
 //! character. The HTML loads nothing from anywhere. Files are written whole or not at all ([`write_file`]), and
 //! those of a study together or not at all ([`FileSet`]).
 //!
@@ -26,17 +26,19 @@ use haptic_log::Event;
 
 use crate::plot::{Figure, PlotError};
 
-/// A document for a browser or a printer.
+/// A document for a browser, a printer or a terminal.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Heading of the document and name of its window.
     pub title: String,
     /// One or two sentences below the title: what this is and what to keep in mind.
     pub summary: String,
+    /// What a reader of the results has to know: a page shows it behind the summary, a terminal beside the results.
+    pub notes: Vec<String>,
     /// In reading order.
     pub sections: Vec<Section>,
     /// Which program made it, of what.
-    pub provenance: Option<Provenance>,
+    pub provenance: Provenance,
 }
 
 /// A part of a report.
@@ -48,15 +50,27 @@ pub struct Section {
     pub blocks: Vec<Block>,
 }
 
+impl Section {
+    /// A heading and what stands below it.
+    pub fn new(heading: impl Into<String>, blocks: Vec<Block>) -> Self {
+        Self {
+            heading: heading.into(),
+            blocks,
+        }
+    }
+}
+
 /// A piece of a section.
 #[derive(Debug, Clone)]
 pub enum Block {
     /// A paragraph.
     Text(String),
-    /// A table.
+    /// A table; without rows it is not shown.
     Table(Table),
     /// A drawing and what it shows.
     Figure {
+        /// Its files are `NAME.svg` and `NAME.png`.
+        name: String,
         /// The drawing.
         figure: Figure,
         /// The sentence below it.
@@ -64,6 +78,31 @@ pub enum Block {
     },
     /// What happened when.
     Events(Vec<Event>),
+    /// What a terminal leaves out.
+    OnPage(Box<Block>),
+    /// What a page leaves out.
+    OnTerminal(Box<Block>),
+}
+
+impl Block {
+    /// A drawing, the name of its files, and what it shows.
+    pub fn figure(name: impl Into<String>, figure: Figure, caption: impl Into<String>) -> Self {
+        Self::Figure {
+            name: name.into(),
+            figure,
+            caption: caption.into(),
+        }
+    }
+
+    /// The same, which a terminal leaves out.
+    pub fn on_page(self) -> Self {
+        Self::OnPage(Box::new(self))
+    }
+
+    /// The same, which a page leaves out.
+    pub fn on_terminal(self) -> Self {
+        Self::OnTerminal(Box::new(self))
+    }
 }
 
 /// A table with one heading per column.
@@ -78,17 +117,26 @@ pub struct Table {
 }
 
 impl Table {
+    /// A table with its caption, headings and rows.
+    pub fn new<C: Into<String>>(
+        caption: impl Into<String>,
+        columns: impl IntoIterator<Item = C>,
+        rows: impl IntoIterator<Item = Vec<Cell>>,
+    ) -> Self {
+        Self {
+            caption: caption.into(),
+            columns: columns.into_iter().map(Into::into).collect(),
+            rows: rows.into_iter().collect(),
+        }
+    }
+
     /// A table of names and values.
     pub fn of_pairs<N: Into<String>, V: Into<String>>(
         columns: [&str; 2],
         pairs: impl IntoIterator<Item = (N, V)>,
     ) -> Self {
-        let row = |(name, value): (N, V)| vec![Cell::Text(name.into()), Cell::Text(value.into())];
-        Self {
-            caption: String::new(),
-            columns: columns.map(String::from).to_vec(),
-            rows: pairs.into_iter().map(row).collect(),
-        }
+        let row = |(name, value): (N, V)| vec![Cell::text(name), Cell::text(value)];
+        Self::new("", columns, pairs.into_iter().map(row))
     }
 }
 
@@ -109,10 +157,15 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// A number that there is.
-    pub fn number(value: f64, decimals: usize) -> Self {
+    /// Words.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+
+    /// A number, if there is one.
+    pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> Self {
         Self::Number {
-            value: Some(value),
+            value: value.into(),
             decimals,
         }
     }
@@ -135,6 +188,11 @@ impl Report {
     /// A figure cannot be drawn.
     pub fn to_html(&self) -> Result<String, PlotError> {
         html::document(self)
+    }
+
+    /// Results with where they come from.
+    pub fn stamp<'a, T>(&self, results: &'a T) -> Stamped<'a, T> {
+        self.provenance.clone().stamp(results)
     }
 }
 

@@ -36,6 +36,13 @@ impl Provenance {
     }
 }
 
+/// Of a result that no scenario decides.
+impl Default for Provenance {
+    fn default() -> Self {
+        Self::of(None)
+    }
+}
+
 /// Results with their provenance, as JSON holds them: one object, `provenance` its last field.
 #[derive(Debug, Clone, Serialize)]
 pub struct Stamped<'a, T> {

@@ -15,7 +15,8 @@ fn report_of(blocks: Vec<Block>) -> String {
         title: "A <b>title</b>".into(),
         summary: "Course: ours.".into(),
         sections: vec![section],
-        provenance: Some(Provenance::of(Some("seed = 1 # </pre><b>".into()))),
+        provenance: Provenance::of(Some("seed = 1 # </pre><b>".into())),
+        ..Report::default()
     }
     .to_html()
     .unwrap()
@@ -36,6 +37,7 @@ fn text_from_outside_cannot_become_markup() {
         Block::Text(evil.into()),
         Block::Table(Table::of_pairs([evil, "b"], [(evil, evil)])),
         Block::Figure {
+            name: String::new(),
             figure,
             caption: evil.into(),
         },
@@ -72,6 +74,7 @@ fn a_report_loads_nothing() {
         ..Figure::default()
     };
     let html = report_of(vec![Block::Figure {
+        name: String::new(),
         figure,
         caption: String::new(),
     }]);
@@ -141,8 +144,47 @@ fn a_sign_can_be_read_off_a_number_however_small() {
         rows: vec![vec![Cell::Signed(-0.0004)]],
         ..Table::default()
     };
-    assert!(table.to_text().ends_with("-0.0004\n"));
+    assert!(table.to_text(None).ends_with("-0.0004\n"));
     assert!(report_of(vec![Block::Table(table)]).contains("<td class=\"number\">-0.0004</td>"));
+}
+
+#[test]
+fn a_page_and_a_terminal_show_the_same_value_but_for_what_is_marked() {
+    let figure = Figure {
+        panels: vec![Panel::default()],
+        ..Figure::default()
+    };
+    let said = |text: &str| Block::Text(text.into());
+    let report = Report {
+        title: "Title".into(),
+        summary: "Three words here.".into(),
+        notes: vec!["A note".into()],
+        sections: vec![
+            Section::new(
+                "First",
+                vec![
+                    Block::figure("figure", figure, "Caption"),
+                    said("Both."),
+                    Block::Table(Table::new("Empty", ["a"], [])),
+                ],
+            ),
+            Section::new(
+                "Second",
+                vec![said("Page.").on_page(), said("Terminal.").on_terminal()],
+            ),
+            Section::new("Third", vec![said("Detail.").on_page()]),
+        ],
+        ..Report::default()
+    };
+    assert_eq!(
+        report.to_text(Some(11)),
+        "Title\n\nThree words\nhere.\n\nFirst\n-----\n\nBoth.\n\nSecond\n------\n\nTerminal.\n"
+    );
+    let html = report.to_html().unwrap();
+    for shown in ["Caption", "Both.", "Page.", "Detail.", "Note: A note."] {
+        assert!(html.contains(shown), "{shown}");
+    }
+    assert!(!html.contains("Terminal.") && !html.contains("Empty"));
 }
 
 #[test]
@@ -156,6 +198,7 @@ fn a_figure_that_cannot_be_drawn_fails_the_report_with_its_name() {
     let section = Section {
         heading: String::new(),
         blocks: vec![Block::Figure {
+            name: String::new(),
             figure,
             caption: String::new(),
         }],
@@ -261,6 +304,7 @@ fn a_report_of_long_records_stays_small() {
         ..Figure::default()
     };
     let block = Block::Figure {
+        name: String::new(),
         figure,
         caption: String::new(),
     };

@@ -45,13 +45,10 @@ impl Detection {
 /// How often and how soon the ECU leaves when something is wrong.
 pub fn detection_table(faults: &Detection) -> Table {
     let row = |row: &CaseResult| {
-        let time = |n: usize| Cell::Number {
-            value: row.left_after_ms.map(|times| f64::from(times[n])),
-            decimals: 0,
-        };
-        let metres = |value: Option<f64>| Cell::Number { value, decimals: 2 };
+        let time = |n: usize| Cell::number(row.left_after_ms.map(|times| f64::from(times[n])), 0);
+        let metres = |value: Option<f64>| Cell::number(value, 2);
         vec![
-            Cell::Text(row.name.into()),
+            Cell::text(row.name),
             Cell::Text(row.class.to_string()),
             Cell::Text(if row.asks_to_leave { "leave" } else { "may go on" }.into()),
             Cell::number(row.runs as f64, 0),
@@ -62,9 +59,9 @@ pub fn detection_table(faults: &Detection) -> Table {
             metres(row.excess_m),
         ]
     };
-    Table {
-        caption: format!("Faults noticed in the world '{}'", faults.world),
-        columns: [
+    Table::new(
+        format!("Faults noticed in the world '{}'", faults.world),
+        [
             "Fault",
             "Class",
             "ECU should",
@@ -74,11 +71,9 @@ pub fn detection_table(faults: &Detection) -> Table {
             "Longest (ms)",
             "Deviation (m)",
             "Beyond dropping (m)",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: faults.shown().map(row).collect(),
-    }
+        ],
+        faults.shown().map(row),
+    )
 }
 
 fn detection_figure(faults: &Detection) -> Figure {
@@ -129,29 +124,34 @@ pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
                    seconds of handover and five until the driver asks again."
         .into();
     let blocks = vec![
-        Block::Figure { figure, caption },
+        Block::Figure {
+            name: String::new(),
+            figure,
+            caption,
+        },
         Block::Table(table(results)),
         Block::Table(causes(results)),
         Block::Table(drives(results)),
         Block::Table(worlds()),
     ];
-    let mut sections = vec![Section {
-        heading: "False declarations".into(),
-        blocks,
-    }];
+    let mut sections = vec![Section::new("False declarations", blocks)];
     if let (Some(figure), Some(faults)) = (detection, faults) {
         let caption = format!(
             "Share of the runs in which the ECU left, and the time from the onset, in the world '{}'. Bars at the left would \
              be faults that nobody notices.",
             faults.world
         );
-        sections.push(Section {
-            heading: "Faults noticed in the same world".into(),
-            blocks: vec![
-                Block::Figure { figure, caption },
+        sections.push(Section::new(
+            "Faults noticed in the same world",
+            vec![
+                Block::Figure {
+                    name: String::new(),
+                    figure,
+                    caption,
+                },
                 Block::Table(detection_table(faults)),
             ],
-        });
+        ));
     }
     write_report(
         directory,
@@ -159,7 +159,8 @@ pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
             title: "Guidance that leaves for nothing".into(),
             summary: SUMMARY.into(),
             sections,
-            provenance: Some(Provenance::of(None)),
+            provenance: Provenance::of(None),
+            ..Report::default()
         },
     )
 }
@@ -191,8 +192,9 @@ fn finding(rate: &Rate, hours: f64) -> String {
 pub fn table(results: &Availability) -> Table {
     let row = |row: &Row| {
         vec![
-            Cell::Text(row.world.into()),
-            Cell::Text(row.road.into()),
+            Cell::text(row.world),
+            Cell::text(row.road),
+            Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
             Cell::number(row.hours, 2),
             Cell::number(row.declarations.count as f64, 0),
             Cell::Text(finding(&row.declarations, row.hours)),
@@ -203,14 +205,14 @@ pub fn table(results: &Availability) -> Table {
             Cell::number(row.diverged as f64, 0),
             Cell::number(row.lost_by_hand.legs as f64, 0),
             Cell::number(row.sdlp_m, 2),
-            Cell::Text(if row.judged { "judged" } else { "beyond" }.into()),
         ]
     };
-    Table {
-        caption: String::new(),
-        columns: [
+    Table::new(
+        "",
+        [
             "World",
             "Road",
+            "Judged",
             "Hours",
             "False declarations",
             "Rate, 95 % confidence",
@@ -221,12 +223,9 @@ pub fn table(results: &Availability) -> Table {
             "Off the road",
             "Lost by hand",
             "SDLP (m)",
-            "",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: results.cells.iter().chain(&results.together).map(row).collect(),
-    }
+        ],
+        results.cells.iter().chain(&results.together).map(row),
+    )
 }
 
 /// The same by the faults that the ECU named.
@@ -234,21 +233,19 @@ pub fn causes(results: &Availability) -> Table {
     let rows = results.cells.iter().flat_map(|row| {
         row.causes.iter().map(|cause| {
             vec![
-                Cell::Text(row.world.into()),
-                Cell::Text(row.road.into()),
+                Cell::text(row.world),
+                Cell::text(row.road),
                 Cell::Text(cause.faults.clone()),
                 Cell::number(cause.rate.count as f64, 0),
                 Cell::Text(finding(&cause.rate, row.hours)),
             ]
         })
     });
-    Table {
-        caption: "By what the ECU named".into(),
-        columns: ["World", "Road", "Faults", "Declarations", "Rate, 95 % confidence"]
-            .map(String::from)
-            .to_vec(),
-        rows: rows.collect(),
-    }
+    Table::new(
+        "By what the ECU named",
+        ["World", "Road", "Faults", "Declarations", "Rate, 95 % confidence"],
+        rows,
+    )
 }
 
 /// The drives of judged worlds in which something happened, each with the number that drives it alone (`--drives`).
@@ -277,9 +274,9 @@ pub fn drives(results: &Availability) -> Table {
             Cell::number(leg.by_hand.largest_error_m, 2),
         ]
     };
-    Table {
-        caption: "Drives in which something happened".into(),
-        columns: [
+    Table::new(
+        "Drives in which something happened",
+        [
             "World",
             "Road",
             "Drive",
@@ -289,21 +286,19 @@ pub fn drives(results: &Availability) -> Table {
             "Ended",
             "By hand",
             "Largest error by hand (m)",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: results.legs.iter().map(row).collect(),
-    }
+        ],
+        results.legs.iter().map(row),
+    )
 }
 
 /// What is real in each world.
 pub fn worlds() -> Table {
-    let row = |c: &WorldKind| vec![Cell::Text(c.name.into()), Cell::Text(c.what.into())];
-    Table {
-        caption: "What is real in each world".into(),
-        columns: ["World", "What is real"].map(String::from).to_vec(),
-        rows: WORLDS.iter().map(row).collect(),
-    }
+    let row = |c: &WorldKind| vec![Cell::text(c.name), Cell::text(c.what)];
+    Table::new(
+        "What is real in each world",
+        ["World", "What is real"],
+        WORLDS.iter().map(row),
+    )
 }
 
 fn figure(results: &Availability) -> Figure {
@@ -414,7 +409,7 @@ mod tests {
             "{:?}",
             none.points
         );
-        let text = table(&results).to_text();
+        let text = table(&results).to_text(None);
         assert!(
             text.contains("no event in 0.08 h: at most 35.9 an hour"),
             "{text}"

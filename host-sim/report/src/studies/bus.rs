@@ -1,12 +1,8 @@
-//! What is shown of the bus's load: a table, a figure, and the files with both.
-
-use std::path::Path;
+//! What is shown of the bus's load: a table and a figure.
 
 use serde::Serialize;
 
-use super::OutputError;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::bus_load::{BIT_RATE, MAX_LOAD, MessageLoad};
 
@@ -34,13 +30,8 @@ impl Load {
         }
     }
 
-    /// With its provenance.
-    pub fn stamped(&self) -> Stamped<'_, Self> {
-        Provenance::of(None).stamp(self)
-    }
-
     /// The sentence that says what it may be.
-    pub fn judgement(&self) -> String {
+    fn judgement(&self) -> String {
         format!(
             "At most {:.2} % of {:.0} kbit/s.",
             100.0 * self.max_load,
@@ -49,11 +40,11 @@ impl Load {
     }
 
     /// Message by message, and the sum.
-    pub fn table(&self) -> Table {
+    fn table(&self) -> Table {
         let share = |load: f64| Cell::number(100.0 * load, 2);
         let rows = self.messages.iter().map(|row| {
             vec![
-                Cell::Text(row.message.into()),
+                Cell::text(row.message),
                 Cell::Text(format!("{:#05x}", row.id)),
                 Cell::number(row.period_ms, 1),
                 Cell::number(f64::from(row.bits), 0),
@@ -62,19 +53,17 @@ impl Load {
         });
         let nothing = || Cell::Text(String::new());
         let sum = vec![
-            Cell::Text("all".into()),
+            Cell::text("all"),
             nothing(),
             nothing(),
             nothing(),
             share(self.load),
         ];
-        Table {
-            caption: String::new(),
-            columns: ["Message", "Identifier", "Period (ms)", "Bits", "Load (%)"]
-                .map(String::from)
-                .to_vec(),
-            rows: rows.chain([sum]).collect(),
-        }
+        Table::new(
+            "",
+            ["Message", "Identifier", "Period (ms)", "Bits", "Load (%)"],
+            rows.chain([sum]),
+        )
     }
 
     fn figure(&self) -> Figure {
@@ -95,35 +84,22 @@ impl Load {
         }
     }
 
-    /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-    ///
-    /// # Errors
-    /// What could not be written or drawn.
-    pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
-        let figure = self.figure();
-        write_figure(directory, "bus", &figure)?;
-        write_json(&directory.join("results.json"), &self.stamped())?;
-        let caption = "Every message at its shortest period, with every stuff bit that can occur.".into();
+    /// The document of the load.
+    pub fn report(&self) -> Report {
+        let caption = "Every message at its shortest period, with every stuff bit that can occur.";
         let blocks = vec![
-            Block::Figure { figure, caption },
+            Block::figure("bus", self.figure(), caption),
             Block::Table(self.table()),
-            Block::Text(self.judgement()),
         ];
-        write_report(
-            directory,
-            &Report {
-                title: "How full the bus is at worst".into(),
-                summary: format!(
-                    "All messages together: {:.2} %. {}",
-                    100.0 * self.load,
-                    self.judgement()
-                ),
-                sections: vec![Section {
-                    heading: "Message by message".into(),
-                    blocks,
-                }],
-                provenance: Some(Provenance::of(None)),
-            },
-        )
+        Report {
+            title: "How full the bus is at worst".into(),
+            summary: format!(
+                "All messages together: {:.2} %. {}",
+                100.0 * self.load,
+                self.judgement()
+            ),
+            sections: vec![Section::new("Message by message", blocks)],
+            ..Report::default()
+        }
     }
 }

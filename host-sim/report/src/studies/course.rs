@@ -1,10 +1,9 @@
-//! The files of a course looked at: its plan, what lies along it, its samples, and a report.
+//! What is shown of a course: its plan, what lies along it, its samples.
 
 use std::path::Path;
 
-use super::files::{write_figure, write_report};
-use super::{OutputError, curves};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
+use super::curves;
+use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::course::{Sample, Survey};
 use haptic_sim::models::road::Course;
@@ -12,15 +11,14 @@ use haptic_sim::models::road::Course;
 /// Width over height of a panel of a figure, so that a plan has one scale.
 const PANEL_ASPECT: f64 = 4.2;
 
-/// Writes the plan and what lies along the road (SVG, PNG), the samples (CSV, JSON) and a report (HTML).
+/// Columns and rows of the picture on a terminal; a character holds 2 by 4 dots.
+const PICTURE: [usize; 2] = [72, 20];
+
+/// Writes the samples (CSV).
 ///
 /// # Errors
-/// What could not be written or drawn.
-pub fn write(survey: &Survey, course: &Course, directory: &Path) -> Result<(), OutputError> {
-    let (plan, along) = (plan(survey), along(survey, course));
-    write_figure(directory, "plan", &plan)?;
-    write_figure(directory, "course", &along)?;
-    write_json(&directory.join("course.json"), &stamped(survey))?;
+/// What could not be written.
+pub fn write_samples(survey: &Survey, directory: &Path) -> Result<(), WriteError> {
     write_file(&directory.join("course.csv"), |f| {
         writeln!(f, "s_m,x_m,y_m,heading_rad,curvature_1pm,bank_rad,grade,width_m")?;
         for s in &survey.samples {
@@ -31,17 +29,11 @@ pub fn write(survey: &Survey, course: &Course, directory: &Path) -> Result<(), O
             )?;
         }
         Ok(())
-    })?;
-    write_report(directory, &report(survey, plan, along))
-}
-
-/// The survey as JSON holds it.
-pub fn stamped(survey: &Survey) -> Stamped<'_, Survey> {
-    Provenance::of(None).stamp(survey)
+    })
 }
 
 /// Least and largest values along the lane's centre.
-pub fn table(survey: &Survey) -> Table {
+fn table(survey: &Survey) -> Table {
     /// Name, unit, digits, value.
     type Quantity = (&'static str, &'static str, usize, fn(&Sample) -> f64);
     let quantities: [Quantity; 4] = [
@@ -53,19 +45,17 @@ pub fn table(survey: &Survey) -> Table {
     let row = |(name, unit, decimals, of): (&str, &str, usize, fn(&Sample) -> f64)| {
         let values = || survey.samples.iter().map(of);
         vec![
-            Cell::Text(name.into()),
+            Cell::text(name),
             Cell::number(values().fold(f64::INFINITY, f64::min), decimals),
             Cell::number(values().fold(f64::NEG_INFINITY, f64::max), decimals),
-            Cell::Text(unit.into()),
+            Cell::text(unit),
         ]
     };
-    Table {
-        caption: String::new(),
-        columns: ["Along the lane's centre", "Least", "Most", "Unit"]
-            .map(String::from)
-            .to_vec(),
-        rows: quantities.into_iter().map(row).collect(),
-    }
+    Table::new(
+        "",
+        ["Along the lane's centre", "Least", "Most", "Unit"],
+        quantities.into_iter().map(row),
+    )
 }
 
 fn plan(survey: &Survey) -> Figure {
@@ -115,33 +105,70 @@ fn along(survey: &Survey, course: &Course) -> Figure {
     }
 }
 
-fn report(survey: &Survey, plan: Figure, along: Figure) -> Report {
+/// The document of a course.
+pub fn report(survey: &Survey, course: &Course) -> Report {
     let facts = [("Length".to_owned(), format!("{:.2} m", survey.length_m))];
     let roads = survey.roads.iter().map(|road| {
         let direction = if road.along_s { "along" } else { "against" };
         let lane = format!("lane {}, driven {direction} its s", road.lane);
         (format!("Road {}", road.road), lane)
     });
-    let figure = |figure, caption: &str| Block::Figure {
-        figure,
-        caption: caption.into(),
-    };
+    let along_road = "Along the road, in the direction of travel: left curves and banks that raise the left edge are positive.";
+    let blocks = vec![
+        Block::Table(Table::of_pairs(["What", "Value"], facts.into_iter().chain(roads))),
+        Block::Table(table(survey)),
+        Block::Text(picture(survey)).on_terminal(),
+        Block::figure("plan", plan(survey), "Seen from above, in the frame of the file."),
+        Block::figure("course", along(survey, course), along_road),
+    ];
     Report {
-        provenance: Some(Provenance::of(None)),
         title: "A course".into(),
-        summary: format!("{}. {}", survey.course, super::notes(&survey.notes)),
-        sections: vec![Section {
-            heading: "The centre of the lane".into(),
-            blocks: vec![
-                Block::Table(Table::of_pairs(["What", "Value"], facts.into_iter().chain(roads))),
-                Block::Table(table(survey)),
-                figure(plan, "Seen from above, in the frame of the file."),
-                figure(
-                    along,
-                    "Along the road, in the direction of travel: left curves and banks that raise \
-                               the left edge are positive.",
-                ),
-            ],
-        }],
+        summary: survey.course.clone(),
+        notes: survey.notes.clone(),
+        sections: vec![Section::new("The centre of the lane", blocks)],
+        ..Report::default()
     }
+}
+
+/// The plan in dots, with one scale for both axes; o marks the start.
+fn picture(survey: &Survey) -> String {
+    let [columns, rows] = PICTURE;
+    let (mut x, mut y) = (
+        [f64::INFINITY, f64::NEG_INFINITY],
+        [f64::INFINITY, f64::NEG_INFINITY],
+    );
+    for sample in &survey.samples {
+        x = [x[0].min(sample.x_m), x[1].max(sample.x_m)];
+        y = [y[0].min(sample.y_m), y[1].max(sample.y_m)];
+    }
+    let dots = [2 * columns - 1, 4 * rows - 1].map(|n| n as f64);
+    // A dot is as wide as it is high where a character is twice as high as wide.
+    let scale = ((x[1] - x[0]) / dots[0]).max((y[1] - y[0]) / dots[1]).max(1e-3);
+    let used = (((y[1] - y[0]) / scale) as usize / 4 + 1).min(rows);
+    let mut cells = vec![vec![0_u8; columns]; used];
+    // Bits of a Braille character by row and column of its dots.
+    const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+    let place = |sample: &Sample| {
+        let column = ((sample.x_m - x[0]) / scale) as usize;
+        let row = ((y[1] - sample.y_m) / scale) as usize;
+        [column.min(2 * columns - 1), row.min(4 * used - 1)]
+    };
+    for sample in &survey.samples {
+        let [column, row] = place(sample);
+        cells[row / 4][column / 2] |= BITS[row % 4][column % 2];
+    }
+    let start = survey.samples.first().map(place);
+    let mut text = String::new();
+    for (row, line) in cells.iter().enumerate() {
+        let glyph = |(column, bits): (usize, &u8)| match (start, bits) {
+            (Some([c, r]), _) if c / 2 == column && r / 4 == row => 'o',
+            (_, 0) => ' ',
+            (_, bits) => char::from_u32(0x2800 + u32::from(*bits)).unwrap_or('.'),
+        };
+        let drawn: String = line.iter().enumerate().map(glyph).collect();
+        text.push_str(drawn.trim_end());
+        text.push('\n');
+    }
+    text.push_str(&format!("(o: start; {:.0} m from left to right)\n", x[1] - x[0]));
+    text
 }

@@ -1,46 +1,28 @@
 //! The answer to "which experiment": its table, its picture and its report.
 
-use std::path::Path;
-
-use super::files::{write_figure, write_report};
-use super::{OutputError, ended};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use super::ended;
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_analysis::identify::{INFORMED, TABLE_4};
 use haptic_batch::design::{Answer, Design};
 
-/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(answer: &Answer, directory: &Path) -> Result<(), OutputError> {
-    let figure = figure(answer);
-    write_figure(directory, "design", &figure)?;
-    write_json(&directory.join("results.json"), &stamped(answer))?;
-    let mut blocks: Vec<Block> = sentences(answer).into_iter().map(Block::Text).collect();
-    blocks.push(Block::Figure {
-        figure,
-        caption: "How long they have to drive, over the frequency of the probe.".into(),
-    });
-    blocks.push(Block::Table(table(answer)));
-    let report = Report {
+/// The document of the answer.
+pub fn report(answer: &Answer) -> Report {
+    let caption = "How long they have to drive, over the frequency of the probe.";
+    let mut blocks = vec![
+        Block::figure("design", figure(answer), caption),
+        Block::Table(table(answer)),
+    ];
+    blocks.extend(sentences(answer).into_iter().map(Block::Text));
+    Report {
         title: format!("Which experiment tells {}", answer.parameter),
         summary: format!(
             "Wanted: a standard error of {} of {}.",
             answer.error, answer.parameter
         ),
-        sections: vec![Section {
-            heading: "Designs".into(),
-            blocks,
-        }],
-        provenance: Some(Provenance::of(None)),
-    };
-    write_report(directory, &report)
-}
-
-/// The answer as JSON holds it.
-pub fn stamped(answer: &Answer) -> Stamped<'_, Answer> {
-    Provenance::of(None).stamp(answer)
+        sections: vec![Section::new("Designs", blocks)],
+        ..Report::default()
+    }
 }
 
 fn form(design: &Design) -> String {
@@ -53,7 +35,7 @@ fn form(design: &Design) -> String {
 }
 
 /// Every design, the best one marked.
-pub fn table(answer: &Answer) -> Table {
+fn table(answer: &Answer) -> Table {
     let row = |(i, d): (usize, &Design)| {
         let mut cells = vec![
             Cell::Text(if answer.best == Some(i) {
@@ -65,32 +47,30 @@ pub fn table(answer: &Answer) -> Table {
             Cell::Text(form(d)),
             Cell::number(d.amplitude_nm, 2),
         ];
-        cells.extend(d.standard_errors.iter().map(|&e| Cell::Number {
-            value: e.is_finite().then_some(e),
-            decimals: 4,
-        }));
-        cells.push(Cell::Number {
-            value: d.needed_s.map(|s| s / 60.0),
-            decimals: 1,
-        });
+        cells.extend(
+            d.standard_errors
+                .iter()
+                .map(|&e| Cell::number(e.is_finite().then_some(e), 4)),
+        );
+        cells.push(Cell::number(d.needed_s.map(|s| s / 60.0), 1));
         cells
     };
     let mut columns: Vec<String> = ["", "Course", "Probe", "N.m"].map(String::from).to_vec();
     columns.extend(INFORMED.map(|n| format!("error {n}")));
     columns.push("Minutes needed".into());
     let once = answer.designs.first().map_or(0.0, |d| d.span_s);
-    Table {
-        caption: format!(
+    Table::new(
+        format!(
             "Least standard errors after once over the course (the first: {once:.0} s), and how long {} takes to {}.",
             answer.parameter, answer.error
         ),
         columns,
-        rows: answer.designs.iter().enumerate().map(row).collect(),
-    }
+        answer.designs.iter().enumerate().map(row),
+    )
 }
 
 /// The answer in words.
-pub fn sentences(answer: &Answer) -> Vec<String> {
+fn sentences(answer: &Answer) -> Vec<String> {
     let Some(best) = answer.best.map(|i| &answer.designs[i]) else {
         return vec![format!(
             "No design here tells {} to {} within two hours.",

@@ -20,7 +20,7 @@ pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(found);
     write_figure(directory, "drivers", &figure)?;
     write_json(&directory.join("results.json"), &stamped(found))?;
-    let mut blocks = vec![Block::Figure {
+    let mut blocks = vec![Block::Figure { name: String::new(),
         figure,
         caption: format!(
             "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. Drives \
@@ -38,7 +38,8 @@ pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
                 heading: "Drivers".into(),
                 blocks,
             }],
-            provenance: Some(Provenance::of(None)),
+            provenance: Provenance::of(None),
+            ..Report::default()
         },
     )
 }

@@ -230,16 +230,18 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
     };
     let [from, to] = results.window_m;
     let mut sections = vec![
-        Section {
-            heading: "Reliance on the guidance (figure 8)".into(),
-            blocks: vec![Block::Figure {
+        Section::new(
+            "Reliance on the guidance (figure 8)",
+            vec![Block::Figure {
+                name: String::new(),
                 figure: nominal,
                 caption: "Lateral error from the centreline, left positive, without failure.".into(),
             }],
-        },
-        Section {
-            heading: "Failure of the guidance (figure 9)".into(),
-            blocks: vec![Block::Figure {
+        ),
+        Section::new(
+            "Failure of the guidance (figure 9)",
+            vec![Block::Figure {
+                name: String::new(),
                 figure: failure,
                 caption: format!(
                     "The guidance torque drops to zero at {} s; one second later the driver steers as manually. \
@@ -247,10 +249,11 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
                     results.failure_time_s
                 ),
             }],
-        },
-        Section {
-            heading: "Failure of the guidance's input".into(),
-            blocks: vec![Block::Figure {
+        ),
+        Section::new(
+            "Failure of the guidance's input",
+            vec![Block::Figure {
+                name: String::new(),
                 figure: handover,
                 caption: format!(
                     "Above, the torque drops to zero at {t} s. Below, the lane preview stops at {t} s: the ECU \
@@ -259,25 +262,22 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
                     t = results.failure_time_s
                 ),
             }],
-        },
+        ),
     ];
     if !results.claims.is_empty() {
         sections.push(claims_section(results));
     }
-    sections.push(Section {
-        heading: "Results".into(),
-        blocks: vec![Block::Table(table(results))],
-    });
+    sections.push(Section::new("Results", vec![Block::Table(table(results))]));
     // So many at a time that paper can hold the table.
     let some = |metrics: &[Definition]| {
         let shown = |d: &Definition| metrics.iter().any(|of| of.name == d.name);
         Block::Table(table_of(results, "", shown))
     };
     let all = DEFINITIONS.chunks(9).map(some);
-    sections.push(Section {
-        heading: "All metrics".into(),
-        blocks: all.chain([Block::Table(definitions_table())]).collect(),
-    });
+    sections.push(Section::new(
+        "All metrics",
+        all.chain([Block::Table(definitions_table())]).collect(),
+    ));
     Report {
         title: "Evaluation of shared steering control".into(),
         summary: format!(
@@ -289,15 +289,13 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
             notes(&results.notes),
         ),
         sections,
-        provenance: Some(provenance(evaluation)),
+        provenance: provenance(evaluation),
+        ..Report::default()
     }
 }
 
 fn claims_section(results: &EvaluationResults) -> Section {
-    Section {
-        heading: "What it must show".into(),
-        blocks: vec![Block::Table(claims_table(results))],
-    }
+    Section::new("What it must show", vec![Block::Table(claims_table(results))])
 }
 
 /// What the evaluation must show, and whether it does.
@@ -310,14 +308,10 @@ pub fn claims_table(results: &EvaluationResults) -> Table {
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
         [holds, claim.claim.as_str(), &claim.evidence]
-            .map(|text| Cell::Text(text.into()))
+            .map(|text| Cell::text(text))
             .to_vec()
     });
-    Table {
-        caption: caption.into(),
-        columns: ["Verdict", "Claim", "Evidence"].map(String::from).to_vec(),
-        rows: rows.collect(),
-    }
+    Table::new(caption, ["Verdict", "Claim", "Evidence"], rows)
 }
 
 fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definition) -> bool) -> Table {
@@ -334,14 +328,11 @@ fn table_of(results: &EvaluationResults, caption: &str, shown: impl Fn(&Definiti
             "end of course".into()
         };
         let texts = [r.condition.to_string(), r.failure.to_string(), ended].map(Cell::Text);
-        [Cell::Number {
-            value: Some(r.t_p),
-            decimals: 1,
-        }]
-        .into_iter()
-        .chain(texts)
-        .chain(left(r))
-        .collect()
+        [Cell::number(r.t_p, 1)]
+            .into_iter()
+            .chain(texts)
+            .chain(left(r))
+            .collect()
     };
     let rows: Vec<(Vec<Cell>, _)> = results.runs.iter().map(|r| (keys(r), r.metrics)).collect();
     let keys = ["t_p (s)", "Condition", "Failure", "Ended", "Guidance ended"];

@@ -192,14 +192,14 @@ fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
         .into_iter()
         .zip(captions)
         .map(|(figure, caption)| Block::Figure {
+            name: String::new(),
             figure,
             caption: caption.into(),
         })
         .collect();
     blocks.insert(0, Block::Table(trajectory_table(experiment)));
-    let truth = |guided: bool, heading: &str| Section {
-        heading: heading.into(),
-        blocks: vec![Block::Table(truth_table(experiment, guided))],
+    let truth = |guided: bool, heading: &str| {
+        Section::new(heading, vec![Block::Table(truth_table(experiment, guided))])
     };
     Report {
         title: "Fourteen drivers, identified".into(),
@@ -214,12 +214,10 @@ fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
         sections: vec![
             truth(true, "With guidance"),
             truth(false, "Manual"),
-            Section {
-                heading: "The identified drivers drive again".into(),
-                blocks,
-            },
+            Section::new("The identified drivers drive again", blocks),
         ],
-        provenance: Some(Provenance::of(None)),
+        provenance: Provenance::of(None),
+        ..Report::default()
     }
 }
 
@@ -252,19 +250,13 @@ pub fn truth_table(experiment: &Experiment, guided: bool) -> Table {
         let start = |method: &str, fit: f64| {
             vec![
                 Cell::Text(drive.participant.to_string()),
-                Cell::Text(method.into()),
-                Cell::Number {
-                    value: Some(fit),
-                    decimals: 1,
-                },
+                Cell::text(method),
+                Cell::number(fit, 1),
             ]
         };
         let mut row = start("truth", t.fitness);
         for (value, (_, _, decimals)) in truths.into_iter().zip(&columns[..shown]) {
-            row.push(Cell::Number {
-                value: Some(value),
-                decimals: *decimals,
-            });
+            row.push(Cell::number(value, *decimals));
             row.push(Cell::Text(String::new()));
         }
         rows.push(row);
@@ -275,33 +267,25 @@ pub fn truth_table(experiment: &Experiment, guided: bool) -> Table {
                 // The published method names a number whatever the data say; it is shown as it would be printed.
                 let paper = finding.identification.method == "paper";
                 let value = if paper { p.optimum } else { p.estimate };
-                row.push(Cell::Number {
-                    value,
-                    decimals: *decimals,
-                });
-                row.push(Cell::Number {
-                    value: p.standard_error,
-                    decimals: *decimals,
-                });
+                row.push(Cell::number(value, *decimals));
+                row.push(Cell::number(p.standard_error, *decimals));
             }
             rows.push(row);
         }
     }
-    Table {
-        caption:
-            "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
-                  come as it would print them, on a bound or not."
-                .into(),
-        columns: headings,
+    Table::new(
+        "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
+                  come as it would print them, on a bound or not.",
+        headings,
         rows,
-    }
+    )
 }
 
 /// How far the identified drivers drive from those that they were identified from.
 pub fn trajectory_table(experiment: &Experiment) -> Table {
     let [low, mean, high] = experiment.published_trajectory_error_m;
     let rows = experiment.drives.iter().map(|d| {
-        let number = |value| Cell::Number { value, decimals: 3 };
+        let number = |value| Cell::number(value, 3);
         vec![
             Cell::Text(d.participant.to_string()),
             Cell::Text(if d.guided { "guided" } else { "manual" }.into()),
@@ -309,15 +293,13 @@ pub fn trajectory_table(experiment: &Experiment) -> Table {
             number(d.paper.trajectory_error_m),
         ]
     });
-    Table {
-        caption: format!(
+    Table::new(
+        format!(
             "Mean absolute trajectory error, m. The paper's, with guidance: {low} to {high}, mean {mean}."
         ),
-        columns: ["Participant", "Drive", "Noise model", "Published method"]
-            .map(String::from)
-            .to_vec(),
-        rows: rows.collect(),
-    }
+        ["Participant", "Drive", "Noise model", "Published method"],
+        rows,
+    )
 }
 
 /// Which drives, recorded or driven again, were not guided throughout; none if all were.

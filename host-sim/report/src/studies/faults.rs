@@ -28,7 +28,11 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
                    that go more than {OFF_ROAD_M} m aside with the torque dropped as well, or that are so far aside without the fault \
                    too when the ECU leaves; their excess is not judged. A number with an arrow stands for what is beyond the axis."
     );
-    let mut blocks = vec![Block::Figure { figure, caption }];
+    let mut blocks = vec![Block::Figure {
+        name: String::new(),
+        figure,
+        caption,
+    }];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
     blocks.push(Block::Table(table(campaign)));
     write_report(
@@ -36,11 +40,9 @@ pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
         &Report {
             title: "Every fault by name".into(),
             summary: summary(campaign),
-            sections: vec![Section {
-                heading: "Fault by fault".into(),
-                blocks,
-            }],
-            provenance: Some(Provenance::of(None)),
+            sections: vec![Section::new("Fault by fault", blocks)],
+            provenance: Provenance::of(None),
+            ..Report::default()
         },
     )
 }
@@ -86,18 +88,16 @@ pub fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
 pub fn table(campaign: &Campaign) -> Table {
     let count = |n: u64| Cell::number(n as f64, 0);
     let row = |row: &CaseResult| {
-        let time = |ms: Option<u32>| Cell::Number {
-            value: ms.map(f64::from),
-            decimals: 0,
-        };
-        let metres = |value: Option<f64>| Cell::Number { value, decimals: 2 };
+        let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
+        let metres = |value: Option<f64>| Cell::number(value, 2);
         let verdict = match row.failures.len() {
             0 => "pass".into(),
             n => format!("FAIL in {n}"),
         };
         vec![
-            Cell::Text(row.name.into()),
+            Cell::text(row.name),
             Cell::Text(row.class.to_string()),
+            Cell::Text(verdict),
             count(row.runs),
             count(row.seen),
             count(row.cycles),
@@ -106,23 +106,20 @@ pub fn table(campaign: &Campaign) -> Table {
             Cell::number(row.peak_torque_nm, 3),
             Cell::number(row.torque_bound_nm, 1),
             count(row.left),
-            Cell::Number {
-                value: row.left_after_ms.map(|[median, _]| f64::from(median)),
-                decimals: 0,
-            },
+            Cell::number(row.left_after_ms.map(|[median, _]| f64::from(median)), 0),
             Cell::number(row.deviation_m, 2),
             metres(row.dropped_m),
             metres(row.excess_m),
             count(row.left_lane),
             count(row.off_road),
-            Cell::Text(verdict),
         ]
     };
-    Table {
-        caption: String::new(),
-        columns: [
+    Table::new(
+        "",
+        [
             "Fault",
             "Class",
+            "Verdict",
             "Runs",
             "Seen",
             "Cycles",
@@ -137,12 +134,9 @@ pub fn table(campaign: &Campaign) -> Table {
             "Excess (m)",
             "Left lane",
             "Off road",
-            "Verdict",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: campaign.rows.iter().map(row).collect(),
-    }
+        ],
+        campaign.rows.iter().map(row),
+    )
 }
 
 /// Reaction beside deadline, torque beside bound. Deadlines span 1 ms to seconds, so the reaction is a share of its

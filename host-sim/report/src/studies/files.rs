@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::OutputError;
-use crate::document::{Report, write_file};
+use crate::document::{Block, Report, write_file};
 use crate::plot::Figure;
 
 /// A figure as `NAME.svg` and `NAME.png`.
@@ -15,6 +15,19 @@ pub(super) fn write_figure(directory: &Path, name: &str, figure: &Figure) -> Res
     Ok(write_file(&directory.join(format!("{name}.png")), |f| {
         f.write_all(&png)
     })?)
+}
+
+/// The figures of a report, and the report itself as `report.html`.
+///
+/// # Errors
+/// What could not be written or drawn.
+pub fn write(report: &Report, directory: &Path) -> Result<(), OutputError> {
+    for block in report.sections.iter().flat_map(|section| &section.blocks) {
+        if let Block::Figure { name, figure, .. } = block {
+            write_figure(directory, name, figure)?;
+        }
+    }
+    write_report(directory, report)
 }
 
 /// The report as `report.html`.

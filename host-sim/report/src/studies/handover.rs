@@ -1,71 +1,43 @@
-//! What the handover study shows: a table, a figure, and the files with both.
+//! What the handover study shows: a table and a figure.
 
-use std::path::Path;
-
-use super::files::{write_figure, write_report};
-use super::{OutputError, ended};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use super::ended;
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::evaluate::DRIVERS_T_P;
 use haptic_batch::handover::{HandoverResults, HandoverRow, SPEEDS_KMH};
 use haptic_sim::scenario::Condition;
 
-/// What of the study a page or a terminal says before the table.
-pub const SUMMARY: &str = "Peak lateral error in the first curve of paper-course, stretched to the speed (0.93 m/s2), \
-                           failure in the arc. Ratio: over the larger of the no-failure and the manual peak.";
-
 /// Why a line ends: a driver who is not stable alone is not judged.
 const UNSTABLE: &str = "ends: unstable by hand";
 
-/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(results: &HandoverResults, directory: &Path) -> Result<(), OutputError> {
-    let figure = figure(results);
-    write_figure(directory, "handover", &figure)?;
-    write_json(&directory.join("results.json"), &stamped(results))?;
-    let blocks = vec![
-        Block::Figure {
-            figure,
-            caption: format!(
-                "Peak after a handed-over loss of input and after a sudden loss of torque, as a ratio. Judged are high \
-                 and mid reliance where the manual driver is stable: {} at most.",
-                results.most
-            ),
-        },
-        Block::Text(judgement(results)),
-        Block::Table(table(results)),
-    ];
-    write_report(
-        directory,
-        &Report {
-            title: "What a lost input costs".into(),
-            summary: SUMMARY.into(),
-            sections: vec![Section {
-                heading: "Handover beside sudden loss".into(),
-                blocks,
-            }],
-            provenance: Some(Provenance::of(None)),
-        },
-    )
-}
-
-/// The results as JSON holds them.
-pub fn stamped(results: &HandoverResults) -> Stamped<'_, HandoverResults> {
-    Provenance::of(None).stamp(results)
-}
-
-/// The sentence that says whether the bound is kept.
-pub fn judgement(results: &HandoverResults) -> String {
-    format!(
+/// The study's document.
+pub fn report(results: &HandoverResults) -> Report {
+    let caption = format!(
+        "Peak after a handed-over loss of input and after a sudden loss of torque, as a ratio. Judged are high and mid \
+         reliance where the manual driver is stable: {} at most.",
+        results.most
+    );
+    let judgement = format!(
         "Largest handover ratio of a judged row: {:.2} (at most {}).",
         results.largest_judged_ratio, results.most
-    )
+    );
+    let blocks = vec![
+        Block::figure("handover", figure(results), caption),
+        Block::Table(table(results)),
+        Block::Text(judgement),
+    ];
+    Report {
+        title: "What a lost input costs".into(),
+        summary: "Peak lateral error in the first curve of paper-course, stretched to the speed (0.93 m/s2), failure in the \
+                  arc. Ratio: over the larger of the no-failure and the manual peak."
+            .into(),
+        sections: vec![Section::new("Handover beside sudden loss", blocks)],
+        ..Report::default()
+    }
 }
 
 /// Every row of the study.
-pub fn table(results: &HandoverResults) -> Table {
+fn table(results: &HandoverResults) -> Table {
     let row = |row: &HandoverRow| {
         let verdict = match (row.manual_stable, row.is_judged(), row.is_broken()) {
             (false, ..) => "manual driver unstable",
@@ -80,30 +52,28 @@ pub fn table(results: &HandoverResults) -> Table {
             Cell::number(row.speed_kmh, 0),
             Cell::number(row.t_p, 1),
             Cell::Text(row.condition.to_string()),
+            Cell::text(verdict),
         ];
-        cells.extend(peaks.map(|value| Cell::Number { value, decimals: 3 }));
-        cells.extend(ratios.map(|value| Cell::Number { value, decimals: 2 }));
-        cells.push(Cell::Text(verdict.into()));
+        cells.extend(ratios.map(|value| Cell::number(value, 2)));
+        cells.extend(peaks.map(|value| Cell::number(value, 3)));
         cells
     };
-    Table {
-        caption: String::new(),
-        columns: [
+    Table::new(
+        "",
+        [
             "Speed (km/h)",
             "t_p (s)",
             "Reliance",
+            "Verdict",
+            "Handover ratio",
+            "Sudden loss ratio",
             "Manual (m)",
             "No failure (m)",
             "Handover (m)",
             "Sudden loss (m)",
-            "Handover ratio",
-            "Sudden loss ratio",
-            "Verdict",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: results.rows.iter().map(row).collect(),
-    }
+        ],
+        results.rows.iter().map(row),
+    )
 }
 
 /// A panel for each driver that is judged: ratios over the speed.

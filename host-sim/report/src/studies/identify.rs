@@ -267,6 +267,7 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
 /// A figure with its caption.
 fn figure(figure: Figure, caption: &str) -> Block {
     Block::Figure {
+        name: String::new(),
         figure,
         caption: caption.into(),
     }
@@ -374,7 +375,8 @@ fn report(drive: &IdentifiedDrive, always: [Figure; 4], where_known: [Option<Fig
             found.method, found.rows, found.fit_percent
         ),
         sections,
-        provenance: Some(Provenance::of(None)),
+        provenance: Provenance::of(None),
+        ..Report::default()
     }
 }
 

@@ -1,5 +1,4 @@
-//! What each study leaves: its figures, its results, and the report that shows them. Each module makes its tables
-//! once, for the report and for the terminal.
+//! What each study shows: a function of each module makes a report of its results, for a page and for a terminal.
 
 pub mod availability;
 pub mod bus;
@@ -26,6 +25,7 @@ use crate::document::WriteError;
 use crate::plot::{Mark, PlotError, Series};
 
 pub use crate::document::SeriesFormat;
+pub use files::write;
 
 /// Notes as the end of a report's summary.
 fn notes(notes: &[String]) -> String {

@@ -1,10 +1,6 @@
-//! The files of the study, and the panel of estimate and truth that a single run shares with it.
+//! What the study shows, and the panel of estimate and truth that a single run shares with it.
 
-use std::path::Path;
-
-use super::OutputError;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::reliance::{
     Accuracy, Example, NEAR, ParticipantResult, REMNANT, Reading, RelianceResults, SETTLING_S,
@@ -39,24 +35,8 @@ pub(super) fn panel(
     }
 }
 
-/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(results: &RelianceResults, directory: &Path) -> Result<(), OutputError> {
-    let figure = figure(results);
-    write_figure(directory, "reliance", &figure)?;
-    write_json(&directory.join("results.json"), &stamped(results))?;
-    write_report(directory, &report(results, figure))
-}
-
-/// The results as JSON holds them. Every drive follows from the published drivers, the probe and the seeds.
-pub fn stamped(results: &RelianceResults) -> Stamped<'_, RelianceResults> {
-    Provenance::of(None).stamp(results)
-}
-
 /// The errors of all participants together, by time.
-pub fn pooled_table(results: &RelianceResults) -> Table {
+fn pooled_table(results: &RelianceResults) -> Table {
     let row = |a: &Accuracy| {
         vec![
             Cell::number(a.after_s, 0),
@@ -67,24 +47,22 @@ pub fn pooled_table(results: &RelianceResults) -> Table {
             Cell::number(a.coverage, 3),
         ]
     };
-    Table {
-        caption: "All participants pooled".into(),
-        columns: [
+    Table::new(
+        "All participants pooled",
+        [
             "Time (s)",
             "Estimates",
             "Bias",
             "RMS error",
             "Deviation reported",
             "Coverage of 95 %",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: results.pooled.iter().map(row).collect(),
-    }
+        ],
+        results.pooled.iter().map(row),
+    )
 }
 
 /// The errors of each participant, by time.
-pub fn participants_table(results: &RelianceResults) -> Table {
+fn participants_table(results: &RelianceResults) -> Table {
     let times = |what: &'static str| {
         results
             .pooled
@@ -101,15 +79,15 @@ pub fn participants_table(results: &RelianceResults) -> Table {
     let head = ["Participant", "True K_hg", "Estimate"]
         .map(String::from)
         .into_iter();
-    Table {
-        caption: "Each participant".into(),
-        columns: head.chain(times("Bias")).chain(times("RMS")).collect(),
-        rows: results.participants.iter().map(row).collect(),
-    }
+    Table::new(
+        "Each participant",
+        head.chain(times("Bias")).chain(times("RMS")),
+        results.participants.iter().map(row),
+    )
 }
 
 /// How many estimates are near after a change, and what limited or ended the drives.
-pub fn settling(results: &RelianceResults) -> String {
+fn settling(results: &RelianceResults) -> String {
     let (settling, [limited, steps]) = (&results.settling, results.limited_steps);
     format!(
         "Of {} changes {:.1} % of the estimates are within {NEAR} of the new truth after {SETTLING_S} s; of those by \
@@ -139,35 +117,30 @@ fn figure(results: &RelianceResults) -> Figure {
     }
 }
 
-fn report(results: &RelianceResults, figure: Figure) -> Report {
+/// The study's document. Every drive follows from the published drivers, the probe and the seeds.
+pub fn report(results: &RelianceResults) -> Report {
+    let caption = "What the ECU says of K_hg while the driver takes over another's gains.";
+    let summary = format!(
+        "A probe of {} N.m at {} Hz; drivers of table 6 with a remnant of {} N.m below {} Hz, {} seeds each, on the built-in \
+         course, the ECU behind its bus.",
+        results.amplitude_nm, results.frequency_hz, REMNANT.0, REMNANT.1, results.seeds
+    );
+    let changing = vec![
+        Block::figure("reliance", figure(results), caption),
+        Block::Text(settling(results)),
+    ];
+    let steady = vec![
+        Block::Table(pooled_table(results)),
+        Block::Table(participants_table(results)),
+    ];
     Report {
         title: "The driver's reliance, read live".into(),
-        summary: format!(
-            "A probe of {} N.m at {} Hz; drivers of table 6 with a remnant of {} N.m below {} Hz, {} seeds \
-             each, on the built-in course, the ECU behind its bus.",
-            results.amplitude_nm, results.frequency_hz, REMNANT.0, REMNANT.1, results.seeds
-        ),
+        summary,
         sections: vec![
-            Section {
-                heading: "A driver who changes".into(),
-                blocks: vec![
-                    Block::Figure {
-                        figure,
-                        caption: "What the ECU says of K_hg while the driver takes over another's gains."
-                            .into(),
-                    },
-                    Block::Text(settling(results)),
-                ],
-            },
-            Section {
-                heading: "A steady driver".into(),
-                blocks: vec![
-                    Block::Table(pooled_table(results)),
-                    Block::Table(participants_table(results)),
-                ],
-            },
+            Section::new("A driver who changes", changing),
+            Section::new("A steady driver", steady),
         ],
-        provenance: Some(Provenance::of(None)),
+        ..Report::default()
     }
 }
 

@@ -66,15 +66,11 @@ pub fn how_it_ended(single: &SingleRun) -> String {
 pub fn table(results: &SingleResults) -> Table {
     let metric = |d: &Definition| {
         let value = (d.value)(&results.record.metrics);
-        vec![
-            Cell::Text(d.label.into()),
-            Cell::Number { value, decimals: 4 },
-            Cell::Text(d.unit.into()),
-        ]
+        vec![Cell::text(d.label), Cell::number(value, 4), Cell::text(d.unit)]
     };
     let mut rows: Vec<_> = DEFINITIONS.iter().map(metric).collect();
     if let Some(read) = results.k_hg {
-        let name = Cell::Text("K_hg, as the ECU reads it".into());
+        let name = Cell::text("K_hg, as the ECU reads it");
         rows.push(vec![
             name,
             Cell::number(read.k_hg, 4),
@@ -84,11 +80,7 @@ pub fn table(results: &SingleResults) -> Table {
             )),
         ]);
     }
-    Table {
-        caption: String::new(),
-        columns: ["Metric", "Value", "Unit"].map(String::from).to_vec(),
-        rows,
-    }
+    Table::new("", ["Metric", "Value", "Unit"], rows)
 }
 
 fn figure(single: &SingleRun) -> Figure {
@@ -183,10 +175,11 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
             notes(&single.results.notes),
         ),
         sections: vec![
-            Section {
-                heading: "Along the road".into(),
-                blocks: vec![
+            Section::new(
+                "Along the road",
+                vec![
                     Block::Figure {
+                        name: String::new(),
                         figure,
                         caption: if single.scenario.guidance().probe {
                             "Lateral error, wheel angle, torques, and what the ECU says of K_hg.".into()
@@ -196,16 +189,17 @@ fn report(single: &SingleRun, figure: Figure) -> Report {
                     },
                     Block::Events(events(single)),
                 ],
-            },
-            Section {
-                heading: "Metrics".into(),
-                blocks: vec![
+            ),
+            Section::new(
+                "Metrics",
+                vec![
                     Block::Table(table(&single.results)),
                     Block::Table(definitions_table()),
                 ],
-            },
+            ),
         ],
-        provenance: Some(provenance(single)),
+        provenance: provenance(single),
+        ..Report::default()
     }
 }
 

@@ -1,10 +1,6 @@
-//! What is shown of the map over speed and delay: tables, maps, and the files with both.
+//! What is shown of the map over speed and delay: tables and maps.
 
-use std::path::Path;
-
-use super::OutputError;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, signed, write_json};
+use crate::document::{Block, Cell, Report, Section, Table, signed};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::left_by_themselves;
 use haptic_batch::stability::{DELAYS_S, Drive, Place, SHARES, SPEEDS_KMH, Shares};
@@ -12,7 +8,7 @@ use haptic_sim::scenario::Condition;
 use serde::Serialize;
 
 /// What the map is about.
-pub const SUMMARY: &str = "Growth: the largest real part of the loop's eigenvalues on a straight; below zero an error dies \
+const SUMMARY: &str = "Growth: the largest real part of the loop's eigenvalues on a straight; below zero an error dies \
                            down, above it grows. Peak: the largest lateral error through a curve of 0.93 m/s2, simulated with the shipping ECU.";
 
 /// The results as JSON holds them.
@@ -24,51 +20,29 @@ pub struct Map {
     pub shares: Vec<Shares>,
 }
 
-/// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(map: &Map, directory: &Path) -> Result<(), OutputError> {
-    let (growth, peak) = (growth_figure(map), peak_figure(map));
-    write_figure(directory, "stability", &growth)?;
-    write_figure(directory, "peaks", &peak)?;
-    write_json(&directory.join("results.json"), &stamped(map))?;
+/// The document of the map.
+pub fn report(map: &Map) -> Report {
+    let growth = "Growth (1/s) by speed and delay, by hand and with guidance. The stronger the colour, the faster an error dies down \
+                  or grows.";
+    let peaks = "Peak lateral error (m) in the curve by speed and delay.";
     let blocks = vec![
-        Block::Figure {
-            figure: growth,
-            caption: "Growth (1/s) by speed and delay, by hand and with guidance. The stronger the colour, the faster an error \
-                      dies down or grows."
-                .into(),
-        },
-        Block::Figure {
-            figure: peak,
-            caption: "Peak lateral error (m) in the curve by speed and delay.".into(),
-        },
+        Block::figure("stability", growth_figure(map), growth),
+        Block::figure("peaks", peak_figure(map), peaks),
         Block::Table(growth_table(map)),
         Block::Table(peak_table(map)),
         Block::Table(shares(map)),
+        Block::Text(judgement(map)),
     ];
-    write_report(
-        directory,
-        &Report {
-            title: "Who keeps the lane, how fast, with which delay".into(),
-            summary: format!("{SUMMARY} {}", judgement(map)),
-            sections: vec![Section {
-                heading: "Speed and delay".into(),
-                blocks,
-            }],
-            provenance: Some(Provenance::of(None)),
-        },
-    )
-}
-
-/// The map with where it comes from.
-pub fn stamped(map: &Map) -> Stamped<'_, Map> {
-    Provenance::of(None).stamp(map)
+    Report {
+        title: "Who keeps the lane, how fast, with which delay".into(),
+        summary: SUMMARY.into(),
+        sections: vec![Section::new("Speed and delay", blocks)],
+        ..Report::default()
+    }
 }
 
 /// Whether guidance keeps every driver stable who is stable alone.
-pub fn judgement(map: &Map) -> String {
+fn judgement(map: &Map) -> String {
     let broken: Vec<String> = map
         .places
         .iter()
@@ -109,20 +83,17 @@ pub fn judgement(map: &Map) -> String {
 }
 
 /// The map of growths, a row for each way to drive and each delay.
-pub fn growth_table(map: &Map) -> Table {
+fn growth_table(map: &Map) -> Table {
     let caption = "Growth (1/s): with - an error dies down, with + the loop is unstable";
     rows(map, caption, |drive| Cell::Signed(drive.growth_per_s))
 }
 
 /// The map of peaks.
-pub fn peak_table(map: &Map) -> Table {
+fn peak_table(map: &Map) -> Table {
     rows(
         map,
         "Peak lateral error (m); a dash: the vehicle leaves the road",
-        |drive| Cell::Number {
-            value: drive.peak_m,
-            decimals: 3,
-        },
+        |drive| Cell::number(drive.peak_m, 3),
     )
 }
 
@@ -137,14 +108,13 @@ fn rows(map: &Map, caption: &str, cell: fn(&Drive) -> Cell) -> Table {
     let rows = Condition::ALL
         .into_iter()
         .flat_map(|condition| DELAYS_S.map(|t_p| row(condition, t_p)));
-    Table {
-        caption: caption.into(),
-        columns: ["Drive".into(), "t_p (s)".into()]
+    Table::new(
+        caption,
+        ["Drive".into(), "t_p (s)".into()]
             .into_iter()
-            .chain(SPEEDS_KMH.map(|kmh| format!("{kmh} km/h")))
-            .collect(),
-        rows: rows.collect(),
-    }
+            .chain(SPEEDS_KMH.map(|kmh| format!("{kmh} km/h"))),
+        rows,
+    )
 }
 
 /// Every place with the drive of one kind there.
@@ -163,27 +133,23 @@ fn name(condition: Condition) -> String {
 }
 
 /// Which share of the guidance at a speed makes the least stable driver most stable.
-pub fn shares(map: &Map) -> Table {
+fn shares(map: &Map) -> Table {
     let row = |row: &Shares| {
         let mut cells = vec![Cell::number(row.speed_kmh, 0)];
-        cells.extend(row.growth_per_s.map(|value| Cell::Number { value, decimals: 3 }));
-        cells.push(Cell::Number {
-            value: row.best(),
-            decimals: 2,
-        });
+        cells.extend(row.growth_per_s.map(|value| Cell::number(value, 3)));
+        cells.push(Cell::number(row.best(), 2));
         cells
     };
     let mut columns = vec!["Speed (km/h)".into()];
     columns.extend(SHARES.map(|share| format!("Share {share}")));
     columns.push("Recommended".into());
-    Table {
-        caption: "Largest growth (1/s) of all guided drives where the manual one is stable, by the share of the guidance that a \
+    Table::new(
+        "Largest growth (1/s) of all guided drives where the manual one is stable, by the share of the guidance that a \
                   schedule leaves at the speed (guidance.low_speed_share, guidance.high_speed_share); recommended is the largest \
-                  share within 0.01 /s of the least growth"
-            .into(),
+                  share within 0.01 /s of the least growth",
         columns,
-        rows: map.shares.iter().map(row).collect(),
-    }
+        map.shares.iter().map(row),
+    )
 }
 
 /// A growth of this size has the strongest colour, 1/s.
@@ -300,7 +266,7 @@ mod tests {
             [(worse, "+0.0003", (20.0, 0.1)), (grows, "+0.200", (30.0, 0.1))]
         );
         assert_eq!(figure.panels[0].title, "manual");
-        let text = growth_table(&map).to_text();
+        let text = growth_table(&map).to_text(None);
         assert!(
             text.contains("-0.0004  +0.0004") && text.contains("+0.0003   +0.200"),
             "{text}"

@@ -95,7 +95,7 @@ pub fn stamped(results: &StudyResults) -> Stamped<'_, StudyResults> {
 }
 
 fn text(text: impl Into<String>) -> Cell {
-    Cell::Text(text.into())
+    Cell::text(text)
 }
 
 /// Who drives what, in which order: a row for each participant.
@@ -108,11 +108,7 @@ pub fn plan(sessions: &[Session]) -> Table {
         row.extend(of_one.iter().map(|session| text(&session.condition)));
         row
     });
-    Table {
-        caption: String::new(),
-        columns,
-        rows: rows.collect(),
-    }
+    Table::new("", columns, rows)
 }
 
 /// Every session, with what two of its metrics are.
@@ -124,7 +120,7 @@ pub fn sessions(results: &StudyResults) -> Table {
             let value = recorded
                 .zip(found)
                 .and_then(|(r, d)| (d.value)(&r.record.metrics));
-            Cell::Number { value, decimals: 3 }
+            Cell::number(value, 3)
         };
         let left = recorded.map(|r| r.record.away).filter(Away::is_by_itself);
         let state = match (recorded, session.who) {
@@ -144,20 +140,18 @@ pub fn sessions(results: &StudyResults) -> Table {
             metric("rms_driver_torque_nm"),
         ]
     };
-    Table {
-        caption: String::new(),
-        columns: [
+    Table::new(
+        "",
+        [
             "Participant",
             "Place",
             "Condition",
             "State",
             "Peak lateral error (m)",
             "RMS driver torque (N.m)",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: results.sessions.iter().map(row).collect(),
-    }
+        ],
+        results.sessions.iter().map(row),
+    )
 }
 
 /// Metrics whose differences a terminal shows; the files have all.
@@ -172,7 +166,7 @@ const SHOWN: [&str; 4] = [
 pub fn differences(results: &StudyResults) -> Table {
     let row = |d: &Difference| {
         let label = DEFINITIONS.iter().find(|own| own.name == d.metric);
-        let number = |value: Option<f64>, decimals| Cell::Number { value, decimals };
+        let number = |value: Option<f64>, decimals| Cell::number(value, decimals);
         vec![
             text(format!("{} - {}", d.to, d.from)),
             text(label.map_or(d.metric, |own| own.label)),
@@ -185,15 +179,21 @@ pub fn differences(results: &StudyResults) -> Table {
         ]
     };
     let shown = results.differences.iter().filter(|d| SHOWN.contains(&d.metric));
-    Table {
-        caption: "Differences within participants, each with its own 95 % interval (not corrected for their number); d_z is the \
-                  mean over the standard deviation of the differences. differences.csv has every metric."
-            .into(),
-        columns: ["Conditions", "Metric", "Unit", "Difference", "95 % from", "to", "d_z", "n"]
-            .map(String::from)
-            .to_vec(),
-        rows: shown.map(row).collect(),
-    }
+    Table::new(
+        "Differences within participants, each with its own 95 % interval (not corrected for their number); d_z is the \
+                  mean over the standard deviation of the differences. differences.csv has every metric.",
+        [
+            "Conditions",
+            "Metric",
+            "Unit",
+            "Difference",
+            "95 % from",
+            "to",
+            "d_z",
+            "n",
+        ],
+        shown.map(row),
+    )
 }
 
 /// Each metric by condition: mean and standard deviation over the sessions that did not leave the road, guided throughout
@@ -221,18 +221,11 @@ pub fn by_condition(results: &StudyResults) -> Table {
             cells.extend([
                 // Of no value it is no number, which a table shows as a dash.
                 Cell::number(mean, 4),
-                Cell::Number {
-                    value: deviation,
-                    decimals: 4,
-                },
+                Cell::number(deviation, 4),
                 Cell::number(n, 0),
             ]);
         }
         cells
     };
-    Table {
-        caption: String::new(),
-        columns,
-        rows: DEFINITIONS.iter().map(row).collect(),
-    }
+    Table::new("", columns, DEFINITIONS.iter().map(row))
 }

@@ -122,7 +122,11 @@ impl Validation {
         let caption = caption.into();
         let broken = self.broken().into_iter().map(|line| format!("Not kept: {line}."));
         let mut blocks: Vec<Block> = broken.map(Block::Text).collect();
-        blocks.push(Block::Figure { figure, caption });
+        blocks.push(Block::Figure {
+            name: String::new(),
+            figure,
+            caption,
+        });
         blocks.extend(self.tables().into_iter().map(Block::Table));
         write_report(
             directory,
@@ -133,7 +137,8 @@ impl Validation {
                     heading: "Truth and estimate".into(),
                     blocks,
                 }],
-                provenance: Some(Provenance::of(None)),
+                provenance: Provenance::of(None),
+                ..Report::default()
             },
         )
     }

@@ -11,7 +11,7 @@ use haptic_target::PilError;
 use haptic_target::parameters::Product;
 use serde_json::json;
 
-use super::super::{BadInput, Outcome, print, print_json};
+use super::super::{BadInput, Outcome, print, print_json, width};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Arguments {
@@ -135,7 +135,7 @@ fn listing(params: &Params) -> String {
             .to_vec(),
         rows: PARAMETERS.iter().zip(params.to_values()).map(row).collect(),
     };
-    table.to_text()
+    table.to_text(width())
 }
 
 #[cfg(test)]

@@ -36,24 +36,25 @@ pub fn write(sweep: &Sweep, summary: &Summary, file: &str, directory: &Path) -> 
         let mut blocks = Vec::new();
         for (name, caption, figure) in figures {
             write_figure(directory, &name, &figure)?;
-            blocks.push(Block::Figure { figure, caption });
+            blocks.push(Block::Figure {
+                name: String::new(),
+                figure,
+                caption,
+            });
         }
         let filled = tables.by_ref().take(own).filter(|table| !table.rows.is_empty());
         blocks.extend(filled.map(Block::Table));
         if !blocks.is_empty() {
-            sections.push(Section {
-                heading: heading.into(),
-                blocks,
-            });
+            sections.push(Section::new(heading, blocks));
         }
     }
     let rest = tables
         .map(Block::Table)
         .chain([Block::Table(definitions_table())]);
-    sections.push(Section {
-        heading: "The worst drives, and what the metrics mean".into(),
-        blocks: rest.collect(),
-    });
+    sections.push(Section::new(
+        "The worst drives, and what the metrics mean",
+        rest.collect(),
+    ));
     write_json(&directory.join("summary.json"), summary)?;
     write_report(
         directory,
@@ -61,7 +62,8 @@ pub fn write(sweep: &Sweep, summary: &Summary, file: &str, directory: &Path) -> 
             title: "Sweep".into(),
             summary: headline(summary),
             sections,
-            provenance: Some(Provenance::of(Some(sweep.text().into()))),
+            provenance: Provenance::of(Some(sweep.text().into())),
+            ..Report::default()
         },
     )
 }
@@ -99,28 +101,23 @@ pub fn headline(summary: &Summary) -> String {
 }
 
 /// What a sweep plans.
-pub fn plan(sweep: &Sweep) -> String {
+pub fn plan(sweep: &Sweep, width: Option<usize>) -> String {
     let columns = ["drive", "seed"]
         .into_iter()
         .chain(sweep.columns())
-        .map(String::from)
-        .collect();
+        .map(String::from);
     let rows = (0..sweep.drives().min(FIRST_ROWS)).map(|drive| {
         let point = sweep.point(drive);
         let own = [Cell::number(drive as f64, 0), Cell::Text(point.seed.to_string())];
         own.into_iter().chain(values(&point).map(Cell::Text)).collect()
     });
-    let table = Table {
-        caption: String::new(),
-        columns,
-        rows: rows.collect(),
-    };
+    let table = Table::new("", columns, rows);
     format!(
         "{} drives in {} chunks, design {}\n\n{}",
         sweep.drives(),
         sweep.chunks(),
         sweep.design(),
-        table.to_text()
+        table.to_text(width)
     )
 }
 

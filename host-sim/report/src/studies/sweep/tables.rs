@@ -67,10 +67,7 @@ fn of_metric(mut effect: Effect, metric: &str) -> Effect {
 fn distributions(summary: &Summary) -> Table {
     let row = |of: &haptic_batch::sweep::Distribution| {
         let digits = decimals(of.metric);
-        let number = |value| Cell::Number {
-            value,
-            decimals: digits,
-        };
+        let number = |value| Cell::number(value, digits);
         let mut cells = vec![Cell::Text(heading(of.metric)), Cell::number(of.count as f64, 0)];
         cells.extend([number(of.mean), number(of.sd), number(of.min)]);
         cells.extend(of.quantiles.iter().map(|(_, value)| number(Some(*value))));
@@ -81,31 +78,28 @@ fn distributions(summary: &Summary) -> Table {
     let columns = [
         "Metric", "Drives", "Mean", "SD", "Least", "5 %", "25 %", "50 %", "75 %", "95 %", "99 %", "Most",
     ];
-    Table {
-        caption: "How the metrics are spread over the drives".into(),
-        columns: columns.map(String::from).to_vec(),
-        rows: summary.distributions.iter().map(row).collect(),
-    }
+    Table::new(
+        "How the metrics are spread over the drives",
+        columns,
+        summary.distributions.iter().map(row),
+    )
 }
 
 fn shares(summary: &Summary) -> Table {
     let mut columns = vec!["Field".to_string()];
     columns.extend(summary.distributions.iter().map(|of| label(of.metric)));
     let row = |effect: &Effect| {
-        let shares = effect.shares.iter().map(|(_, value)| Cell::Number {
-            value: *value,
-            decimals: 3,
-        });
+        let shares = effect.shares.iter().map(|(_, value)| Cell::number(*value, 3));
         [Cell::Text(effect.field.clone())]
             .into_iter()
             .chain(shares)
             .collect()
     };
-    Table {
-        caption: "Share of each metric's variance that a field explains by itself".into(),
+    Table::new(
+        "Share of each metric's variance that a field explains by itself",
         columns,
-        rows: summary.effects.iter().map(row).collect(),
-    }
+        summary.effects.iter().map(row),
+    )
 }
 
 fn indices(summary: &Summary) -> Table {
@@ -116,19 +110,17 @@ fn indices(summary: &Summary) -> Table {
         cells.extend([first[0], first[1], total[0], total[1]].map(number));
         cells
     };
-    Table {
-        caption: "Sobol indices: share of the variance by a field alone, and with all others".into(),
-        columns: ["Metric", "Field", "First order", "SE", "Total", "SE "]
-            .map(String::from)
-            .to_vec(),
-        rows: summary.sobol.iter().map(row).collect(),
-    }
+    Table::new(
+        "Sobol indices: share of the variance by a field alone, and with all others",
+        ["Metric", "Field", "First order", "SE", "Total", "SE "],
+        summary.sobol.iter().map(row),
+    )
 }
 
 /// The metric that judges along each field; which level is best is said where one is told apart from another.
 fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
     let (name, unit) = metric(summary.judge);
-    let mut columns = ["Field", "Value", "Unit", "Drives", "Diverged"]
+    let mut columns = ["Field", "Value", "Unit", "Verdict", "Drives", "Diverged"]
         .map(String::from)
         .to_vec();
     columns.extend([
@@ -139,18 +131,22 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
     if summary.limit.is_some() {
         columns.extend(["Bad (%)", "95 % from", "to"].map(String::from));
     }
-    columns.push(String::new());
     let digits = decimals(summary.judge);
     let row = |effect: &Effect, level: &haptic_batch::sweep::Level| {
         let drives = &level.drives;
         let unit = effect.unit.as_deref().unwrap_or(OWN_UNIT);
-        let mut cells = [&effect.field, &level.label, unit]
-            .map(|text| Cell::Text(text.into()))
+        let verdict = match effect.best.contains(&level.label) {
+            true if effect.best.len() > 1 => "among the best",
+            true => "best",
+            false => "",
+        };
+        let mut cells = [&effect.field, &level.label, unit, verdict]
+            .map(|text| Cell::text(text))
             .to_vec();
         cells.extend([drives.count, drives.diverged].map(|count| Cell::number(count as f64, 0)));
         let mut known = |value: Option<f64>, interval: Option<[f64; 2]>, decimals| {
             let ends = interval.map_or([None; 2], |ends| ends.map(Some));
-            cells.extend([value, ends[0], ends[1]].map(|value| Cell::Number { value, decimals }));
+            cells.extend([value, ends[0], ends[1]].map(|value| Cell::number(value, decimals)));
         };
         known(drives.mean, drives.interval, digits);
         if summary.limit.is_some() {
@@ -161,12 +157,6 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
                 2,
             );
         }
-        let verdict = match effect.best.contains(&level.label) {
-            true if effect.best.len() > 1 => "among the best",
-            true => "best",
-            false => "",
-        };
-        cells.push(Cell::Text(verdict.into()));
         cells
     };
     let effects = by_weight(summary);
@@ -181,11 +171,11 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
         [] => String::new(),
         _ => format!("; nothing is told apart along {}", alike.join(", ")),
     };
-    Table {
-        caption: format!("By value of each field (of a distribution: by sixteenths){alike}"),
+    Table::new(
+        format!("By value of each field (of a distribution: by sixteenths){alike}"),
         columns,
-        rows: rows.collect(),
-    }
+        rows,
+    )
 }
 
 /// What the values of one field do along the others, those that matter most first.
@@ -212,10 +202,7 @@ fn compared(summary: &Summary, most: usize) -> Table {
         let value = |label: &String| {
             let own = level.compared.iter().find(|own| own.label == *label);
             let value = own.and_then(|own| own.drives.beyond.map(|share| 100.0 * share).or(own.drives.mean));
-            Cell::Number {
-                value,
-                decimals: digits,
-            }
+            Cell::number(value, digits)
         };
         let mut cells = vec![
             Cell::Text(effect.field.clone()),
@@ -231,11 +218,11 @@ fn compared(summary: &Summary, most: usize) -> Table {
         .flat_map(|effect| effect.levels.iter().map(move |level| row(effect, level)));
     let mut columns: Vec<String> = ["Field", "Value", "Drives"].map(String::from).to_vec();
     columns.extend(labels.iter().map(|own| format!("{own}{unit}")));
-    Table {
-        caption: format!("{what} by {compare}, along the other fields"),
+    Table::new(
+        format!("{what} by {compare}, along the other fields"),
         columns,
-        rows: rows.collect(),
-    }
+        rows,
+    )
 }
 
 fn worst(sweep: &Sweep, summary: &Summary, file: &str) -> Table {
@@ -245,10 +232,7 @@ fn worst(sweep: &Sweep, summary: &Summary, file: &str) -> Table {
     let row = |drive: &haptic_batch::sweep::Worst| {
         let mut cells = vec![Cell::number(drive.drive as f64, 0)];
         cells.extend(drive.values.iter().map(|value| Cell::Text(short(value))));
-        cells.push(Cell::Number {
-            value: drive.value,
-            decimals: decimals(summary.judge),
-        });
+        cells.push(Cell::number(drive.value, decimals(summary.judge)));
         let ended = if drive.diverged { "diverged" } else { "at its end" };
         let left = drive.away.when_and_why().filter(|_| drive.away.is_by_itself());
         cells.push(Cell::Text(
@@ -260,11 +244,11 @@ fn worst(sweep: &Sweep, summary: &Summary, file: &str) -> Table {
         )));
         cells
     };
-    Table {
-        caption: format!("The worst drives by {}", label(summary.judge)),
+    Table::new(
+        format!("The worst drives by {}", label(summary.judge)),
         columns,
-        rows: summary.worst.iter().map(row).collect(),
-    }
+        summary.worst.iter().map(row),
+    )
 }
 
 /// Six digits tell drives apart.

@@ -1,0 +1,82 @@
+//! What every study does with its results in the same way: the files of `--out`, what is printed, the exit code.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use haptic_report::document::{Report, write_json};
+use serde::Serialize;
+
+use super::output::Output;
+use super::{BadInput, Outcome, print, print_json, print_notes, width};
+
+#[derive(Debug, Args)]
+pub(super) struct ResultArguments {
+    /// Directory for figures, the results and a report; default: no files
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Print the results as one JSON object instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+impl ResultArguments {
+    /// For a command, as it is typed. Its directory is checked before there is work behind it.
+    pub(super) fn begin(&self, command: &str) -> Result<Results<'_>, BadInput> {
+        self.begin_beside(command, &[])
+    }
+
+    /// The same, where the command keeps files by other means too.
+    pub(super) fn begin_beside(&self, command: &str, keeps: &[&str]) -> Result<Results<'_>, BadInput> {
+        let output = self.out.as_deref();
+        Ok(Results {
+            arguments: self,
+            output: output
+                .map(|place| Output::beside(place, command, keeps))
+                .transpose()?,
+            file: "results.json",
+        })
+    }
+}
+
+/// Where the results of a study go.
+pub(super) struct Results<'a> {
+    arguments: &'a ResultArguments,
+    output: Option<Output>,
+    /// Name of the file with the results.
+    file: &'static str,
+}
+
+impl Results<'_> {
+    /// With another name of the file with the results.
+    pub(super) fn named(self, file: &'static str) -> Self {
+        Self { file, ..self }
+    }
+
+    /// Where a study writes what is neither results nor report, if files are wanted.
+    pub(super) fn place(&self) -> Option<&Path> {
+        self.output.as_ref().map(Output::place)
+    }
+
+    /// Writes and prints the results; the command has failed if a check did not hold.
+    pub(super) fn show(
+        self,
+        report: &Report,
+        results: &impl Serialize,
+        holds: bool,
+    ) -> Result<Outcome, BadInput> {
+        if let Some(output) = self.output {
+            write_json(&output.place().join(self.file), results)?;
+            output.finish(|place| haptic_report::studies::write(report, place))?;
+        }
+        if self.arguments.json {
+            print_json(results)?;
+        } else {
+            print(&report.to_text(width()))?;
+        }
+        print_notes(&report.notes);
+        if let Some(directory) = &self.arguments.out {
+            eprintln!("Report: {}", directory.join("report.html").display());
+        }
+        Ok(if holds { Outcome::Good } else { Outcome::Failed })
+    }
+}
