@@ -29,7 +29,7 @@ pub mod candump;
 mod event;
 #[cfg(feature = "formats")]
 pub mod formats;
-#[cfg(feature = "formats")]
+#[cfg(feature = "parquet")]
 pub mod guard;
 pub mod recording;
 pub mod table;

@@ -20,7 +20,8 @@ pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
     let figure = figure(found);
     write_figure(directory, "drivers", &figure)?;
     write_json(&directory.join("results.json"), &stamped(found))?;
-    let mut blocks = vec![Block::Figure { name: String::new(),
+    let mut blocks = vec![Block::Figure {
+        name: String::new(),
         figure,
         caption: format!(
             "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. Drives \

@@ -27,6 +27,7 @@ mod evidence;
 mod finite;
 mod information;
 mod judge;
+mod muscle;
 mod report;
 mod restricted;
 mod rows;
