@@ -176,7 +176,10 @@ fn another_name_is_answered_with_the_right_one() {
             &["experiment", "--participants", "1,3..5"],
             "`--participant 1,3..5` says which ones",
         ),
-        (&["validate"], "--coverage <N>|--corruptions <N>|--methods <N>"),
+        (
+            &["validate"],
+            "--coverage <N>|--corruptions <N>|--changes <N>|--methods <N>",
+        ),
         (&["--speed", "70"], "`host-sim evaluate --speed 70`"),
         (&["evalute"], "'evaluate'"),
         (&["ecu", "parameter"], "'parameters'"),
