@@ -283,7 +283,7 @@ fn claims_table(results: &EvaluationResults) -> Table {
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
         [holds, claim.claim.as_str(), &claim.evidence]
-            .map(|text| Cell::text(text))
+            .map(Cell::text)
             .to_vec()
     });
     Table::new(caption, ["Verdict", "Claim", "Evidence"], rows)

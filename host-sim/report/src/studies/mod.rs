@@ -13,7 +13,7 @@ pub mod faults;
 mod files;
 pub mod handover;
 pub mod identify;
-pub mod pieces;
+mod pieces;
 pub mod reliance;
 pub mod run;
 pub mod stability;

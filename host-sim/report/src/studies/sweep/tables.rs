@@ -141,7 +141,7 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
             false => "",
         };
         let mut cells = [&effect.field, &level.label, unit, verdict]
-            .map(|text| Cell::text(text))
+            .map(Cell::text)
             .to_vec();
         cells.extend([drives.count, drives.diverged].map(|count| Cell::number(count as f64, 0)));
         let mut known = |value: Option<f64>, interval: Option<[f64; 2]>, decimals| {
