@@ -267,6 +267,75 @@ fn studies_leave_their_pictures_when_asked() {
     }
 }
 
+/// Nothing that a study prints is wider than the terminal, and the last line names the report.
+#[test]
+fn a_study_fits_the_terminal_and_names_its_report() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("s.toml"), "condition = 'high'\n").unwrap();
+    let studies = [
+        &["evaluate"][..],
+        &["run", "s.toml", "--out", "run"],
+        &["ecu", "bus", "--out", "bus"],
+        &["course", "paper-course", "--out", "course"],
+        &["faults", "--rows", "jerk", "--seeds", "1", "--out", "faults"],
+        &[
+            "availability",
+            "--drives",
+            "0",
+            "--worlds",
+            "everything",
+            "--fault-seeds",
+            "0",
+            "--out",
+            "away",
+        ],
+        &[
+            "reliance",
+            "--participant",
+            "3",
+            "--seeds",
+            "1",
+            "--out",
+            "reliance",
+        ],
+        &[
+            "design",
+            "--participant",
+            "3",
+            "--confirm",
+            "0",
+            "--frequencies",
+            "2.5",
+            "--out",
+            "design",
+        ],
+        &["experiment", "--participant", "3", "--out", "experiment"],
+    ];
+    for (arguments, width) in studies.into_iter().flat_map(|study| [(study, 80), (study, 100)]) {
+        let output = Command::new(env!("CARGO_BIN_EXE_host-sim"))
+            .args(arguments)
+            .env("COLUMNS", width.to_string())
+            .current_dir(directory.path())
+            .output()
+            .unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        let text = String::from_utf8_lossy(&output.stdout);
+        let too_long = text.lines().find(|line| line.chars().count() > width);
+        assert_eq!(too_long, None, "{arguments:?} at {width}");
+        let said = stderr(&output);
+        let last = said.lines().last().unwrap_or_default();
+        assert!(
+            last.starts_with("Report: ") && last.ends_with("report.html"),
+            "{arguments:?}: {said}"
+        );
+    }
+}
+
 /// A clean log of participants with a known truth: nothing false is identified. One drive of each is too few to hold the
 /// truth in 93 to 97 %, which is said.
 #[test]

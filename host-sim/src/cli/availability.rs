@@ -6,13 +6,13 @@ use clap::Args;
 use haptic_batch::availability::{Leg, Plan, ROADS, study};
 use haptic_campaign::table::{self, FaultCase, Place};
 use haptic_campaign::{World, campaign};
-use haptic_report::document::Table;
-use haptic_report::studies::availability::{self as files, Balance, Detection};
+use haptic_report::studies::availability::{Balance, Detection, report, worlds};
 use haptic_sim::worlds::WORLDS;
 
 use super::checkpoint::Checkpoint;
-use super::output::{self, Output};
-use super::{BadInput, Outcome, print, print_json, progress, width};
+use super::output;
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, print, progress, width};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -40,12 +40,8 @@ pub(super) struct Arguments {
     /// Runs of each fault of the campaign in the world 'everything' (or the last one asked for); 0: none
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     fault_seeds: u64,
-    /// Directory for figures, the results and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
     /// Say what is real in each world, and drive nothing
     #[arg(long, conflicts_with_all = ["out", "json", "checkpoint"])]
     list: bool,
@@ -53,21 +49,13 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if arguments.list {
-        print(&files::worlds().to_text(width()))?;
+        print(&worlds().to_text(width()))?;
         return Ok(Outcome::Good);
     }
     let plan = plan(arguments)?;
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| {
-            Output::beside(
-                place,
-                "availability",
-                &kept_in(place, arguments.checkpoint.as_deref()),
-            )
-        })
-        .transpose()?;
+    let out = arguments.results.out.as_deref();
+    let kept = kept_in(out, arguments.checkpoint.as_deref());
+    let output = arguments.results.begin_beside("availability", &kept)?;
     let (checkpoint, on_record) = match &arguments.checkpoint {
         None => (None, Vec::new()),
         Some(path) => {
@@ -97,29 +85,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         detection: detection(&plan, arguments.fault_seeds),
         availability: results,
     };
-    if let Some(output) = output {
-        output.finish(|place| files::write(&results, place))?;
-    }
-    if arguments.json {
-        print_json(&files::stamped(&results))?;
-    } else {
-        print(&readable(&results))?;
-    }
-    let results = results.availability;
+    let report = report(&results);
     let too_many = |most: f64| {
-        let mut bounds = results.judged().map(|cell| cell.declarations.upper_95);
+        let judged = results.availability.judged();
+        let mut bounds = judged.map(|cell| cell.declarations.upper_95);
         bounds.any(|upper| upper > most || upper.is_nan())
     };
-    Ok(if arguments.max_rate.is_some_and(too_many) {
-        Outcome::Failed
-    } else {
-        Outcome::Good
-    })
+    let holds = !arguments.max_rate.is_some_and(too_many);
+    output.show(&report, &report.stamp(&results), holds)
 }
 
 /// The checkpoint's name, if it lies in the directory of the results.
-fn kept_in<'a>(directory: &Path, checkpoint: Option<&'a Path>) -> Vec<&'a str> {
-    let within = checkpoint.filter(|path| path.parent() == Some(directory));
+fn kept_in<'a>(directory: Option<&Path>, checkpoint: Option<&'a Path>) -> Vec<&'a str> {
+    let within = checkpoint.filter(|path| directory.is_some() && path.parent() == directory);
     within
         .and_then(|path| path.file_name()?.to_str())
         .into_iter()
@@ -179,30 +157,11 @@ fn detection(plan: &Plan, seeds: u64) -> Option<Detection> {
     let named = plan.worlds.iter().find(|world| world.name == "everything");
     let world = named.or(plan.worlds.last()).filter(|_| seeds > 0)?;
     let rows: Vec<&'static FaultCase> = table::rows().filter(|row| row.place != Place::Target).collect();
-    let bar = progress::bar(rows.len() as u64 * seeds, "faults");
-    let campaign = campaign::run(&World::real(world), &rows, 1..seeds + 1, || bar.inc(1));
-    bar.finish_and_clear();
+    let campaign = progress::over(rows.len() as u64 * seeds, "faults", |done| {
+        campaign::run(&World::real(world), &rows, 1..seeds + 1, done)
+    });
     Some(Detection {
         world: world.name,
         rows: campaign.rows,
     })
-}
-
-fn readable(results: &Balance) -> String {
-    let mut text = format!(
-        "{}\n\n{}",
-        files::SUMMARY,
-        files::table(&results.availability).to_text(width())
-    );
-    let mut add = |table: Table| {
-        if !table.rows.is_empty() {
-            text.push_str(&format!("\n{}", table.to_text(width())));
-        }
-    };
-    add(files::causes(&results.availability));
-    add(files::drives(&results.availability));
-    if let Some(faults) = &results.detection {
-        add(files::detection_table(faults));
-    }
-    text
 }

@@ -120,13 +120,11 @@ fn listed(recording: &Recording) -> Table {
             Cell::Text(line.samples.to_string()),
         ]
     };
-    Table {
-        caption: String::new(),
-        columns: ["Channel", "Unit", "Source", "Rate (Hz)", "Values"]
-            .map(String::from)
-            .to_vec(),
-        rows: recording.table().into_iter().map(row).collect(),
-    }
+    Table::new(
+        "",
+        ["Channel", "Unit", "Source", "Rate (Hz)", "Values"],
+        recording.table().into_iter().map(row),
+    )
 }
 
 fn time_column(text: &str) -> Result<TimeColumn, BadInput> {

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use haptic_analysis::identify::{Options, Recording, open_mapped};
-use haptic_batch::identify::{Drivers, compare_drivers};
-use haptic_report::studies::drivers as files;
+use haptic_batch::identify::compare_drivers;
+use haptic_report::studies::drivers::report;
 
-use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress, width};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -27,12 +27,8 @@ pub(super) struct Arguments {
     /// Estimate what is otherwise taken as known; as for identify
     #[arg(long, value_name = "NAME[=LOW..HIGH]")]
     estimate: Vec<String>,
-    /// Directory for figures, results and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -50,25 +46,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         let (log, _) = open_mapped(path, &[], &how)?;
         logs.push((path.display().to_string(), log));
     }
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| Output::begin(place, "drivers"))
-        .transpose()?;
-    let bar = progress::bar(logs.len() as u64, "drives");
-    let found: Drivers = compare_drivers(logs, &options, arguments.pieces, || bar.inc(1));
-    bar.finish_and_clear();
-    if let Some(output) = output {
-        output.finish(|place| files::write(&found, place))?;
-    }
-    if arguments.json {
-        print_json(&files::stamped(&found))?;
-    } else {
-        let tables: Vec<String> = files::tables(&found).iter().map(|t| t.to_text(width())).collect();
-        print(&tables.join("\n"))?;
-    }
-    if let Some(directory) = &arguments.out {
-        eprintln!("Report: {}", directory.join("report.html").display());
-    }
-    Ok(Outcome::Good)
+    let output = arguments.results.begin("drivers")?;
+    let drives = logs.len() as u64;
+    let found = progress::over(drives, "drives", |done| {
+        compare_drivers(logs, &options, arguments.pieces, done)
+    });
+    let report = report(&found);
+    output.show(&report, &report.stamp(&found), true)
 }

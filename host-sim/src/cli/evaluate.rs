@@ -1,22 +1,21 @@
 //! `host-sim evaluate`, which `host-sim` alone is too.
 
-use std::path::PathBuf;
-
 use clap::{Args, ValueEnum};
 use haptic_analysis::metrics::Window;
 use haptic_batch::check_window;
-use haptic_batch::evaluate::{Evaluation, RUNS, evaluate};
-use haptic_report::studies::evaluation as files;
+use haptic_batch::evaluate::{RUNS, evaluate};
+use haptic_report::studies::evaluation::{report, write_series};
 use haptic_sim::input::in_range;
 use haptic_sim::models::road::Course;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, Failure, SPEED_KMH, Scenario, Sensors};
 
-use super::output::Output;
+use super::results::{DEFAULT_OUT, ResultArguments};
 use super::road::CourseArguments;
 use super::series::SeriesArgument;
-use super::{BadInput, Outcome, print, print_json, print_notes, progress, width};
+use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("out", |out| out.default_value("out").help(DEFAULT_OUT)))]
 pub(super) struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
@@ -32,12 +31,8 @@ pub(super) struct Arguments {
     /// What the controller sees: full resolution every millisecond, or the paper's sensors over the bus
     #[arg(long, value_enum, default_value_t = SensorsArgument::Paper)]
     sensors: SensorsArgument,
-    /// Print the results as one JSON object instead of a table
-    #[arg(long)]
-    json: bool,
-    /// Directory for figures, results and report
-    #[arg(long, value_name = "DIR", default_value = "out")]
-    out: PathBuf,
+    #[command(flatten)]
+    results: ResultArguments,
     /// Also every sample of the 30 runs, in the directory's runs/: 172 MB as CSV, a fifth of it compressed
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = SeriesArgument::None)]
     series: SeriesArgument,
@@ -74,44 +69,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(window) = window {
         check_window(window, &base).map_err(|e| format!("--{e}"))?;
     }
-    let output = Output::begin(&arguments.out, "evaluate")?;
-    let bar = progress::bar(RUNS as u64, "runs");
-    let evaluation = evaluate(&base, window, || bar.inc(1))?;
-    bar.finish_and_clear();
-    output.finish(|place| files::write(&evaluation, arguments.series.into(), place))?;
-    if arguments.json {
-        print_json(&files::stamped(&evaluation))?;
-    } else {
-        print(&readable(&evaluation))?;
+    let output = arguments.results.begin("evaluate")?;
+    let evaluation = progress::over(RUNS as u64, "runs", |done| evaluate(&base, window, done))?;
+    if let Some(place) = output.place() {
+        write_series(&evaluation, arguments.series.into(), place)?;
     }
-    print_notes(&evaluation.results.notes);
-    eprintln!("Report: {}", arguments.out.join("report.html").display());
-    Ok(if evaluation.results.all_claims_hold() {
-        Outcome::Good
-    } else {
-        Outcome::Failed
-    })
-}
-
-/// What a reader of the table cannot guess.
-const LEGEND: &str = "t_p: the driver's delay. Condition: how much the driver relies on the guidance.
-Failure: none, the guidance torque lost at once, or its input lost and the torque handed over.";
-
-fn readable(evaluation: &Evaluation) -> String {
+    let report = report(&evaluation);
     let results = &evaluation.results;
-    let [from, to] = results.window_m;
-    let mut text = format!(
-        "{}, {} km/h, {} to {} m of {:.0} m, failure at {} s\n\n{}\n{LEGEND}\n",
-        results.course,
-        results.speed_kmh,
-        from,
-        to,
-        results.course_length_m,
-        results.failure_time_s,
-        files::table(results).to_text(width())
-    );
-    if !results.claims.is_empty() {
-        text.push_str(&format!("\n{}", files::claims_table(results).to_text(width())));
-    }
-    text
+    output.show(&report, &report.stamp(results), results.all_claims_hold())
 }

@@ -1,16 +1,15 @@
 //! `host-sim experiment`.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use haptic_batch::experiment::{Drive, Experiment, Plan, experiment};
-use haptic_report::studies::experiment as files;
+use haptic_batch::experiment::{Plan, experiment};
+use haptic_report::studies::experiment::{report, write_logs};
 
-use super::output::Output;
 use super::participants::{Participants, check_probe};
-use super::{BadInput, Outcome, print, print_json, print_notes, progress, width};
+use super::results::{DEFAULT_OUT, ResultArguments};
+use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("out", |out| out.default_value("out/experiment").help(DEFAULT_OUT)))]
 pub(super) struct Arguments {
     #[command(flatten)]
     participants: Participants,
@@ -21,15 +20,11 @@ pub(super) struct Arguments {
     /// Seed of the remnants
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Directory for figures, results and a report
-    #[arg(long, value_name = "DIR", default_value = "out/experiment")]
-    out: PathBuf,
     /// Write the recorded drives too, a CSV file each, into the directory's logs/
     #[arg(long)]
     logs: bool,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -39,54 +34,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         probe_nm: arguments.probe,
         seed: arguments.seed,
     };
-    let output = Output::begin(&arguments.out, "experiment")?;
-    let bar = progress::bar(2 * plan.participants.len() as u64, "drives");
-    let result = experiment(&plan, || bar.inc(1))?;
-    bar.finish_and_clear();
-    output.finish(|place| {
-        if arguments.logs {
-            files::write_logs(&result, &place.join("logs"))?;
-        }
-        files::write(&result, place)
-    })?;
-    if arguments.json {
-        print_json(&files::stamped(&result))?;
-    } else {
-        print(&readable(&result))?;
+    let output = arguments.results.begin("experiment")?;
+    let drives = 2 * plan.participants.len() as u64;
+    let result = progress::over(drives, "drives", |done| experiment(&plan, done))?;
+    if let Some(place) = output.place().filter(|_| arguments.logs) {
+        write_logs(&result, &place.join("logs"))?;
     }
-    print_notes(files::left(&result).as_slice());
-    eprintln!("Report: {}", arguments.out.join("report.html").display());
-    Ok(Outcome::Good)
-}
-
-fn readable(result: &Experiment) -> String {
-    let mean = |guided: bool, value: fn(&Drive) -> Option<f64>| -> String {
-        let values: Vec<f64> = result
-            .drives
-            .iter()
-            .filter(|d| d.guided == guided)
-            .filter_map(value)
-            .collect();
-        match values.len() {
-            0 => "-".into(),
-            count => format!("{:.3}", values.iter().sum::<f64>() / count as f64),
-        }
-    };
-    let [low, middle, high] = result.published_trajectory_error_m;
-    format!(
-        "{}, probe {} N.m, seed {}; a dash: not identified\n\nManual\n{}\nGuided\n{}\n{}\n\
-         Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69). {}\n\
-         Mean trajectory error, guided: noise model {} m, published method {} m (the paper: {middle}, {low} to {high})",
-        result.course,
-        result.probe_nm,
-        result.seed,
-        files::truth_table(result, false).to_text(width()),
-        files::truth_table(result, true).to_text(width()),
-        files::trajectory_table(result).to_text(width()),
-        mean(false, |d| Some(d.paper.identification.fit_percent)),
-        mean(true, |d| Some(d.paper.identification.fit_percent)),
-        files::FIT_IS_CALIBRATED,
-        mean(true, |d| d.noise_model.trajectory_error_m),
-        mean(true, |d| d.paper.trajectory_error_m),
-    )
+    let report = report(&result);
+    output.show(&report, &report.stamp(&result), true)
 }

@@ -1,17 +1,16 @@
 //! `host-sim faults`.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use haptic_campaign::campaign::{self, Campaign};
+use haptic_campaign::campaign;
 use haptic_campaign::drivers::Drivers;
 use haptic_campaign::table::{self as rows, FaultCase, Place};
 use haptic_campaign::{World, document, target};
-use haptic_report::studies::faults as files;
+use haptic_report::document::write_file;
+use haptic_report::studies::faults::{report, story};
 use haptic_sim::worlds::WORLDS;
 
-use super::output::Output;
-use super::{BadInput, Outcome, print, print_json, progress, width};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, print, progress};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -39,12 +38,8 @@ pub(super) struct Arguments {
     /// Print the table of faults, as docs/reference/fault-campaign.md has it, and run nothing
     #[arg(long, conflicts_with_all = ["rows", "world", "drivers", "seeds", "seed", "target", "json", "out"])]
     list: bool,
-    /// Print the results as one JSON object instead of a table
-    #[arg(long)]
-    json: bool,
-    /// Directory for a figure, the results (JSON), the table of faults (Markdown) and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -57,12 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(seed) => seed..seed + 1,
         None => 1..arguments.seeds + 1,
     };
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| Output::begin(place, "faults"))
-        .transpose()?;
-    let bar = progress::bar(chosen.len() as u64 * (seeds.end - seeds.start), "runs");
+    let output = arguments.results.begin("faults")?.named("faults.json");
     let world = match &arguments.world {
         None => World::new(),
         Some(name) => match WORLDS.iter().find(|kind| kind.name == name) {
@@ -81,30 +71,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Some(drivers) => world.driven_by(drivers),
         None => world,
     };
-    let campaign = if arguments.target {
-        target::run(&world, &chosen, seeds, || bar.inc(1))?
-    } else {
-        campaign::run(&world, &chosen, seeds, || bar.inc(1))
-    };
-    bar.finish_and_clear();
-    if let Some(output) = output {
-        output.finish(|place| files::write(&campaign, place))?;
-    }
-    if arguments.json {
-        print_json(&files::stamped(&campaign))?;
-    } else {
-        print(&readable(&campaign))?;
-        if let Some(seed) = arguments.seed {
-            for row in &chosen {
-                print(&story(&world, row, seed))?;
-            }
+    let runs = chosen.len() as u64 * (seeds.end - seeds.start);
+    let campaign = progress::over(runs, "runs", |done| {
+        if arguments.target {
+            return target::run(&world, &chosen, seeds, done);
         }
+        Ok(campaign::run(&world, &chosen, seeds, done))
+    })?;
+    let told = arguments.seed.into_iter().flat_map(|seed| {
+        let world = &world;
+        chosen.iter().map(move |row| story(row, world.run(row, seed)))
+    });
+    let report = report(&campaign, told.collect());
+    if let Some(place) = output.place() {
+        let faults = document::table_of_faults();
+        write_file(&place.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
     }
-    Ok(if campaign.failures().next().is_some() {
-        Outcome::Failed
-    } else {
-        Outcome::Good
-    })
+    let holds = campaign.failures().next().is_none();
+    output.show(&report, &report.stamp(&campaign), holds)
 }
 
 fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, BadInput> {
@@ -131,33 +115,4 @@ fn choose(names: &[String], in_qemu: bool) -> Result<Vec<&'static FaultCase>, Ba
             Some(row) => Ok(row),
         })
         .collect()
-}
-
-fn readable(campaign: &Campaign) -> String {
-    let mut text = files::table(campaign).to_text(width());
-    for failure in campaign.failures() {
-        text.push_str(&format!("\n{}\n", files::failure(failure)));
-    }
-    text.push_str(&format!("\n{}", files::summary(campaign)));
-    text
-}
-
-/// What the ECU reported in one run.
-fn story(world: &World, row: &'static FaultCase, seed: u64) -> String {
-    let outcome = world.run(row, seed);
-    let mut text = format!(
-        "\n{}: {}; {}, {}, fault at {:.3} s\n",
-        row.name,
-        row.injected,
-        outcome.driver,
-        outcome.change.map_or_else(
-            || format!("{} km/h", outcome.speed_kmh),
-            |change| change.to_string()
-        ),
-        f64::from(outcome.onset_ms) * 1e-3
-    );
-    for event in outcome.reported {
-        text.push_str(&format!("  {:.3} s  {}\n", event.time_s, event.what));
-    }
-    text
 }

@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use haptic_analysis::identify::Options;
-use haptic_batch::identify::{IdentifiedDrive, Method, identify, identify_pieces, identify_several};
-use haptic_report::studies::{identify as files, pieces};
+use haptic_batch::identify::{Method, identify, identify_pieces, identify_several};
+use haptic_report::studies::identify::report;
 use haptic_sim::input::in_range;
 use haptic_sim::scenario::{DEFAULT_SPEED_KMH, SPEED_KMH};
 
-use super::output::Output;
 use super::recording::RecordingArguments;
+use super::results::{DEFAULT_OUT, ResultArguments};
 use super::road::CourseArguments;
-use super::{BadInput, Outcome, print, print_json, width};
+use super::{BadInput, Outcome};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("out", |out| out.default_value("out/identify").help(DEFAULT_OUT)))]
 pub(super) struct Arguments {
     #[command(flatten)]
     recording: RecordingArguments,
@@ -60,12 +61,8 @@ pub(super) struct Arguments {
     /// Speed on that course, km/h (20 to 250)
     #[arg(long, value_name = "KMH", default_value_t = DEFAULT_SPEED_KMH)]
     speed: f64,
-    /// Directory for figures, results and a report
-    #[arg(long, value_name = "DIR", default_value = "out/identify")]
-    out: PathBuf,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -90,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         MethodArgument::NoiseModel => Method::NoiseModel,
     };
     let course = arguments.course.open()?;
-    let output = Output::begin(&arguments.out, "identify")?;
+    let output = arguments.results.begin("identify")?;
     let (log, converted) = arguments.recording.open(arguments.manual, &options.stretches)?;
     let name = arguments.recording.log.display().to_string();
     let mut drive = if arguments.pieces {
@@ -124,58 +121,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(course) = course {
         drive.drive_again(course, arguments.speed, &options)?;
     }
-    output.finish(|place| files::write(&drive, place))?;
-    if arguments.json {
-        print_json(&files::stamped(&drive))?;
-    } else {
-        print(&readable(&drive))?;
-    }
-    eprintln!("Report: {}", arguments.out.join("report.html").display());
-    Ok(Outcome::Good)
-}
-
-fn readable(drive: &IdentifiedDrive) -> String {
-    let found = &drive.results.identification;
-    let mut text = format!(
-        "{}: method {}, {} rows, fit of the driver torque {:.1} %\n\n{}",
-        drive.name,
-        found.method,
-        found.rows,
-        found.fit_percent,
-        files::parameters(found).to_text(width())
-    );
-    for sentence in files::verdicts(found) {
-        text.push_str(&format!("\n{sentence}"));
-    }
-    text.push('\n');
-    for table in drive.results.pieces.iter().flat_map(pieces::tables) {
-        text.push_str(&format!("\n{}", table.to_text(width())));
-    }
-    if let Some(in_the_log) = files::in_the_log(found) {
-        text.insert_str(0, &format!("{}\n", in_the_log.to_text(width())));
-    }
-    for sentence in files::refutations(found) {
-        text.push_str(&format!("\n{sentence}\n"));
-    }
-    if !found.assumed.is_empty() {
-        text.push_str("\nAssumed, for the log cannot show it:\n");
-        for assumed in &found.assumed {
-            text.push_str(&format!("- {assumed}\n"));
-        }
-    }
-    if !found.combinations.is_empty() {
-        text.push_str(&format!("\n{}", files::combinations(found).to_text(width())));
-    }
-    text.push_str(&format!("\n{}", files::correlation(found).to_text(width())));
-    text.push_str(&format!("\n{}\n", files::input_tests(found).to_text(width())));
-    for (name, value) in files::facts(found) {
-        text.push_str(&format!("{name}: {value}\n"));
-    }
-    for note in &found.notes {
-        text.push_str(&format!("\n- {note}"));
-    }
-    if let Some(again) = files::drives_again(drive) {
-        text.push_str(&format!("\n\n{}", again.to_text(width())));
-    }
-    text
+    let report = report(&drive);
+    output.show(&report, &report.stamp(&drive.results), true)
 }

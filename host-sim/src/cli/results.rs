@@ -9,6 +9,9 @@ use serde::Serialize;
 use super::output::Output;
 use super::{BadInput, Outcome, print, print_json, print_notes, width};
 
+/// Help of `--out` where a study always leaves files.
+pub(super) const DEFAULT_OUT: &str = "Directory for figures, the results and a report";
+
 #[derive(Debug, Args)]
 pub(super) struct ResultArguments {
     /// Directory for figures, the results and a report; default: no files
@@ -20,6 +23,11 @@ pub(super) struct ResultArguments {
 }
 
 impl ResultArguments {
+    /// Of a command whose `--out` has a default.
+    pub(super) fn directory(&self) -> &Path {
+        self.out.as_deref().unwrap_or(Path::new(""))
+    }
+
     /// For a command, as it is typed. Its directory is checked before there is work behind it.
     pub(super) fn begin(&self, command: &str) -> Result<Results<'_>, BadInput> {
         self.begin_beside(command, &[])
@@ -27,14 +35,21 @@ impl ResultArguments {
 
     /// The same, where the command keeps files by other means too.
     pub(super) fn begin_beside(&self, command: &str, keeps: &[&str]) -> Result<Results<'_>, BadInput> {
-        let output = self.out.as_deref();
+        let place = self.out.as_deref();
+        let output = place.map(|place| Output::beside(place, command, keeps));
         Ok(Results {
-            arguments: self,
-            output: output
-                .map(|place| Output::beside(place, command, keeps))
-                .transpose()?,
-            file: "results.json",
+            output: output.transpose()?,
+            ..self.without_files()
         })
+    }
+
+    /// The same, where the files are there already.
+    pub(super) fn without_files(&self) -> Results<'_> {
+        Results {
+            arguments: self,
+            output: None,
+            file: "results.json",
+        }
     }
 }
 

@@ -5,24 +5,25 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use haptic_batch::VERSION;
-use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Summary, Sweep, drive_all};
-use haptic_report::document::write_file;
+use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Sweep, drive_all};
+use haptic_report::document::{SeriesFormat, write_file, write_json};
 use haptic_report::studies::run as run_files;
 use haptic_report::studies::sweep as files;
+use haptic_report::studies::write;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{self, Output};
-use super::{BadInput, Outcome, print, print_json, width};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, print, width};
+
+const OUT: &str = "Directory of the sweep: finished chunks, the table (drives.csv, drives.parquet), summary, figures, report. A sweep that was interrupted goes on where it was";
 
 #[derive(Debug, Args)]
+#[command(mut_arg("out", |out| out.default_value("out/sweep").help(OUT)))]
 pub(super) struct Arguments {
     /// Sweep file (TOML): a scenario, what is varied in it and how, the metrics (docs/sweeps.md)
     #[arg(value_name = "FILE.toml")]
     file: PathBuf,
-    /// Directory of the sweep: finished chunks, the table (drives.csv, drives.parquet), summary, figures, report. A sweep
-    /// that was interrupted goes on where it was
-    #[arg(long, value_name = "DIR", default_value = "out/sweep")]
-    out: PathBuf,
     /// Drive only part I of N, on this machine or another one; the table is made when the last part is done in (or
     /// copied into) the same directory
     #[arg(long, value_name = "I/N", default_value = "1/1")]
@@ -32,33 +33,33 @@ pub(super) struct Arguments {
     threads: Option<u32>,
     /// Instead: drive one row of the table again, and compare it with the table if there is one (exit code 1 if it
     /// differs); its scenario is in the printed text
-    #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "dry_run"])]
+    #[arg(long, value_name = "ROW", conflicts_with_all = ["shard", "threads", "dry_run", "json"])]
     replay: Option<u64>,
     /// With --replay: also the scenario, the time series, figures and report of that drive into this directory
     #[arg(long, value_name = "DIR", requires = "replay")]
     replay_out: Option<PathBuf>,
     /// Only check the file, and print how many drives it plans, with its first rows
-    #[arg(long)]
+    #[arg(long, conflicts_with = "json")]
     dry_run: bool,
-    /// Print the summary as one JSON object instead of tables
-    #[arg(long, conflicts_with_all = ["replay", "dry_run"])]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let sweep = Sweep::load(&arguments.file)?;
     if arguments.dry_run {
-        print(&files::plan(&sweep, width()))?;
+        print(&files::plan(&sweep).to_text(width()))?;
         return Ok(Outcome::Good);
     }
     if let Some(drive) = arguments.replay {
         return replay(arguments, &sweep, drive);
     }
-    output::check(&arguments.out, "sweep", kept(&arguments.out))?;
-    let store = Store::open(&sweep, VERSION, &arguments.out)?;
+    let out = arguments.results.directory();
+    output::check(out, "sweep", kept(out))?;
+    let store = Store::open(&sweep, VERSION, out)?;
     output::keeps(format!(
         "{} keeps every chunk that was done; the same command goes on from there.",
-        arguments.out.display()
+        out.display()
     ))?;
     let threads = arguments.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
@@ -78,21 +79,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         Err(error) => return Err(error.into()),
     };
     // What drives a row again is told the table too.
-    let file = format!("{} --out {}", arguments.file.display(), arguments.out.display());
-    match Output::beside(&arguments.out, "sweep", kept(&arguments.out)) {
-        Ok(output) => output.finish(|place| files::write(&sweep, &summary, &file, place))?,
+    let file = format!("{} --out {}", arguments.file.display(), out.display());
+    let output = match arguments.results.begin_beside("sweep", kept(out)) {
         // Every shard that finds all chunks makes the same files.
-        Err(_) if arguments.shard != Shard::WHOLE => {}
-        Err(error) => return Err(error),
-    }
-    if arguments.json {
-        print_json(&summary)?;
-    } else {
-        print(&readable(&sweep, &summary, &file))?;
-    }
-    eprintln!("Table: {}", arguments.out.join("drives.csv").display());
-    eprintln!("Report: {}", arguments.out.join("report.html").display());
-    Ok(Outcome::Good)
+        Err(_) if arguments.shard != Shard::WHOLE => arguments.results.without_files(),
+        output => output?,
+    };
+    eprintln!("Table: {}", out.join("drives.csv").display());
+    let report = files::report(&sweep, &summary, &file);
+    output.named("summary.json").show(&report, &summary, true)
 }
 
 /// What a sweep keeps in its directory beside its report. Of a directory without a sweep nothing is its own.
@@ -102,16 +97,6 @@ fn kept(directory: &Path) -> &'static [&'static str] {
     } else {
         &[]
     }
-}
-
-fn readable(sweep: &Sweep, summary: &Summary, file: &str) -> String {
-    let mut text = format!("{}\n", files::headline(summary));
-    for table in files::short_tables(sweep, summary, file) {
-        if !table.rows.is_empty() {
-            text.push_str(&format!("\n{}", table.to_text(width())));
-        }
-    }
-    text
 }
 
 /// Drives one row again.
@@ -131,35 +116,36 @@ fn replay(arguments: &Arguments, sweep: &Sweep, drive: u64) -> Result<Outcome, B
     if let Some(directory) = &arguments.replay_out {
         write_drive(&scenario, directory)?;
     }
-    let stored = arguments.out.join("sweep.toml").exists();
+    let out = arguments.results.directory();
+    let stored = out.join("sweep.toml").exists();
     let store = if stored {
-        Store::open(sweep, VERSION, &arguments.out).ok()
+        Store::open(sweep, VERSION, out).ok()
     } else {
         None
     };
     let Some(there) = store.and_then(|store| store.get_drive(drive)) else {
-        eprintln!("There is no row to compare with in {}.", arguments.out.display());
+        eprintln!("There is no row to compare with in {}.", out.display());
         return Ok(Outcome::Good);
     };
     if there == driven {
-        eprintln!("The same bits as in the table of {}.", arguments.out.display());
+        eprintln!("The same bits as in the table of {}.", out.display());
         return Ok(Outcome::Good);
     }
-    eprintln!(
-        "NOT the same as in the table of {}: {there:?}",
-        arguments.out.display()
-    );
+    eprintln!("NOT the same as in the table of {}: {there:?}", out.display());
     Ok(Outcome::Failed)
 }
 
 fn write_drive(scenario: &haptic_sim::Scenario, directory: &Path) -> Result<(), BadInput> {
     let output = Output::begin(directory, "sweep --replay")?;
     let single = haptic_batch::run::run(scenario.clone(), false)?;
+    let report = run_files::report(&single);
     output.finish(|place| {
         write_file(&place.join("scenario.toml"), |f| {
             f.write_all(scenario.to_toml().as_bytes())
         })?;
-        run_files::write(&single, haptic_report::studies::SeriesFormat::Csv, place)
+        run_files::write_series(&single, SeriesFormat::Csv, place)?;
+        write_json(&place.join("results.json"), &report.stamp(&single.results))?;
+        write(&report, place)
     })?;
     eprintln!("Report: {}", directory.join("report.html").display());
     Ok(())

@@ -1,14 +1,12 @@
 //! `host-sim validate`: the estimates of `identify` against drivers whose truth is known.
 
-use std::path::PathBuf;
-
 use clap::{ArgGroup, Args};
 use haptic_batch::experiment::{POPULATION, Plan, changes, corruptions, methods, repeat};
 use haptic_report::studies::validation::Validation;
 
-use super::output::Output;
 use super::participants::{Participants, check_probe};
-use super::{BadInput, Outcome, print, print_json, progress, width};
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress};
 
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("question").required(true))]
@@ -42,12 +40,8 @@ pub(super) struct Arguments {
     /// Seed of the remnants of the first drive of each participant; the others count on from it
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Directory for a figure, the results and a report; default: no files
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print the results as one JSON object instead of tables
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    results: ResultArguments,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
@@ -65,11 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         let names: Vec<&str> = POPULATION.iter().map(|(name, _)| *name).collect();
         return Err(format!("--only {:?}: none of {}", arguments.only, names.join("; ")).into());
     }
-    let output = arguments
-        .out
-        .as_deref()
-        .map(|place| Output::begin(place, "validate"))
-        .transpose()?;
+    let output = arguments.results.begin("validate")?;
     let seeds = arguments
         .coverage
         .or(arguments.corruptions)
@@ -78,41 +68,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .unwrap_or(1);
     let fits = if arguments.corruptions.is_some() { ways } else { 1 };
     let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
-    let bar = progress::bar(drives, "drives");
-    let done = || bar.inc(1);
-    let result = if arguments.coverage.is_some() {
-        Validation::Coverage(repeat(&plan, seeds, done)?)
-    } else if arguments.corruptions.is_some() {
-        Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, done)?))
-    } else if arguments.changes.is_some() {
-        Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, done)?))
-    } else {
-        Validation::Methods(methods(&plan, seeds, done)?)
-    };
-    bar.finish_and_clear();
-    if let Some(output) = output {
-        output.finish(|place| result.write(place))?;
-    }
-    if arguments.json {
-        print_json(&result.stamped())?;
-    } else {
-        let tables: Vec<String> = result
-            .tables()
-            .iter()
-            .map(|table| table.to_text(width()))
-            .collect();
-        print(&format!("{}\n\n{}", result.summary(), tables.join("\n")))?;
-    }
+    let result = progress::over(drives, "drives", |done| -> Result<_, String> {
+        Ok(if arguments.coverage.is_some() {
+            Validation::Coverage(repeat(&plan, seeds, done)?)
+        } else if arguments.corruptions.is_some() {
+            Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, done)?))
+        } else if arguments.changes.is_some() {
+            Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, done)?))
+        } else {
+            Validation::Methods(methods(&plan, seeds, done)?)
+        })
+    })?;
     let broken = result.broken();
     for line in &broken {
         eprintln!("NOT KEPT: {line}");
     }
-    if let Some(directory) = &arguments.out {
-        eprintln!("Report: {}", directory.join("report.html").display());
-    }
-    Ok(if broken.is_empty() {
-        Outcome::Good
-    } else {
-        Outcome::Failed
-    })
+    let report = result.report();
+    output.show(&report, &report.stamp(&result), broken.is_empty())
 }

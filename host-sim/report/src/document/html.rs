@@ -15,8 +15,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 const STYLE: &str = include_str!("report.css");
 
 pub(super) fn document(report: &Report) -> Result<String, PlotError> {
-    let sections = report
-        .sections
+    let shown = |section: &&Section| section.blocks.iter().any(Block::is_on_page);
+    let parts: Vec<&Section> = report.sections.iter().filter(shown).collect();
+    let sections = parts
         .iter()
         .enumerate()
         .map(|(i, s)| section(i, s))
@@ -41,7 +42,7 @@ pub(super) fn document(report: &Report) -> Result<String, PlotError> {
                     @if !report.summary.is_empty() { p { (report.summary) } }
                     @for note in &report.notes { p { "Note: " (note) "." } }
                     nav {
-                        @for (i, section) in report.sections.iter().enumerate() {
+                        @for (i, section) in parts.iter().enumerate() {
                             a href={ "#section-" (i + 1) } { (section.heading) }
                         }
                     }

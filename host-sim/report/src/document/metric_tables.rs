@@ -29,7 +29,7 @@ pub fn metrics_table(
 pub fn definitions_table() -> Table {
     let row = |d: &Definition| {
         let cells = [d.label, d.name, d.unit, d.definition, d.source];
-        cells.map(|text| Cell::text(text)).to_vec()
+        cells.map(Cell::text).to_vec()
     };
     Table::new(
         "e: lateral error; T_d: driver's torque; T_h: guidance torque; v: speed; r: yaw rate.",

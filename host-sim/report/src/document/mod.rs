@@ -94,6 +94,16 @@ impl Block {
         }
     }
 
+    /// Whether a page shows it.
+    fn is_on_page(&self) -> bool {
+        match self {
+            Self::Table(table) => !table.rows.is_empty(),
+            Self::OnTerminal(_) => false,
+            Self::OnPage(block) => block.is_on_page(),
+            Self::Text(_) | Self::Figure { .. } | Self::Events(_) => true,
+        }
+    }
+
     /// The same, which a terminal leaves out.
     pub fn on_page(self) -> Self {
         Self::OnPage(Box::new(self))

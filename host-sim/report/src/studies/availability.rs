@@ -1,9 +1,6 @@
-//! What is shown of how often guidance leaves for nothing: tables, a figure, and the files with both.
+//! What is shown of how often guidance leaves for nothing: tables and figures.
 
-use std::path::Path;
-
-use super::{OutputError, files::write_figure, files::write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_batch::availability::{Availability, Cell as Row, Ended, Leg, Rate};
 use haptic_campaign::campaign::CaseResult;
@@ -11,7 +8,7 @@ use haptic_sim::worlds::{WORLDS, WorldKind};
 use serde::Serialize;
 
 /// What the study is about.
-pub const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
+const SUMMARY: &str = "A declaration is what took guidance away. Nothing is wrong in any drive, so each is a false one. \
                            The interval is the exact one of a Poisson rate; where nothing was declared there is only a \
                            bound. Every drive is driven a second time \
                            by hand; one that leaves the road then too is lost by hand, and counted there alone.";
@@ -43,7 +40,7 @@ impl Detection {
 }
 
 /// How often and how soon the ECU leaves when something is wrong.
-pub fn detection_table(faults: &Detection) -> Table {
+fn detection_table(faults: &Detection) -> Table {
     let row = |row: &CaseResult| {
         let time = |n: usize| Cell::number(row.left_after_ms.map(|times| f64::from(times[n])), 0);
         let metres = |value: Option<f64>| Cell::number(value, 2);
@@ -106,68 +103,38 @@ fn detection_figure(faults: &Detection) -> Figure {
     }
 }
 
-/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(results: &Balance, directory: &Path) -> Result<(), OutputError> {
-    let detection = results.detection.as_ref().map(detection_figure);
-    if let Some(detection) = &detection {
-        write_figure(directory, "detection", detection)?;
-    }
-    write_json(&directory.join("results.json"), &stamped(results))?;
-    let (results, faults) = (&results.availability, &results.detection);
-    let figure = figure(results);
-    write_figure(directory, "availability", &figure)?;
-    let caption = "False declarations in an hour with their exact 95 % interval; where there was none, the rate that is not \
-                   exceeded with 95 % confidence, which is large where little was driven. Beside them the time without guidance: two \
-                   seconds of handover and five until the driver asks again."
-        .into();
+/// The study's document.
+pub fn report(results: &Balance) -> Report {
+    let caption = "False declarations in an hour with their exact 95 % interval; where there was none, the rate that is not exceeded \
+                   with 95 % confidence, which is large where little was driven. Beside them the time without guidance: two \
+                   seconds of handover and five until the driver asks again.";
+    let own = &results.availability;
     let blocks = vec![
-        Block::Figure {
-            name: String::new(),
-            figure,
-            caption,
-        },
-        Block::Table(table(results)),
-        Block::Table(causes(results)),
-        Block::Table(drives(results)),
-        Block::Table(worlds()),
+        Block::figure("availability", figure(own), caption),
+        Block::Table(table(own)),
+        Block::Table(causes(own)),
+        Block::Table(drives(own)),
+        Block::Table(worlds()).on_page(),
     ];
     let mut sections = vec![Section::new("False declarations", blocks)];
-    if let (Some(figure), Some(faults)) = (detection, faults) {
+    if let Some(faults) = &results.detection {
         let caption = format!(
-            "Share of the runs in which the ECU left, and the time from the onset, in the world '{}'. Bars at the left would \
-             be faults that nobody notices.",
+            "Share of the runs in which the ECU left, and the time from the onset, in the world '{}'. Bars at the left would be faults \
+             that nobody notices.",
             faults.world
         );
-        sections.push(Section::new(
-            "Faults noticed in the same world",
-            vec![
-                Block::Figure {
-                    name: String::new(),
-                    figure,
-                    caption,
-                },
-                Block::Table(detection_table(faults)),
-            ],
-        ));
+        let blocks = vec![
+            Block::figure("detection", detection_figure(faults), caption),
+            Block::Table(detection_table(faults)),
+        ];
+        sections.push(Section::new("Faults noticed in the same world", blocks));
     }
-    write_report(
-        directory,
-        &Report {
-            title: "Guidance that leaves for nothing".into(),
-            summary: SUMMARY.into(),
-            sections,
-            provenance: Provenance::of(None),
-            ..Report::default()
-        },
-    )
-}
-
-/// The results as JSON holds them.
-pub fn stamped(results: &Balance) -> Stamped<'_, Balance> {
-    Provenance::of(None).stamp(results)
+    Report {
+        title: "Guidance that leaves for nothing".into(),
+        summary: SUMMARY.into(),
+        sections,
+        ..Report::default()
+    }
 }
 
 /// What is known of a rate after so many hours.
@@ -189,7 +156,7 @@ fn finding(rate: &Rate, hours: f64) -> String {
 }
 
 /// Every world on every road; the roads of a judged one together.
-pub fn table(results: &Availability) -> Table {
+fn table(results: &Availability) -> Table {
     let row = |row: &Row| {
         vec![
             Cell::text(row.world),
@@ -229,7 +196,7 @@ pub fn table(results: &Availability) -> Table {
 }
 
 /// The same by the faults that the ECU named.
-pub fn causes(results: &Availability) -> Table {
+fn causes(results: &Availability) -> Table {
     let rows = results.cells.iter().flat_map(|row| {
         row.causes.iter().map(|cause| {
             vec![
@@ -249,7 +216,7 @@ pub fn causes(results: &Availability) -> Table {
 }
 
 /// The drives of judged worlds in which something happened, each with the number that drives it alone (`--drives`).
-pub fn drives(results: &Availability) -> Table {
+fn drives(results: &Availability) -> Table {
     let off = |ended: Ended| match ended {
         Ended::Whole => "",
         Ended::Latched => "latched",

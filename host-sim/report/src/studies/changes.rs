@@ -27,12 +27,9 @@ pub(super) fn summary(found: &Changes) -> String {
 pub(super) fn table(found: &Changes) -> Table {
     let row = |l: &ChangesLine| {
         let count = |n: usize| Cell::number(n as f64, 0);
-        let share = |held: haptic_batch::experiment::Held| Cell::Number {
-            value: held.share(),
-            decimals: 3,
-        };
+        let share = |held: haptic_batch::experiment::Held| Cell::number(held.share(), 3);
         vec![
-            Cell::Text(l.kind.into()),
+            Cell::text(l.kind),
             count(l.drives),
             count(l.seen),
             count(l.refuted_otherwise),
@@ -47,11 +44,10 @@ pub(super) fn table(found: &Changes) -> Table {
             share(l.intervals[1]),
         ]
     };
-    Table {
-        caption: "Seen: the driver is refuted for having changed. False: called identified, and for more than half of the time more than 4 \
-                  standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. In pieces: of the drives that are seen to change."
-            .into(),
-        columns: [
+    Table::new(
+        "Seen: the driver is refuted for having changed. False: called identified, and for more than half of the time more than 4 \
+                  standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. In pieces: of the drives that are seen to change.",
+        [
             "What changes",
             "Drives",
             "Seen",
@@ -65,11 +61,9 @@ pub(super) fn table(found: &Changes) -> Table {
             "In pieces: identified",
             "False",
             "Held by 95 %",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: found.lines.iter().chain([&found.all]).map(row).collect(),
-    }
+        ],
+        found.lines.iter().chain([&found.all]).map(row),
+    )
 }
 
 pub(super) fn figure(found: &Changes) -> Figure {

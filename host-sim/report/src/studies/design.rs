@@ -46,18 +46,19 @@ fn table(answer: &Answer) -> Table {
             Cell::Text(d.course.clone()),
             Cell::Text(form(d)),
             Cell::number(d.amplitude_nm, 2),
+            Cell::number(d.needed_s.map(|s| s / 60.0), 1),
         ];
         cells.extend(
             d.standard_errors
                 .iter()
                 .map(|&e| Cell::number(e.is_finite().then_some(e), 4)),
         );
-        cells.push(Cell::number(d.needed_s.map(|s| s / 60.0), 1));
         cells
     };
-    let mut columns: Vec<String> = ["", "Course", "Probe", "N.m"].map(String::from).to_vec();
+    let mut columns: Vec<String> = ["", "Course", "Probe", "N.m", "Minutes needed"]
+        .map(String::from)
+        .to_vec();
     columns.extend(INFORMED.map(|n| format!("error {n}")));
-    columns.push("Minutes needed".into());
     let once = answer.designs.first().map_or(0.0, |d| d.span_s);
     Table::new(
         format!(

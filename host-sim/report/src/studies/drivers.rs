@@ -1,10 +1,6 @@
 //! Several drivers beside each other: what differs between two, and what a group is like.
 
-use std::path::Path;
-
-use super::OutputError;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Difference, Population, told};
 use haptic_batch::identify::Drivers;
@@ -12,50 +8,29 @@ use haptic_batch::identify::Drivers;
 /// Parameters that a torque record can carry.
 const SHOWN: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
 
-/// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(found: &Drivers, directory: &Path) -> Result<(), OutputError> {
-    let figure = figure(found);
-    write_figure(directory, "drivers", &figure)?;
-    write_json(&directory.join("results.json"), &stamped(found))?;
-    let mut blocks = vec![Block::Figure {
-        name: String::new(),
-        figure,
-        caption: format!(
-            "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. Drives \
+/// The document of the drivers.
+pub fn report(found: &Drivers) -> Report {
+    let caption = format!(
+        "Each driver with the 95 % interval of that driver's own drive; the bands are the group's mean with its interval. Drives \
              too imprecise to name a value count with what they tell. {}",
-            gaps(found)
-        ),
-    }];
+        gaps(found)
+    );
+    let mut blocks = vec![Block::figure("drivers", figure(found), caption)];
     blocks.extend(tables(found).into_iter().map(Block::Table));
-    write_report(
-        directory,
-        &Report {
-            title: format!("{} drivers", found.drivers.len()),
-            summary: "Every drive is a driver of its own.".into(),
-            sections: vec![Section {
-                heading: "Drivers".into(),
-                blocks,
-            }],
-            provenance: Provenance::of(None),
-            ..Report::default()
-        },
-    )
-}
-
-/// The results as JSON holds them.
-pub fn stamped(found: &Drivers) -> Stamped<'_, Drivers> {
-    Provenance::of(None).stamp(found)
+    Report {
+        title: format!("{} drivers", found.drivers.len()),
+        summary: "Every drive is a driver of its own.".into(),
+        sections: vec![Section::new("Drivers", blocks)],
+        ..Report::default()
+    }
 }
 
 fn number(value: Option<f64>) -> Cell {
-    Cell::Number { value, decimals: 4 }
+    Cell::number(value, 4)
 }
 
 /// All that is found: each driver, the differences of two, the population of more.
-pub fn tables(found: &Drivers) -> Vec<Table> {
+fn tables(found: &Drivers) -> Vec<Table> {
     let mut out = vec![each(found)];
     if !found.differences.is_empty() {
         out.push(differences(&found.differences));
@@ -104,19 +79,15 @@ fn each(found: &Drivers) -> Table {
         columns.extend([name.to_owned(), "+-".to_owned()]);
     }
     columns.push("Refuted".to_owned());
-    Table {
-        caption: "Each driver; a dash: not identified.".into(),
-        columns,
-        rows: rows.collect(),
-    }
+    Table::new("Each driver; a dash: not identified.", columns, rows)
 }
 
 fn differences(found: &[Difference]) -> Table {
     let row = |d: &Difference| {
         let [low, high] = d.interval_95;
         vec![
-            Cell::Text(d.parameter.into()),
-            Cell::Text(d.unit.into()),
+            Cell::text(d.parameter),
+            Cell::text(d.unit),
             number(Some(d.difference)),
             number(Some(d.standard_error)),
             number(Some(low)),
@@ -125,13 +96,13 @@ fn differences(found: &[Difference]) -> Table {
             Cell::Text(if d.real { "they differ" } else { "not told apart" }.into()),
         ]
     };
-    Table {
-        caption: format!(
+    Table::new(
+        format!(
             "The first driver less the second. Each interval is that of its parameter alone; the verdict is on all {} together, at \
              5 % (Holm's method).",
             found.len()
         ),
-        columns: [
+        [
             "",
             "Unit",
             "Difference",
@@ -140,18 +111,16 @@ fn differences(found: &[Difference]) -> Table {
             "to",
             "p (Holm)",
             "Verdict",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: found.iter().map(row).collect(),
-    }
+        ],
+        found.iter().map(row),
+    )
 }
 
 fn population(found: &[Population], gaps: &str) -> Table {
     let row = |p: &Population| {
         vec![
-            Cell::Text(p.parameter.into()),
-            Cell::Text(p.unit.into()),
+            Cell::text(p.parameter),
+            Cell::text(p.unit),
             Cell::number(p.drivers as f64, 0),
             number(Some(p.mean)),
             number(Some(p.mean_interval_95[0])),
@@ -161,11 +130,9 @@ fn population(found: &[Population], gaps: &str) -> Table {
             number(Some(p.spread_interval_95[1])),
         ]
     };
-    Table {
-        caption: format!(
-            "The group: its mean, and the standard deviation between drivers (random effects). {gaps}"
-        ),
-        columns: [
+    Table::new(
+        format!("The group: its mean, and the standard deviation between drivers (random effects). {gaps}"),
+        [
             "",
             "Unit",
             "Drivers",
@@ -175,11 +142,9 @@ fn population(found: &[Population], gaps: &str) -> Table {
             "Spread",
             "95 % from",
             "to",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: found.iter().map(row).collect(),
-    }
+        ],
+        found.iter().map(row),
+    )
 }
 
 fn figure(found: &Drivers) -> Figure {

@@ -1,13 +1,11 @@
-//! The files that an evaluation leaves: figures 8 and 9, figure 9 beside a handover, time series, results, and
-//! the report that shows them.
+//! What an evaluation shows: figures 8 and 9, figure 9 beside a handover, and its tables; its time series.
 
 use std::path::Path;
 
-use super::files::{write_figure, write_report};
-use super::{LEFT_THE_ROAD, OutputError, curves, ended, notes};
+use super::{LEFT_THE_ROAD, curves, ended};
 use crate::document::{
-    Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, metrics_table,
-    write_json, write_trace,
+    Block, Cell, Provenance, Report, Section, SeriesFormat, Table, WriteError, definitions_table,
+    metrics_table, write_trace,
 };
 use crate::plot::{Axis, Band, Figure, Marker, Panel, Series, Shade};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
@@ -29,20 +27,15 @@ const IN_SHORT: [&str; 7] = [
     "peak_driver_torque_nm",
 ];
 
-/// Writes figures 8 and 9 (SVG, PNG), the results (JSON) and a report (HTML), and the time series of the 30 runs if
-/// they are asked for.
+/// Writes the time series of the 30 runs, if they are asked for.
 ///
 /// # Errors
-/// What could not be written or drawn.
-pub fn write(evaluation: &Evaluation, series: SeriesFormat, directory: &Path) -> Result<(), OutputError> {
-    let figures = [
-        ("figure8", nominal_figure(evaluation)),
-        ("figure9", failure_figure(evaluation)),
-        ("figure9_handover", handover_figure(evaluation)),
-    ];
-    for (name, figure) in &figures {
-        write_figure(directory, name, figure)?;
-    }
+/// What could not be written.
+pub fn write_series(
+    evaluation: &Evaluation,
+    series: SeriesFormat,
+    directory: &Path,
+) -> Result<(), WriteError> {
     for (scenario, run) in &evaluation.runs {
         let name = format!(
             "t_p_{}_{}_failure_{}",
@@ -52,13 +45,7 @@ pub fn write(evaluation: &Evaluation, series: SeriesFormat, directory: &Path) ->
         );
         write_trace(&directory.join("runs"), &name, &run.trace, series)?;
     }
-    write_json(&directory.join("results.json"), &stamped(evaluation))?;
-    write_report(directory, &report(evaluation, figures.map(|(_, figure)| figure)))
-}
-
-/// The results as JSON holds them, with the scenario that the runs vary.
-pub fn stamped(evaluation: &Evaluation) -> Stamped<'_, EvaluationResults> {
-    provenance(evaluation).stamp(&evaluation.results)
+    Ok(())
 }
 
 /// One of the runs stands for all: they differ in t_p, condition and kind of failure alone.
@@ -69,7 +56,7 @@ fn provenance(evaluation: &Evaluation) -> Provenance {
 }
 
 /// The main metrics of each run.
-pub fn table(results: &EvaluationResults) -> Table {
+fn table(results: &EvaluationResults) -> Table {
     table_of(results, "The main metrics of each run.", |d| {
         IN_SHORT.contains(&d.name)
     })
@@ -216,8 +203,14 @@ fn label(condition: Condition) -> &'static str {
     }
 }
 
-fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) -> Report {
+/// What a reader of the table cannot guess.
+const LEGEND: &str = "t_p: the driver's delay. Condition: how much the driver relies on the guidance.
+Failure: none, the guidance torque lost at once, or its input lost and the torque handed over.";
+
+/// The document of an evaluation.
+pub fn report(evaluation: &Evaluation) -> Report {
     let results = &evaluation.results;
+    let failure_s = results.failure_time_s;
     // All runs have the same.
     let speed = evaluation
         .runs
@@ -229,77 +222,59 @@ fn report(evaluation: &Evaluation, [nominal, failure, handover]: [Figure; 3]) ->
         ""
     };
     let [from, to] = results.window_m;
-    let mut sections = vec![
-        Section::new(
-            "Reliance on the guidance (figure 8)",
-            vec![Block::Figure {
-                name: String::new(),
-                figure: nominal,
-                caption: "Lateral error from the centreline, left positive, without failure.".into(),
-            }],
-        ),
-        Section::new(
-            "Failure of the guidance (figure 9)",
-            vec![Block::Figure {
-                name: String::new(),
-                figure: failure,
-                caption: format!(
-                    "The guidance torque drops to zero at {} s; one second later the driver steers as manually. \
-                     The manual run has no failure and is drawn for comparison.",
-                    results.failure_time_s
-                ),
-            }],
-        ),
-        Section::new(
-            "Failure of the guidance's input",
-            vec![Block::Figure {
-                name: String::new(),
-                figure: handover,
-                caption: format!(
-                    "Above, the torque drops to zero at {t} s. Below, the lane preview stops at {t} s: the ECU \
-                     holds its last trusted torque and fades it to zero over 2 s. One second after either the \
-                     driver steers as manually.",
-                    t = results.failure_time_s
-                ),
-            }],
-        ),
-    ];
-    if !results.claims.is_empty() {
-        sections.push(claims_section(results));
-    }
-    sections.push(Section::new("Results", vec![Block::Table(table(results))]));
+    let nominal = "Lateral error from the centreline, left positive, without failure.";
+    let lost = format!(
+        "The guidance torque drops to zero at {failure_s} s; one second later the driver steers as manually. The manual run has \
+         no failure and is drawn for comparison."
+    );
+    let handed_over = format!(
+        "Above, the torque drops to zero at {failure_s} s. Below, the lane preview stops at {failure_s} s: the ECU holds its \
+         last trusted torque and fades it to zero over 2 s. One second after either the driver steers as manually."
+    );
+    let figure = |name, figure, caption| vec![Block::figure(name, figure, caption)];
     // So many at a time that paper can hold the table.
     let some = |metrics: &[Definition]| {
         let shown = |d: &Definition| metrics.iter().any(|of| of.name == d.name);
-        Block::Table(table_of(results, "", shown))
+        Block::Table(table_of(results, "", shown)).on_page()
     };
     let all = DEFINITIONS.chunks(9).map(some);
-    sections.push(Section::new(
-        "All metrics",
-        all.chain([Block::Table(definitions_table())]).collect(),
-    ));
+    let all = all.chain([Block::Table(definitions_table()).on_page()]);
     Report {
         title: "Evaluation of shared steering control".into(),
         summary: format!(
-            "Three drivers under four conditions on {}, {}, the shipping controller in the loop, sensors: \
-             {}. {course}Metrics are taken over {from} to {to} m of the road. {}",
+            "Three drivers under four conditions on {}, {speed}, the shipping controller in the loop, sensors: {}. {course}Metrics \
+             are taken over {from} to {to} m of {:.0} m of road, failure at {failure_s} s.",
             results.course,
-            speed,
             format!("{:?}", results.sensors).to_lowercase(),
-            notes(&results.notes),
+            results.course_length_m,
         ),
-        sections,
+        notes: results.notes.clone(),
+        sections: vec![
+            Section::new(
+                "Reliance on the guidance (figure 8)",
+                figure("figure8", nominal_figure(evaluation), nominal.into()),
+            ),
+            Section::new(
+                "Failure of the guidance (figure 9)",
+                figure("figure9", failure_figure(evaluation), lost),
+            ),
+            Section::new(
+                "Failure of the guidance's input",
+                figure("figure9_handover", handover_figure(evaluation), handed_over),
+            ),
+            Section::new(
+                "Results",
+                vec![Block::Table(table(results)), Block::Text(LEGEND.into())],
+            ),
+            Section::new("What it must show", vec![Block::Table(claims_table(results))]),
+            Section::new("All metrics", all.collect()),
+        ],
         provenance: provenance(evaluation),
-        ..Report::default()
     }
 }
 
-fn claims_section(results: &EvaluationResults) -> Section {
-    Section::new("What it must show", vec![Block::Table(claims_table(results))])
-}
-
 /// What the evaluation must show, and whether it does.
-pub fn claims_table(results: &EvaluationResults) -> Table {
+fn claims_table(results: &EvaluationResults) -> Table {
     let caption = if results.claims.len() > 1 {
         "The independent implementation's numbers, and the paper's claims as orderings."
     } else {
@@ -308,7 +283,7 @@ pub fn claims_table(results: &EvaluationResults) -> Table {
     let rows = results.claims.iter().map(|claim| {
         let holds = if claim.holds { "holds" } else { "BROKEN" };
         [holds, claim.claim.as_str(), &claim.evidence]
-            .map(|text| Cell::text(text))
+            .map(Cell::text)
             .to_vec()
     });
     Table::new(caption, ["Verdict", "Claim", "Evidence"], rows)

@@ -1,59 +1,30 @@
-//! The files that the experiment leaves: truth beside estimate, the paths driven and driven again (as the
-//! paper's figure 7), trajectory errors beside the paper's, results, and the report that shows them.
+//! What the experiment shows: truth beside estimate, the paths driven and driven again (as the paper's figure 7), trajectory
+//! errors beside the paper's; its recorded drives.
 
 use std::path::Path;
 
-use super::files::{write_figure, write_report};
-use super::{LEFT_THE_ROAD, OutputError, ended};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
+use super::{LEFT_THE_ROAD, ended};
+use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_analysis::identify::{Parameter, Parameters};
 use haptic_batch::experiment::{Drive, Experiment, Finding};
 use haptic_batch::left_by_themselves;
 
 /// What the agreement with the paper's fits rests on.
-pub const FIT_IS_CALIBRATED: &str = "No agreement can be read from these fits: the size of the remnant was chosen so that \
+const FIT_IS_CALIBRATED: &str = "No agreement can be read from these fits: the size of the remnant was chosen so that \
     they come out so";
-
-/// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
-    let mut figures = vec![
-        ("trajectory_errors", trajectory_errors(experiment)),
-        ("k_hg", estimates(experiment)),
-    ];
-    if let Some(drive) = typical(experiment) {
-        figures.push(("paths", paths(drive)));
-        figures.push(("torque", torque(drive)));
-    }
-    for (name, figure) in &figures {
-        write_figure(directory, name, figure)?;
-    }
-    write_json(&directory.join("results.json"), &stamped(experiment))?;
-    write_report(
-        directory,
-        &report(experiment, figures.into_iter().map(|f| f.1).collect()),
-    )
-}
 
 /// Writes what was recorded of each drive, a CSV file each, as `identify` reads them.
 ///
 /// # Errors
 /// What could not be written.
-pub fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), OutputError> {
+pub fn write_logs(experiment: &Experiment, directory: &Path) -> Result<(), WriteError> {
     for drive in &experiment.drives {
         let kind = if drive.guided { "guided" } else { "manual" };
         let name = format!("participant-{:02}-{kind}.csv", drive.participant);
         write_file(&directory.join(name), |f| drive.log.write(f))?;
     }
     Ok(())
-}
-
-/// The results as JSON holds them. Every drive follows from the published drivers, the probe and the seed.
-pub fn stamped(experiment: &Experiment) -> Stamped<'_, Experiment> {
-    Provenance::of(None).stamp(experiment)
 }
 
 /// The guided drive whose fit is the middle one, as the paper shows "a typical participant".
@@ -180,49 +151,76 @@ fn estimates(experiment: &Experiment) -> Figure {
     }
 }
 
-fn report(experiment: &Experiment, figures: Vec<Figure>) -> Report {
-    let captions = [
-        "Mean distance between the path of the drive and that of the identified driver without remnant.",
-        "K_hg of the guided drives. A driver without an estimate by the noise model is one whose data do not \
-         identify it.",
-        "A typical participant: the path of the drive, and of the drivers identified from it.",
-        "The same participant: driver torque, measured and simulated by the default method.",
+/// The document of the experiment. Every drive follows from the published drivers, the probe and the seed.
+pub fn report(experiment: &Experiment) -> Report {
+    let mut again = vec![
+        Block::Table(trajectory_table(experiment)),
+        Block::Text(means(experiment)),
+        Block::figure(
+            "trajectory_errors",
+            trajectory_errors(experiment),
+            "Mean distance between the path of the drive and that of the identified driver without remnant.",
+        ),
+        Block::figure(
+            "k_hg",
+            estimates(experiment),
+            "K_hg of the guided drives. A driver without an estimate by the noise model is one whose data do not identify it.",
+        ),
     ];
-    let mut blocks: Vec<Block> = figures
-        .into_iter()
-        .zip(captions)
-        .map(|(figure, caption)| Block::Figure {
-            name: String::new(),
-            figure,
-            caption: caption.into(),
-        })
-        .collect();
-    blocks.insert(0, Block::Table(trajectory_table(experiment)));
-    let truth = |guided: bool, heading: &str| {
-        Section::new(heading, vec![Block::Table(truth_table(experiment, guided))])
-    };
+    if let Some(drive) = typical(experiment) {
+        again.push(Block::figure(
+            "paths",
+            paths(drive),
+            "A typical participant: the path of the drive, and of the drivers identified from it.",
+        ));
+        again.push(Block::figure(
+            "torque",
+            torque(drive),
+            "The same participant: driver torque, measured and simulated by the default method.",
+        ));
+    }
+    let truth = |guided| vec![Block::Table(truth_table(experiment, guided))];
     Report {
         title: "Fourteen drivers, identified".into(),
         summary: format!(
-            "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. \
-             Truth beside estimate; a dash where the data do not identify a parameter. {FIT_IS_CALIBRATED}. {}",
-            experiment.course,
-            experiment.probe_nm,
-            experiment.seed,
-            super::notes(left(experiment).as_slice()),
+            "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. Truth beside \
+             estimate; a dash where the data do not identify a parameter. {FIT_IS_CALIBRATED}.",
+            experiment.course, experiment.probe_nm, experiment.seed,
         ),
+        notes: left(experiment).into_iter().collect(),
         sections: vec![
-            truth(true, "With guidance"),
-            truth(false, "Manual"),
-            Section::new("The identified drivers drive again", blocks),
+            Section::new("Manual", truth(false)),
+            Section::new("With guidance", truth(true)),
+            Section::new("The identified drivers drive again", again),
         ],
-        provenance: Provenance::of(None),
         ..Report::default()
     }
 }
 
+/// Mean fits and errors, beside the paper's.
+fn means(experiment: &Experiment) -> String {
+    let mean = |guided: bool, value: fn(&Drive) -> Option<f64>| -> String {
+        let drives = experiment.drives.iter().filter(|d| d.guided == guided);
+        let values: Vec<f64> = drives.filter_map(value).collect();
+        match values.len() {
+            0 => "-".into(),
+            count => format!("{:.3}", values.iter().sum::<f64>() / count as f64),
+        }
+    };
+    let fit = |d: &Drive| Some(d.paper.identification.fit_percent);
+    let [low, middle, high] = experiment.published_trajectory_error_m;
+    format!(
+        "Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69).\n\
+         Mean trajectory error, guided: noise model {} m, published method {} m (the paper: {middle}, {low} to {high}).",
+        mean(false, fit),
+        mean(true, fit),
+        mean(true, |d| d.noise_model.trajectory_error_m),
+        mean(true, |d| d.paper.trajectory_error_m),
+    )
+}
+
 /// Truth beside estimates, of the guided or the manual drives.
-pub fn truth_table(experiment: &Experiment, guided: bool) -> Table {
+fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     let sum = |d: &Drive| d.truth.k_d + haptic_analysis::identify::Muscle::default().k_nms;
     type Column = (&'static str, fn(&Parameters) -> &Parameter, usize);
     let columns: [Column; 5] = [
@@ -282,7 +280,7 @@ pub fn truth_table(experiment: &Experiment, guided: bool) -> Table {
 }
 
 /// How far the identified drivers drive from those that they were identified from.
-pub fn trajectory_table(experiment: &Experiment) -> Table {
+fn trajectory_table(experiment: &Experiment) -> Table {
     let [low, mean, high] = experiment.published_trajectory_error_m;
     let rows = experiment.drives.iter().map(|d| {
         let number = |value| Cell::number(value, 3);
@@ -303,7 +301,7 @@ pub fn trajectory_table(experiment: &Experiment) -> Table {
 }
 
 /// Which drives, recorded or driven again, were not guided throughout; none if all were.
-pub fn left(experiment: &Experiment) -> Option<String> {
+fn left(experiment: &Experiment) -> Option<String> {
     let drives = experiment.drives.iter().filter(|d| d.guided).flat_map(|d| {
         let name = |what: &str| format!("participant {}, {what},", d.participant);
         [

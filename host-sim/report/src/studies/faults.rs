@@ -1,59 +1,56 @@
-//! What is shown of a fault campaign: a table, a figure, and the files with both.
+//! What is shown of a fault campaign: a table, a figure, and runs told one by one.
 
-use std::path::Path;
-
-use super::OutputError;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_file, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_campaign::OFF_ROAD_M;
 use haptic_campaign::campaign::{Campaign, CaseResult};
-use haptic_campaign::document;
 use haptic_campaign::drivers::Drivers;
+use haptic_campaign::table::FaultCase;
+use haptic_campaign::{OFF_ROAD_M, TrialOutcome};
 
-/// Writes the figure (SVG, PNG), the results (JSON), the table of faults (Markdown) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(campaign: &Campaign, directory: &Path) -> Result<(), OutputError> {
-    let figure = figure(campaign);
-    write_figure(directory, "faults", &figure)?;
-    write_json(&directory.join("faults.json"), &stamped(campaign))?;
-    let faults = document::table_of_faults();
-    write_file(&directory.join("faults.md"), |f| f.write_all(faults.as_bytes()))?;
+/// The document of a campaign, with what the ECU reported in these runs.
+pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
     let caption = format!(
-        "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that \
-                   they must keep. A fault without a mark on the left has no deadline. The deviation is that from the \
-                   fault-free run, beside what it is if the torque is dropped in the step in which the ECU leaves. Off road: runs \
-                   that go more than {OFF_ROAD_M} m aside with the torque dropped as well, or that are so far aside without the fault \
-                   too when the ECU leaves; their excess is not judged. A number with an arrow stands for what is beyond the axis."
+        "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that they must keep. A fault \
+         without a mark on the left has no deadline. The deviation is that from the fault-free run, beside what it is if the torque \
+         is dropped in the step in which the ECU leaves. Off road: runs that go more than {OFF_ROAD_M} m aside with the torque \
+         dropped as well, or that are so far aside without the fault too when the ECU leaves; their excess is not judged. A number \
+         with an arrow stands for what is beyond the axis."
     );
-    let mut blocks = vec![Block::Figure {
-        name: String::new(),
-        figure,
-        caption,
-    }];
+    let mut blocks = vec![
+        Block::figure("faults", figure(campaign), caption),
+        Block::Table(table(campaign)),
+    ];
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
-    blocks.push(Block::Table(table(campaign)));
-    write_report(
-        directory,
-        &Report {
-            title: "Every fault by name".into(),
-            summary: summary(campaign),
-            sections: vec![Section::new("Fault by fault", blocks)],
-            provenance: Provenance::of(None),
-            ..Report::default()
-        },
+    let mut sections = vec![Section::new("Fault by fault", blocks)];
+    sections.extend(told);
+    Report {
+        title: "Every fault by name".into(),
+        summary: summary(campaign),
+        sections,
+        ..Report::default()
+    }
+}
+
+/// What the ECU reported in a run.
+pub fn story(case: &FaultCase, outcome: TrialOutcome) -> Section {
+    let speed = match outcome.change {
+        None => format!("{} km/h", outcome.speed_kmh),
+        Some(change) => change.to_string(),
+    };
+    let onset_s = f64::from(outcome.onset_ms) * 1e-3;
+    let (injected, driver) = (&case.injected, outcome.driver);
+    let text = format!(
+        "{}: {injected}; {driver}, {speed}, fault at {onset_s:.3} s",
+        case.name
+    );
+    Section::new(
+        case.name,
+        vec![Block::Text(text), Block::Events(outcome.reported)],
     )
 }
 
-/// The results as JSON holds them.
-pub fn stamped(campaign: &Campaign) -> Stamped<'_, Campaign> {
-    Provenance::of(None).stamp(campaign)
-}
-
 /// How much ran, and how much of it failed.
-pub fn summary(campaign: &Campaign) -> String {
+fn summary(campaign: &Campaign) -> String {
     let drivers = match campaign.drivers {
         Drivers::Paper => "with the paper's drivers",
         Drivers::Population => "with drivers who keep the lane in a real car",
@@ -77,7 +74,7 @@ pub fn summary(campaign: &Campaign) -> String {
 }
 
 /// A run that failed, and how to run it again.
-pub fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
+fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
     format!(
         "{} seed {}, cycle {}: {}: {}",
         f.row, f.seed, f.cycle, f.what, f.replay
@@ -85,7 +82,7 @@ pub fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
 }
 
 /// Fault by fault.
-pub fn table(campaign: &Campaign) -> Table {
+fn table(campaign: &Campaign) -> Table {
     let count = |n: u64| Cell::number(n as f64, 0);
     let row = |row: &CaseResult| {
         let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);

@@ -7,7 +7,7 @@ use crate::document::{Block, Report, write_file};
 use crate::plot::Figure;
 
 /// A figure as `NAME.svg` and `NAME.png`.
-pub(super) fn write_figure(directory: &Path, name: &str, figure: &Figure) -> Result<(), OutputError> {
+fn write_figure(directory: &Path, name: &str, figure: &Figure) -> Result<(), OutputError> {
     let (svg, png) = (figure.to_svg()?, figure.to_png()?);
     write_file(&directory.join(format!("{name}.svg")), |f| {
         f.write_all(svg.as_bytes())
@@ -27,11 +27,6 @@ pub fn write(report: &Report, directory: &Path) -> Result<(), OutputError> {
             write_figure(directory, name, figure)?;
         }
     }
-    write_report(directory, report)
-}
-
-/// The report as `report.html`.
-pub(super) fn write_report(directory: &Path, report: &Report) -> Result<(), OutputError> {
     let html = report.to_html()?;
     Ok(write_file(&directory.join("report.html"), |f| {
         f.write_all(html.as_bytes())

@@ -1,54 +1,17 @@
-//! The files that one identification leaves: measured and simulated torque (as the paper's figure 6), the
-//! residuals, the driver over time, the results, and the report that shows them.
+//! What one identification shows: measured and simulated torque (as the paper's figure 6), the residuals, the driver over time,
+//! the parameters and what they rest on.
 
-use std::path::Path;
-
-use super::OutputError;
-use super::files::{write_figure, write_report};
 use super::pieces;
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
 use haptic_analysis::identify::{History, Identification, Reason, autocorrelation};
-use haptic_batch::identify::{IdentificationResults, IdentifiedDrive};
+use haptic_batch::identify::IdentifiedDrive;
 
 /// Lags of the autocorrelation drawn.
 const LAGS: usize = 60;
 
 /// Highest value of the delay's profile that is drawn: so that the level of 95 %, 3.84, is seen well above the axis.
 const HIGHEST: f64 = 15.0;
-
-/// Writes the figures (SVG, PNG), the results (JSON) and a report (HTML).
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(drive: &IdentifiedDrive, directory: &Path) -> Result<(), OutputError> {
-    let found = &drive.results.identification;
-    let always = [
-        ("torque", torque(found)),
-        ("residuals", residuals(found)),
-        ("autocorrelation", correlogram(found)),
-        ("over_time", over_time(drive)),
-    ];
-    let where_known = [
-        ("delay_profile", delay_profile(found)),
-        ("intervals", intervals(found)),
-        ("pieces", pieces::figure(drive)),
-    ];
-    let known = where_known
-        .iter()
-        .filter_map(|(name, f)| Some((name, f.as_ref()?)));
-    for (name, figure) in always.iter().map(|(name, f)| (name, f)).chain(known) {
-        write_figure(directory, name, figure)?;
-    }
-    write_json(&directory.join("results.json"), &stamped(drive))?;
-    let report = report(drive, always.map(|f| f.1), where_known.map(|f| f.1));
-    write_report(directory, &report)
-}
-
-/// The results as JSON holds them.
-pub fn stamped(drive: &IdentifiedDrive) -> Stamped<'_, IdentificationResults> {
-    Provenance::of(None).stamp(&drive.results)
-}
 
 fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
     Series::line(label, style, x.iter().copied().zip(y.iter().copied()).collect())
@@ -264,31 +227,20 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
     figure
 }
 
-/// A figure with its caption.
-fn figure(figure: Figure, caption: &str) -> Block {
-    Block::Figure {
-        name: String::new(),
-        figure,
-        caption: caption.into(),
-    }
-}
-
 /// What is known of the driver, and what it rests on.
-fn verdict_blocks(
-    found: &Identification,
-    delay_profile: Option<Figure>,
-    intervals: Option<Figure>,
-) -> Vec<Block> {
-    let mut verdict: Vec<Block> = refutations(found).into_iter().map(Block::Text).collect();
-    verdict.extend(verdicts(found).into_iter().map(Block::Text));
+fn verdict_blocks(found: &Identification) -> Vec<Block> {
+    let sentences = refutations(found).into_iter().chain(verdicts(found));
+    let mut verdict: Vec<Block> = sentences.map(Block::Text).collect();
     verdict.push(Block::Table(parameters(found)));
-    let shown = |picture: Option<Figure>, caption: &str| picture.map(|f| figure(f, caption));
+    let shown = |name, figure: Option<Figure>, caption| figure.map(|f| Block::figure(name, f, caption));
     verdict.extend(shown(
-        intervals,
+        "intervals",
+        intervals(found),
         "The 95 % intervals, and what they would be if t_nms were what is assumed.",
     ));
     verdict.extend(shown(
-        delay_profile,
+        "delay_profile",
+        delay_profile(found),
         "Likelihood of the delay with all else at its best: one narrow valley, or the delay is not known.",
     ));
     if !found.assumed.is_empty() {
@@ -298,100 +250,79 @@ fn verdict_blocks(
         )));
     }
     verdict.extend(found.notes.iter().cloned().map(Block::Text));
-    if !found.combinations.is_empty() {
-        verdict.push(Block::Table(combinations(found)));
-    }
+    verdict.push(Block::Table(combinations(found)));
     verdict.push(Block::Table(correlation(found)));
     verdict
 }
 
-fn report(drive: &IdentifiedDrive, always: [Figure; 4], where_known: [Option<Figure>; 3]) -> Report {
+/// The document of an identification.
+pub fn report(drive: &IdentifiedDrive) -> Report {
     let found = &drive.results.identification;
-    let [torque, residuals, correlogram, over_time] = always;
-    let [delay_profile, intervals, in_pieces] = where_known;
-    let verdict = verdict_blocks(found, delay_profile, intervals);
-    let mut sections: Vec<Section> = in_the_log(found)
-        .map(|table| Section {
-            heading: "In the log".into(),
-            blocks: vec![Block::Table(table)],
-        })
-        .into_iter()
-        .collect();
-    sections.extend([
-        Section {
-            heading: "Parameters".into(),
-            blocks: verdict,
-        },
-        Section {
-            heading: "Fit".into(),
-            blocks: vec![
-                figure(
-                    torque,
-                    "Driver torque, measured and simulated from the inputs alone. Shaded: what was left out, and why.",
-                ),
-                Block::Table(Table::of_pairs(["", ""], facts(found))),
-            ],
-        },
-        Section {
-            heading: "Residuals".into(),
-            blocks: vec![
-                figure(
-                    residuals,
-                    "What the driver model leaves over, and what the loss is made of.",
-                ),
-                figure(correlogram, "Autocorrelation of the residuals of the loss."),
-                Block::Table(input_tests(found)),
-            ],
-        },
-        Section {
-            heading: "Over time".into(),
-            blocks: vec![figure(
-                over_time,
-                "The same drive followed by the constrained Kalman filter, for drivers who change.",
-            )],
-        },
-    ]);
-    if let Some((pieces, picture)) = drive.results.pieces.as_ref().zip(in_pieces) {
-        let mut blocks = vec![figure(picture, pieces::CAPTION)];
-        blocks.extend(pieces::tables(pieces).into_iter().map(Block::Table));
-        sections.insert(
-            0,
-            Section {
-                heading: "Pieces".into(),
-                blocks,
-            },
-        );
-    }
-    if let Some(again) = drives_again(drive) {
-        sections.push(Section {
-            heading: "The identified driver on the course".into(),
-            blocks: vec![Block::Table(again)],
-        });
-    }
+    let fit = vec![
+        Block::figure(
+            "torque",
+            torque(found),
+            "Driver torque, measured and simulated from the inputs alone. Shaded: what was left out, and why.",
+        ),
+        Block::Table(Table::of_pairs(["", ""], facts(found))),
+    ];
+    let left_over = vec![
+        Block::figure(
+            "residuals",
+            residuals(found),
+            "What the driver model leaves over, and what the loss is made of.",
+        ),
+        Block::figure(
+            "autocorrelation",
+            correlogram(found),
+            "Autocorrelation of the residuals of the loss.",
+        ),
+        Block::Table(input_tests(found)),
+    ];
+    let followed = Block::figure(
+        "over_time",
+        over_time(drive),
+        "The same drive followed by the constrained Kalman filter, for drivers who change.",
+    );
+    let in_pieces = drive.results.pieces.as_ref().zip(pieces::figure(drive));
+    let in_pieces = in_pieces.map(|(pieces, figure)| {
+        let figure = Block::figure("pieces", figure, pieces::CAPTION);
+        let tables = pieces::tables(pieces).into_iter().map(Block::Table);
+        Section::new("Pieces", [figure].into_iter().chain(tables).collect())
+    });
+    let table = |heading, table| Section::new(heading, vec![Block::Table(table)]);
+    let in_the_log = in_the_log(found).map(|found| table("In the log", found));
+    let again = drives_again(drive).map(|again| table("The identified driver on the course", again));
+    let always = [
+        Section::new("Parameters", verdict_blocks(found)),
+        Section::new("Fit", fit),
+        Section::new("Residuals", left_over),
+        Section::new("Over time", vec![followed]),
+    ];
+    let first = in_pieces.into_iter().chain(in_the_log);
     Report {
         title: format!("Driver of {}", drive.name),
         summary: format!(
             "Method {}, {} rows. The fit of the driver torque is {:.1} %.",
             found.method, found.rows, found.fit_percent
         ),
-        sections,
-        provenance: Provenance::of(None),
+        sections: first.chain(always).chain(again).collect(),
         ..Report::default()
     }
 }
 
 /// What was found in the log and done about it.
-pub fn in_the_log(found: &Identification) -> Option<Table> {
+fn in_the_log(found: &Identification) -> Option<Table> {
     let rows = found.preflight.as_ref()?.findings().into_iter();
-    Some(Table {
-        caption: "What was found in the log, and what was done about it.".into(),
-        columns: ["In the log", "Found", "Done"].map(String::from).to_vec(),
-        rows: rows.map(|row| row.map(Cell::Text).to_vec()).collect(),
-    })
+    Some(Table::new(
+        "What was found in the log, and what was done about it.",
+        ["In the log", "Found", "Done"],
+        rows.map(|row| row.map(Cell::Text).to_vec()),
+    ))
 }
 
 /// What the record refutes, a sentence each.
-pub fn refutations(found: &Identification) -> Vec<String> {
+fn refutations(found: &Identification) -> Vec<String> {
     let sentence = |r: &haptic_analysis::identify::Refutation| {
         format!(
             "Refuted: {}. Evidence: {}. Likeliest cause: {}. Cure: {}.",
@@ -402,7 +333,7 @@ pub fn refutations(found: &Identification) -> Vec<String> {
 }
 
 /// What is known of each parameter that a torque can tell, in words.
-pub fn verdicts(found: &Identification) -> Vec<String> {
+fn verdicts(found: &Identification) -> Vec<String> {
     let meaning = |name: &str| match name {
         "gain_1" => "torque per lateral error",
         "gain_2" => "torque per integral of the lateral error",
@@ -459,16 +390,16 @@ fn is_published(found: &Identification) -> bool {
 }
 
 /// How the identified driver drives a course, if asked.
-pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
+fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
     let again = drive.results.drives_again.as_ref()?;
     let left_road = if again.diverged { "yes" } else { "no" };
-    let row = |name: &str, cell| vec![Cell::Text(name.into()), cell];
+    let row = |name: &str, cell| vec![Cell::text(name), cell];
     let left = again.away.when_and_why();
     let left = left.map(|left| row("guidance ended", Cell::Text(left)));
-    Some(Table {
-        caption: "The identified driver on the course.".into(),
-        columns: vec![String::new(); 2],
-        rows: vec![
+    Some(Table::new(
+        "The identified driver on the course.",
+        ["", ""],
+        vec![
             row(
                 "peak lateral error (m)",
                 number(again.metrics.peak_lateral_error_m),
@@ -477,20 +408,19 @@ pub fn drives_again(drive: &IdentifiedDrive) -> Option<Table> {
                 "mean absolute lateral error (m)",
                 number(again.metrics.mean_abs_lateral_error_m),
             ),
-            row("left the road", Cell::Text(left_road.into())),
+            row("left the road", Cell::text(left_road)),
         ]
         .into_iter()
-        .chain(left)
-        .collect(),
-    })
+        .chain(left),
+    ))
 }
 
 fn number(value: Option<f64>) -> Cell {
-    Cell::Number { value, decimals: 4 }
+    Cell::number(value, 4)
 }
 
 /// Every parameter with its interval and verdict.
-pub fn parameters(found: &Identification) -> Table {
+fn parameters(found: &Identification) -> Table {
     let narrow = |name: &str| {
         let at = found.at_t_nms.as_ref().filter(|_| found.refuted.is_empty())?;
         at.intervals_95.iter().find(|i| i.0 == name).map(|i| i.1)
@@ -522,43 +452,40 @@ pub fn parameters(found: &Identification) -> Table {
                 p.estimate
             };
             vec![
-                Cell::Text(name.into()),
-                Cell::Text(unit.into()),
+                Cell::text(name),
+                Cell::text(unit),
+                Cell::text(verdict),
                 number(estimate),
                 number(p.standard_error),
                 number(low),
                 number(high),
                 number(narrow(name).map(|i| i[0])),
                 number(narrow(name).map(|i| i[1])),
-                Cell::Text(verdict.into()),
             ]
         });
-    Table {
-        caption: if is_published(found) {
+    Table::new(
+        if is_published(found) {
             "The values of the published method as it prints them, whether the record holds them or not."
         } else {
             "An estimate is given only where the data identify the parameter."
-        }
-        .into(),
-        columns: [
+        },
+        [
             "",
             "Unit",
+            "Verdict",
             "Estimate",
             "Standard error",
             "95 % from",
             "to",
             "t_nms known: from",
             "to",
-            "Verdict",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: rows.collect(),
-    }
+        ],
+        rows,
+    )
 }
 
 /// What the data determine where they do not determine each parameter.
-pub fn combinations(found: &Identification) -> Table {
+fn combinations(found: &Identification) -> Table {
     let row = |c: &haptic_analysis::identify::Combination| {
         vec![
             Cell::Text(c.name.clone()),
@@ -566,34 +493,30 @@ pub fn combinations(found: &Identification) -> Table {
             number(Some(c.standard_error)),
         ]
     };
-    Table {
-        caption: "What the data determine instead.".into(),
-        columns: ["Combination", "Estimate", "Standard error"]
-            .map(String::from)
-            .to_vec(),
-        rows: found.combinations.iter().map(row).collect(),
-    }
+    Table::new(
+        "What the data determine instead.",
+        ["Combination", "Estimate", "Standard error"],
+        found.combinations.iter().map(row),
+    )
 }
 
 /// Correlation of the errors.
-pub fn correlation(found: &Identification) -> Table {
+fn correlation(found: &Identification) -> Table {
     let names = &found.correlation.names;
     let row = |(name, values): (&&str, &Vec<Option<f64>>)| {
         let mut cells = vec![Cell::Text((*name).into())];
-        cells.extend(values.iter().map(|&value| Cell::Number { value, decimals: 3 }));
+        cells.extend(values.iter().map(|&value| Cell::number(value, 3)));
         cells
     };
-    Table {
-        caption: "Correlation of the errors.".into(),
-        columns: std::iter::once(String::new())
-            .chain(names.iter().map(|n| (*n).into()))
-            .collect(),
-        rows: names.iter().zip(&found.correlation.matrix).map(row).collect(),
-    }
+    Table::new(
+        "Correlation of the errors.",
+        std::iter::once("").chain(names.iter().copied()),
+        names.iter().zip(&found.correlation.matrix).map(row),
+    )
 }
 
 /// What else is known of the fit, name and value.
-pub fn facts(found: &Identification) -> Vec<(String, String)> {
+fn facts(found: &Identification) -> Vec<(String, String)> {
     let mut facts = vec![(
         "Fit of the torque".to_owned(),
         format!("{:.2} %", found.fit_percent),
@@ -637,7 +560,7 @@ pub fn facts(found: &Identification) -> Vec<(String, String)> {
 }
 
 /// Whether the residuals are free of the inputs.
-pub fn input_tests(found: &Identification) -> Table {
+fn input_tests(found: &Identification) -> Table {
     let row = |test: &haptic_analysis::identify::InputCorrelation| {
         let verdict = if test.independent {
             "independent"
@@ -645,17 +568,14 @@ pub fn input_tests(found: &Identification) -> Table {
             "correlated"
         };
         vec![
-            Cell::Text(test.input.into()),
-            Cell::Number {
-                value: Some(test.largest_z),
-                decimals: 2,
-            },
-            Cell::Text(verdict.into()),
+            Cell::text(test.input),
+            Cell::number(test.largest_z, 2),
+            Cell::text(verdict),
         ]
     };
-    Table {
-        caption: "Residuals against each input of 0 to 1 s before, in standard deviations.".into(),
-        columns: ["Input", "Largest", "Verdict"].map(String::from).to_vec(),
-        rows: found.input_correlation.iter().map(row).collect(),
-    }
+    Table::new(
+        "Residuals against each input of 0 to 1 s before, in standard deviations.",
+        ["Input", "Largest", "Verdict"],
+        found.input_correlation.iter().map(row),
+    )
 }

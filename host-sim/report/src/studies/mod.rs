@@ -13,7 +13,7 @@ pub mod faults;
 mod files;
 pub mod handover;
 pub mod identify;
-pub mod pieces;
+mod pieces;
 pub mod reliance;
 pub mod run;
 pub mod stability;
@@ -26,11 +26,6 @@ use crate::plot::{Mark, PlotError, Series};
 
 pub use crate::document::SeriesFormat;
 pub use files::write;
-
-/// Notes as the end of a report's summary.
-fn notes(notes: &[String]) -> String {
-    notes.iter().map(|note| format!("Note: {note}. ")).collect()
-}
 
 /// Why a line ends when the vehicle did not stay on the road.
 const LEFT_THE_ROAD: &str = "ends: left the road";

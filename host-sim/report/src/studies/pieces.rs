@@ -19,7 +19,7 @@ fn parameter<'a>(piece: &'a Piece, name: &str) -> Option<&'a Parameter> {
 }
 
 /// Every piece and every change.
-pub fn tables(pieces: &Pieces) -> Vec<Table> {
+pub(super) fn tables(pieces: &Pieces) -> Vec<Table> {
     let mut out = vec![each(&pieces.pieces)];
     if !pieces.changes.is_empty() {
         out.push(changes(&pieces.changes));
@@ -32,7 +32,7 @@ fn each(pieces: &[Piece]) -> Table {
         let mut cells = vec![Cell::number(piece.from_s, 1), Cell::number(piece.to_s, 1)];
         for name in SHOWN {
             let p = parameter(piece, name);
-            let number = |value| Cell::Number { value, decimals: 4 };
+            let number = |value| Cell::number(value, 4);
             cells.push(number(p.and_then(|p| p.estimate)));
             let [low, high] = p.and_then(|p| p.interval_95).map_or([None; 2], |i| i.map(Some));
             cells.extend([number(low), number(high)]);
@@ -46,27 +46,26 @@ fn each(pieces: &[Piece]) -> Table {
         columns.extend([name.to_owned(), "95 % from".to_owned(), "to".to_owned()]);
     }
     columns.push("Refuted".to_owned());
-    Table {
-        caption: "Each piece is a driver of its own. A dash: not identified in it.".into(),
+    Table::new(
+        "Each piece is a driver of its own. A dash: not identified in it.",
         columns,
-        rows: pieces.iter().map(row).collect(),
-    }
+        pieces.iter().map(row),
+    )
 }
 
 fn changes(changes: &[Change]) -> Table {
     let row = |change: &Change| {
-        let mut cells = vec![Cell::Text(change.parameter.into()), Cell::number(change.by, 3)];
+        let mut cells = vec![Cell::text(change.parameter), Cell::number(change.by, 3)];
         for (at, [low, high]) in change.at_s.iter().zip(change.at_95_s) {
             cells.extend([*at, low, high].map(|s| Cell::number(s, 1)));
         }
         cells.push(Cell::number(change.deviance, 1));
         cells
     };
-    Table {
-        caption: "What changed most, and when: begin and end are the same for a step. Of k_d the share of all gains. Evidence: what the \
-                  change adds to twice the log likelihood."
-            .into(),
-        columns: [
+    Table::new(
+        "What changed most, and when: begin and end are the same for a step. Of k_d the share of all gains. Evidence: what the \
+                  change adds to twice the log likelihood.",
+        [
             "Changed",
             "by",
             "Begin (s)",
@@ -76,11 +75,9 @@ fn changes(changes: &[Change]) -> Table {
             "95 % from",
             "to",
             "Evidence",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: changes.iter().map(row).collect(),
-    }
+        ],
+        changes.iter().map(row),
+    )
 }
 
 /// The parameters of each piece over time; none if there are no pieces.

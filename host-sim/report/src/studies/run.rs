@@ -1,13 +1,12 @@
-//! The files that one run leaves: a figure, its time series, its results, and the report that shows them.
+//! What one run shows: a figure, what happened, its metrics; its time series and its bus.
 
 use std::path::Path;
 
-use super::files::{write_figure, write_report};
 use super::reliance::panel as reliance_panel;
-use super::{LEFT_THE_ROAD, OutputError, curves, ended, notes};
+use super::{LEFT_THE_ROAD, curves, ended};
 use crate::document::{
-    Block, Cell, Provenance, Report, Section, SeriesFormat, Stamped, Table, definitions_table, write_file,
-    write_json, write_trace,
+    Block, Cell, Provenance, Report, Section, SeriesFormat, Table, WriteError, definitions_table, write_file,
+    write_trace,
 };
 use crate::plot::{Axis, Figure, Marker, Panel, Series};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
@@ -17,39 +16,25 @@ use haptic_log::{Event, candump};
 use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind};
 use haptic_sim::simulation::Ending;
 
-/// Writes a figure (SVG, PNG), the results (JSON), a report (HTML), the time series if they are asked for, and the bus
-/// if it was recorded (as `candump -L` does).
+/// Writes the time series if they are asked for, and the bus if it was recorded (as `candump -L` does).
 ///
 /// # Errors
-/// What could not be written or drawn.
-pub fn write(single: &SingleRun, series: SeriesFormat, directory: &Path) -> Result<(), OutputError> {
-    let figure = figure(single);
-    write_figure(directory, "run", &figure)?;
+/// What could not be written.
+pub fn write_series(single: &SingleRun, series: SeriesFormat, directory: &Path) -> Result<(), WriteError> {
     write_trace(directory, "run", &single.run.trace, series)?;
-    write_json(&directory.join("results.json"), &stamped(single))?;
-    write_report(directory, &report(single, figure))?;
-    if !single.bus.is_empty() {
-        write_file(&directory.join("bus.log"), |f| {
-            for (ms, frame) in &single.bus {
-                candump::write(f, f64::from(*ms) * 1e-3, frame.id(), frame.data())?;
-            }
-            Ok(())
-        })?;
+    if single.bus.is_empty() {
+        return Ok(());
     }
-    Ok(())
-}
-
-/// The results as JSON holds them, with the scenario.
-pub fn stamped(single: &SingleRun) -> Stamped<'_, SingleResults> {
-    provenance(single).stamp(&single.results)
-}
-
-fn provenance(single: &SingleRun) -> Provenance {
-    Provenance::of(Some(single.scenario.to_toml()))
+    write_file(&directory.join("bus.log"), |f| {
+        for (ms, frame) in &single.bus {
+            candump::write(f, f64::from(*ms) * 1e-3, frame.id(), frame.data())?;
+        }
+        Ok(())
+    })
 }
 
 /// How the run ended, and when and why the guidance did, if it did before.
-pub fn how_it_ended(single: &SingleRun) -> String {
+fn how_it_ended(single: &SingleRun) -> String {
     let record = &single.results.record;
     let ended = if record.diverged {
         format!("DIVERGED at {:.0} m", record.end_m)
@@ -63,7 +48,7 @@ pub fn how_it_ended(single: &SingleRun) -> String {
 }
 
 /// Every metric of the run, and what the ECU read of K_hg.
-pub fn table(results: &SingleResults) -> Table {
+fn table(results: &SingleResults) -> Table {
     let metric = |d: &Definition| {
         let value = (d.value)(&results.record.metrics);
         vec![Cell::text(d.label), Cell::number(value, 4), Cell::text(d.unit)]
@@ -158,48 +143,49 @@ fn true_reliance(single: &SingleRun) -> Vec<(f64, f64)> {
     }
 }
 
-fn report(single: &SingleRun, figure: Figure) -> Report {
-    let scenario = &single.scenario;
-    let [from, to] = single.results.window_m;
+/// The document of a run.
+pub fn report(single: &SingleRun) -> Report {
+    let (scenario, results) = (&single.scenario, &single.results);
+    let [from, to] = results.window_m;
+    let caption = if scenario.guidance().probe {
+        "Lateral error, wheel angle, torques, and what the ECU says of K_hg."
+    } else {
+        "Lateral error, wheel angle and torques."
+    };
     Report {
         title: "A run under shared steering control".into(),
         summary: format!(
-            "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}): {}. Metrics are taken over {from} to {to} m. {}",
-            scenario.course().name(),
+            "{}, {}, driver with t_p {} s, K_d {} and K_hg {} ({}), failure {}: {}. Metrics are taken over {from} to {to} m of \
+             {:.0} m.",
+            results.course,
             scenario.speed(),
             scenario.driver().t_p,
             scenario.gains().k_d,
             scenario.gains().k_hg,
             scenario.condition(),
+            results.record.failure,
             how_it_ended(single),
-            notes(&single.results.notes),
+            results.course_length_m,
         ),
+        notes: results.notes.clone(),
         sections: vec![
             Section::new(
                 "Along the road",
                 vec![
-                    Block::Figure {
-                        name: String::new(),
-                        figure,
-                        caption: if single.scenario.guidance().probe {
-                            "Lateral error, wheel angle, torques, and what the ECU says of K_hg.".into()
-                        } else {
-                            "Lateral error, wheel angle and torques.".into()
-                        },
-                    },
+                    Block::figure("run", figure(single), caption),
                     Block::Events(events(single)),
                 ],
             ),
             Section::new(
                 "Metrics",
                 vec![
-                    Block::Table(table(&single.results)),
-                    Block::Table(definitions_table()),
+                    Block::Table(table(results)),
+                    Block::Table(definitions_table()).on_page(),
                 ],
             ),
         ],
-        provenance: provenance(single),
-        ..Report::default()
+        // Enough to repeat the run.
+        provenance: Provenance::of(Some(scenario.to_toml())),
     }
 }
 

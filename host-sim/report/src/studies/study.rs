@@ -2,17 +2,43 @@
 
 use std::path::Path;
 
-use super::OutputError;
-use crate::document::{Cell, Provenance, Stamped, Table, write_file, write_json};
+use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
 use haptic_batch::study::{Difference, Recorded, Session, SessionResult, StudyResults, Who};
 
-/// Writes the table of sessions and that of the differences between conditions (CSV), and the results (JSON).
+/// The document of a study.
+pub fn report(results: &StudyResults) -> Report {
+    let mut each = vec![Block::Table(sessions(results))];
+    let waits = |s: &&SessionResult| s.who == Who::Person && s.recorded.is_none();
+    let waiting: Vec<_> = results.sessions.iter().filter(waits).collect();
+    if let Some(session) = waiting.first() {
+        each.push(Block::Text(format!(
+            "{} sessions wait for a person: --import {}=FILE.csv",
+            waiting.len(),
+            session.name()
+        )));
+    }
+    Report {
+        title: results.study.clone(),
+        notes: results.notes.clone(),
+        sections: vec![
+            Section::new("Sessions", each),
+            Section::new("By condition", vec![Block::Table(by_condition(results))]),
+            Section::new(
+                "Differences between conditions",
+                vec![Block::Table(differences(results))],
+            ),
+        ],
+        ..Report::default()
+    }
+}
+
+/// Writes the table of sessions and that of the differences between conditions (CSV).
 ///
 /// # Errors
 /// What could not be written.
-pub fn write(results: &StudyResults, directory: &Path) -> Result<(), OutputError> {
+pub fn write_tables(results: &StudyResults, directory: &Path) -> Result<(), WriteError> {
     write_file(&directory.join("sessions.csv"), |file| {
         let metrics: Vec<&str> = DEFINITIONS.iter().map(|d| d.name).collect();
         let (away, metrics) = (Away::NAMES.join(","), metrics.join(","));
@@ -52,9 +78,7 @@ pub fn write(results: &StudyResults, directory: &Path) -> Result<(), OutputError
             )?;
         }
         Ok(())
-    })?;
-    write_json(&directory.join("results.json"), &stamped(results))?;
-    Ok(())
+    })
 }
 
 /// A session as a line of the table. Names hold no commas.
@@ -89,11 +113,6 @@ fn who(who: Who) -> &'static str {
     }
 }
 
-/// The results as JSON holds them.
-pub fn stamped(results: &StudyResults) -> Stamped<'_, StudyResults> {
-    Provenance::of(None).stamp(results)
-}
-
 fn text(text: impl Into<String>) -> Cell {
     Cell::text(text)
 }
@@ -112,7 +131,7 @@ pub fn plan(sessions: &[Session]) -> Table {
 }
 
 /// Every session, with what two of its metrics are.
-pub fn sessions(results: &StudyResults) -> Table {
+fn sessions(results: &StudyResults) -> Table {
     let row = |session: &SessionResult| {
         let recorded = session.recorded.as_ref();
         let metric = |name: &str| {
@@ -163,7 +182,7 @@ const SHOWN: [&str; 4] = [
 ];
 
 /// How much the conditions differ in some metrics, participant by participant.
-pub fn differences(results: &StudyResults) -> Table {
+fn differences(results: &StudyResults) -> Table {
     let row = |d: &Difference| {
         let label = DEFINITIONS.iter().find(|own| own.name == d.metric);
         let number = |value: Option<f64>, decimals| Cell::number(value, decimals);
@@ -198,7 +217,7 @@ pub fn differences(results: &StudyResults) -> Table {
 
 /// Each metric by condition: mean and standard deviation over the sessions that did not leave the road, guided throughout
 /// or not; the study's notes say which were not.
-pub fn by_condition(results: &StudyResults) -> Table {
+fn by_condition(results: &StudyResults) -> Table {
     let mut columns = vec!["Metric".to_owned(), "Unit".to_owned()];
     for condition in &results.conditions {
         columns.extend([condition.clone(), "SD".into(), "n".into()]);

@@ -1,13 +1,9 @@
 //! What is shown of the estimator's validation: tables for terminal and report, a figure, and the files with them.
 
-use std::path::Path;
-
 use serde::Serialize;
 
-use super::OutputError;
 use super::changes;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Stamped, Table, write_json};
+use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::experiment::{
     Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
@@ -28,11 +24,6 @@ pub enum Validation {
 }
 
 impl Validation {
-    /// With its provenance. Every drive follows from the published drivers, the probe and the seeds.
-    pub fn stamped(&self) -> Stamped<'_, Self> {
-        Provenance::of(None).stamp(self)
-    }
-
     /// What was promised and is not kept.
     pub fn broken(&self) -> Vec<String> {
         match self {
@@ -44,7 +35,7 @@ impl Validation {
     }
 
     /// What it rests on, and what came out, in a sentence or two.
-    pub fn summary(&self) -> String {
+    fn summary(&self) -> String {
         let rests_on = |drives: u32, participants: &[u32], probe_nm: f64, seed: u64| {
             let numbers: Vec<String> = participants.iter().map(u32::to_string).collect();
             format!(
@@ -76,7 +67,7 @@ impl Validation {
     }
 
     /// Its tables.
-    pub fn tables(&self) -> Vec<Table> {
+    fn tables(&self) -> Vec<Table> {
         match self {
             Self::Coverage(result) => vec![repetitions_table(result)],
             Self::Corruptions(result) => vec![corruptions_table(result), held_table(result)],
@@ -85,11 +76,8 @@ impl Validation {
         }
     }
 
-    /// Writes the figure (SVG, PNG), the results (JSON) and a report (HTML).
-    ///
-    /// # Errors
-    /// What could not be written or drawn.
-    pub fn write(&self, directory: &Path) -> Result<(), OutputError> {
+    /// The document of the answer. Every drive follows from the published drivers, the probe and the seeds.
+    pub fn report(&self) -> Report {
         let (name, title, caption) = match self {
             Self::Coverage(_) => (
                 "coverage",
@@ -116,31 +104,17 @@ impl Validation {
                  from exact ones. Beyond 6 bounds only the table shows them.",
             ),
         };
-        let figure = self.figure();
-        write_figure(directory, name, &figure)?;
-        write_json(&directory.join("results.json"), &self.stamped())?;
-        let caption = caption.into();
-        let broken = self.broken().into_iter().map(|line| format!("Not kept: {line}."));
-        let mut blocks: Vec<Block> = broken.map(Block::Text).collect();
-        blocks.push(Block::Figure {
-            name: String::new(),
-            figure,
-            caption,
-        });
-        blocks.extend(self.tables().into_iter().map(Block::Table));
-        write_report(
-            directory,
-            &Report {
-                title: title.into(),
-                summary: self.summary(),
-                sections: vec![Section {
-                    heading: "Truth and estimate".into(),
-                    blocks,
-                }],
-                provenance: Provenance::of(None),
-                ..Report::default()
-            },
-        )
+        let broken = self.broken().into_iter();
+        let broken = broken.map(|line| Block::Text(format!("Not kept: {line}.")).on_page());
+        let figure = Block::figure(name, self.figure(), caption);
+        let tables = self.tables().into_iter().map(Block::Table);
+        let blocks = broken.chain([figure]).chain(tables);
+        Report {
+            title: title.into(),
+            summary: self.summary(),
+            sections: vec![Section::new("Truth and estimate", blocks.collect())],
+            ..Report::default()
+        }
     }
 
     fn figure(&self) -> Figure {
@@ -250,15 +224,12 @@ fn corruptions_table(result: &Corruptions) -> Table {
     let row = |l: &CorruptionLine| {
         let count = |n: usize| Cell::number(n as f64, 0);
         let mut cells = vec![
-            Cell::Text(l.corrupted_by.into()),
+            Cell::text(l.corrupted_by),
             count(l.drives),
             count(l.refuted),
             count(l.identified),
             count(l.false_identifications),
-            Cell::Number {
-                value: l.coverage,
-                decimals: 3,
-            },
+            Cell::number(l.coverage, 3),
         ];
         cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
         cells.push(count(l.k_hg_read));
@@ -266,11 +237,10 @@ fn corruptions_table(result: &Corruptions) -> Table {
         cells.push(Cell::Text(cause.unwrap_or_default()));
         cells
     };
-    Table {
-        caption: "False: called identified, and more than 4 standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. RMS \
-                  errors are those of all drives, refuted or not."
-            .into(),
-        columns: [
+    Table::new(
+        "False: called identified, and more than 4 standard errors and 10 % (15 ms of t_p, 0.05 of K_hg) off. RMS \
+                  errors are those of all drives, refuted or not.",
+        [
             "Corrupted by",
             "Drives",
             "Refuted",
@@ -284,11 +254,9 @@ fn corruptions_table(result: &Corruptions) -> Table {
             "K_hg",
             "K_hg read",
             "Cause named most",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: result.lines.iter().map(row).collect(),
-    }
+        ],
+        result.lines.iter().map(row),
+    )
 }
 
 /// How many of the 95 % intervals of identified values hold the truth, by corruption and parameter.
@@ -300,21 +268,18 @@ fn held_table(result: &Corruptions) -> Table {
             Cell::Text(text.unwrap_or_else(|| "-".into()))
         };
         let cells = held.iter().copied().chain([all]).map(cell);
-        std::iter::once(Cell::Text(name.into())).chain(cells).collect()
+        std::iter::once(Cell::text(name)).chain(cells).collect()
     };
     let lines = result.lines.iter().filter(|l| l.identified > 0);
     let mut rows: Vec<Vec<Cell>> = lines.map(|l| row(l.corrupted_by, &l.intervals)).collect();
     rows.push(row("all, t_nms as assumed", &result.intervals_at_t_nms));
     rows.push(row("all", &result.intervals));
-    Table {
-        caption: "Share of the 95 % intervals of identified values that hold the truth. Corruptions with which nothing is identified are \
-                  left out."
-            .into(),
-        columns: ["Corrupted by", "gain_1", "gain_2", "gain_3", "t_p", "K_hg", "All"]
-            .map(String::from)
-            .to_vec(),
+    Table::new(
+        "Share of the 95 % intervals of identified values that hold the truth. Corruptions with which nothing is identified are \
+                  left out.",
+        ["Corrupted by", "gain_1", "gain_2", "gain_3", "t_p", "K_hg", "All"],
         rows,
-    }
+    )
 }
 
 /// Shares of the truth that 95 % intervals have to hold.
@@ -340,43 +305,48 @@ fn off_coverage(result: &Repetitions) -> Vec<String> {
 fn methods_table(lines: &[MethodLine]) -> Table {
     let row = |l: &MethodLine| {
         let mut cells = vec![
-            Cell::Text(l.noise.into()),
-            Cell::Text(l.method.into()),
+            Cell::text(l.noise),
+            Cell::text(l.method),
             Cell::number(l.drives as f64, 0),
         ];
         cells.extend(l.rms.iter().map(|&x| Cell::number(x, 4)));
-        cells.push(Cell::Number {
-            value: l.coverage,
-            decimals: 3,
-        });
+        cells.push(Cell::number(l.coverage, 3));
         cells
     };
     let bound = lines.first().map(|l| {
         let mut cells = vec![
-            Cell::Text("none".into()),
-            Cell::Text("information bound".into()),
-            Cell::Text("-".into()),
+            Cell::text("none"),
+            Cell::text("information bound"),
+            Cell::text("-"),
         ];
         cells.extend(l.bound.iter().map(|&x| Cell::number(x, 4)));
-        cells.push(Cell::Text("-".into()));
+        cells.push(Cell::text("-"));
         cells
     });
-    Table {
-        caption: "RMS errors by noise on the lane signals and way to treat it, and the share of 95 % intervals that hold.".into(),
-        columns: ["Noise", "Method", "Drives", "RMS gain_1", "gain_2", "gain_3", "t_p", "K_hg", "Coverage"]
-            .map(String::from)
-            .to_vec(),
-        rows: lines.iter().map(row).chain(bound).collect(),
-    }
+    Table::new(
+        "RMS errors by noise on the lane signals and way to treat it, and the share of 95 % intervals that hold.",
+        [
+            "Noise",
+            "Method",
+            "Drives",
+            "RMS gain_1",
+            "gain_2",
+            "gain_3",
+            "t_p",
+            "K_hg",
+            "Coverage",
+        ],
+        lines.iter().map(row).chain(bound),
+    )
 }
 
 /// Estimates of repeated drives against the truth.
 fn repetitions_table(result: &Repetitions) -> Table {
     let row = |line: &Repeated| {
-        let number = |value, decimals| Cell::Number { value, decimals };
+        let number = |value, decimals| Cell::number(value, decimals);
         vec![
             Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
-            Cell::Text(line.parameter.into()),
+            Cell::text(line.parameter),
             Cell::number(line.drives as f64, 0),
             number(Some(line.identified), 3),
             number(Some(line.coverage), 3),
@@ -388,9 +358,9 @@ fn repetitions_table(result: &Repetitions) -> Table {
             number(Some(line.bound), 4),
         ]
     };
-    Table {
-        caption: String::new(),
-        columns: [
+    Table::new(
+        "",
+        [
             "Participant",
             "Parameter",
             "Drives",
@@ -402,14 +372,7 @@ fn repetitions_table(result: &Repetitions) -> Table {
             "Largest error",
             "Mean standard error",
             "Information bound",
-        ]
-        .map(String::from)
-        .to_vec(),
-        rows: result
-            .participants
-            .iter()
-            .chain(&result.pooled)
-            .map(row)
-            .collect(),
-    }
+        ],
+        result.participants.iter().chain(&result.pooled).map(row),
+    )
 }

@@ -128,13 +128,11 @@ fn listing(params: &Params) -> String {
         ];
         cells.map(Cell::Text).to_vec()
     };
-    let table = Table {
-        caption: String::new(),
-        columns: ["parameter", "value", "unit", "range", "meaning"]
-            .map(String::from)
-            .to_vec(),
-        rows: PARAMETERS.iter().zip(params.to_values()).map(row).collect(),
-    };
+    let table = Table::new(
+        "",
+        ["parameter", "value", "unit", "range", "meaning"],
+        PARAMETERS.iter().zip(params.to_values()).map(row),
+    );
     table.to_text(width())
 }
 

@@ -4,72 +4,51 @@ mod figures;
 mod tables;
 mod words;
 
-use std::path::Path;
-
-use super::OutputError;
-use super::files::{write_figure, write_report};
-use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitions_table, write_json};
+use crate::document::{Block, Cell, Provenance, Report, Section, Table, definitions_table};
 use figures::{distribution, influence, responses};
 use haptic_analysis::metrics::Definition;
 use haptic_batch::Away;
 use haptic_batch::sweep::{Driven, Point, Summary, Sweep};
 
-pub use tables::{short_tables, tables};
+use tables::{short_tables, tables};
 
 /// Rows that a plan shows.
 const FIRST_ROWS: u64 = 5;
 
-/// Writes the figures (SVG, PNG), the summary (JSON) and a report (HTML). `file` is the sweep's, as its commands name it.
-///
-/// # Errors
-/// What could not be written or drawn.
-pub fn write(sweep: &Sweep, summary: &Summary, file: &str, directory: &Path) -> Result<(), OutputError> {
-    let mut sections = Vec::new();
+/// The document of a sweep; a terminal shows what matters most. `file` is the sweep's, as its commands name it.
+pub fn report(sweep: &Sweep, summary: &Summary, file: &str) -> Report {
     // With each the number of tables that belong to it.
     let parts = [
         ("How the drives are spread", vec![distribution(summary)], 1),
         ("What matters most", influence(summary).into_iter().collect(), 2),
         ("Which value is best", responses(summary), 2),
+        ("The worst drives, and what the metrics mean", Vec::new(), 1),
     ];
-    let mut tables = tables(sweep, summary, file).into_iter();
-    for (heading, figures, own) in parts {
-        let mut blocks = Vec::new();
-        for (name, caption, figure) in figures {
-            write_figure(directory, &name, &figure)?;
-            blocks.push(Block::Figure {
-                name: String::new(),
-                figure,
-                caption,
-            });
-        }
-        let filled = tables.by_ref().take(own).filter(|table| !table.rows.is_empty());
-        blocks.extend(filled.map(Block::Table));
-        if !blocks.is_empty() {
-            sections.push(Section::new(heading, blocks));
-        }
+    let mut tables = tables(sweep, summary, file)
+        .into_iter()
+        .zip(short_tables(sweep, summary, file));
+    let sections = parts.map(|(heading, figures, own)| {
+        let figures = figures.into_iter();
+        let figures = figures.map(|(name, caption, figure)| Block::figure(name, figure, caption));
+        let own = tables.by_ref().take(own);
+        let own = own.flat_map(|(all, most)| [Block::Table(all).on_page(), Block::Table(most).on_terminal()]);
+        Section::new(heading, figures.chain(own).collect())
+    });
+    let mut sections = sections.to_vec();
+    if let Some(last) = sections.last_mut() {
+        last.blocks.push(Block::Table(definitions_table()).on_page());
     }
-    let rest = tables
-        .map(Block::Table)
-        .chain([Block::Table(definitions_table())]);
-    sections.push(Section::new(
-        "The worst drives, and what the metrics mean",
-        rest.collect(),
-    ));
-    write_json(&directory.join("summary.json"), summary)?;
-    write_report(
-        directory,
-        &Report {
-            title: "Sweep".into(),
-            summary: headline(summary),
-            sections,
-            provenance: Provenance::of(Some(sweep.text().into())),
-            ..Report::default()
-        },
-    )
+    Report {
+        title: "Sweep".into(),
+        summary: headline(summary),
+        sections,
+        provenance: Provenance::of(Some(sweep.text().into())),
+        ..Report::default()
+    }
 }
 
 /// How many drives, and how many of them are bad.
-pub fn headline(summary: &Summary) -> String {
+fn headline(summary: &Summary) -> String {
     let stopped = if summary.drives < summary.planned {
         format!(" of {} planned: stopped early, as [stop] asks", summary.planned)
     } else {
@@ -101,7 +80,7 @@ pub fn headline(summary: &Summary) -> String {
 }
 
 /// What a sweep plans.
-pub fn plan(sweep: &Sweep, width: Option<usize>) -> String {
+pub fn plan(sweep: &Sweep) -> Report {
     let columns = ["drive", "seed"]
         .into_iter()
         .chain(sweep.columns())
@@ -112,13 +91,16 @@ pub fn plan(sweep: &Sweep, width: Option<usize>) -> String {
         own.into_iter().chain(values(&point).map(Cell::Text)).collect()
     });
     let table = Table::new("", columns, rows);
-    format!(
-        "{} drives in {} chunks, design {}\n\n{}",
-        sweep.drives(),
-        sweep.chunks(),
-        sweep.design(),
-        table.to_text(width)
-    )
+    Report {
+        summary: format!(
+            "{} drives in {} chunks, design {}",
+            sweep.drives(),
+            sweep.chunks(),
+            sweep.design()
+        ),
+        sections: vec![Section::new("", vec![Block::Table(table)])],
+        ..Report::default()
+    }
 }
 
 fn values(point: &Point) -> impl Iterator<Item = String> {

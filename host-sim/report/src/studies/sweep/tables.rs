@@ -9,7 +9,7 @@ const SHOWN: usize = 2;
 
 /// Distributions, shares of the variance, Sobol indices, levels, what is compared, the worst drives: in this order, some
 /// empty.
-pub fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
+pub(super) fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
     vec![
         distributions(summary),
         shares(summary),
@@ -22,7 +22,7 @@ pub fn tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
 
 /// What a terminal shows: of what matters only the metric that judges; levels where they differ, of distributions those of the
 /// fields that matter most.
-pub fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
+pub(super) fn short_tables(sweep: &Sweep, summary: &Summary, file: &str) -> Vec<Table> {
     let judge = summary.judge;
     let own = Summary {
         effects: summary
@@ -141,7 +141,7 @@ fn levels(summary: &Summary, shown: impl Fn(&Effect) -> bool) -> Table {
             false => "",
         };
         let mut cells = [&effect.field, &level.label, unit, verdict]
-            .map(|text| Cell::text(text))
+            .map(Cell::text)
             .to_vec();
         cells.extend([drives.count, drives.diverged].map(|count| Cell::number(count as f64, 0)));
         let mut known = |value: Option<f64>, interval: Option<[f64; 2]>, decimals| {
