@@ -14,6 +14,10 @@ const ROAD: Circumstances = Circumstances {
     probe_hz: None,
 };
 
+fn window(from_m: f64, to_m: f64) -> Option<Window> {
+    Some(Window { from_m, to_m })
+}
+
 /// `seconds` of driving at 20 m/s with each sample made by `make(t)`.
 fn drive(seconds: f64, make: impl Fn(f64) -> Sample) -> Trace {
     let samples = (0..(seconds * RATE_HZ).round() as usize)
@@ -295,10 +299,7 @@ fn a_window_takes_its_stretch_of_road_and_no_more() {
         lateral_error_m: t,
         ..Sample::default()
     });
-    let window = Some(Window {
-        from_m: 60.0,
-        to_m: 80.0,
-    });
+    let window = window(60.0, 80.0);
     let metrics = measure(&trace, &Circumstances { window, ..ROAD });
     assert_near(metrics.duration_s, 1.01, 1e-9);
     assert_near(metrics.peak_lateral_error_m, 4.0, 1e-9);
@@ -308,20 +309,9 @@ fn a_window_takes_its_stretch_of_road_and_no_more() {
 #[test]
 fn nothing_is_measured_where_there_is_nothing() {
     let trace = drive(1.0, |_| Sample::default());
-    let beyond = Some(Window {
-        from_m: 1e4,
-        to_m: 2e4,
-    });
-    assert_eq!(
-        measure(
-            &trace,
-            &Circumstances {
-                window: beyond,
-                ..ROAD
-            }
-        ),
-        Metrics::default()
-    );
+    let window = window(1e4, 2e4);
+    let beyond = measure(&trace, &Circumstances { window, ..ROAD });
+    assert_eq!(beyond, Metrics::default());
     assert_eq!(measure(&Trace::default(), &ROAD), Metrics::default());
 }
 
@@ -333,10 +323,7 @@ fn a_diverged_run_gives_no_value_instead_of_nan() {
     });
     assert_eq!(measure(&trace, &ROAD), Metrics::default());
     // Up to the divergence there are values, but a filter that looks ahead has none.
-    let window = Some(Window {
-        from_m: 0.0,
-        to_m: 10.0,
-    });
+    let window = window(0.0, 10.0);
     let metrics = measure(&trace, &Circumstances { window, ..ROAD });
     assert_eq!(metrics.peak_lateral_error_m, Some(0.0));
     assert_eq!(metrics.reversals_3deg_per_min, None);
