@@ -21,7 +21,9 @@ pub(crate) fn refusal(why: &str, trace: &Trace) -> String {
         Some((sample.time_s, what))
     });
     let Some((time_s, what)) = at else {
-        let plain = why.replace("the log covers", "your drive lasts");
+        let plain = why
+            .replace("the log covers", "your drive lasts")
+            .replace("the sensor measures nothing", "nobody held the wheel");
         return COLUMNS
             .iter()
             .fold(plain, |why, (name, words)| why.replace(name, words));
