@@ -4,7 +4,7 @@
 use super::pieces;
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Band, Figure, Mark, Panel, Series, Shade};
-use haptic_analysis::identify::{History, Identification, Reason, autocorrelation};
+use haptic_analysis::identify::{History, Identification, Parameter, Reason, autocorrelation};
 use haptic_batch::identify::IdentifiedDrive;
 
 /// Lags of the autocorrelation drawn.
@@ -384,6 +384,24 @@ fn verdicts(found: &Identification) -> Vec<String> {
     .collect()
 }
 
+/// Whether the residuals of the published method are not what it takes them for: white, and independent of the inputs.
+fn is_refuted_as_published(found: &Identification) -> bool {
+    let depend = found.input_correlation.iter().any(|input| !input.independent);
+    is_published(found) && (depend || !found.whiteness.white)
+}
+
+/// What a value of the published method is worth.
+fn published_verdict(found: &Identification, p: &Parameter) -> &'static str {
+    match (p.optimum, is_refuted_as_published(found), p.on_bound) {
+        (None, ..) => "no part of the method",
+        (_, true, true) => "as published, on a bound, refuted",
+        (_, true, false) => "as published, refuted",
+        (_, false, true) => "as published, on a bound",
+        (_, false, false) if p.identified => "as published",
+        (_, false, false) => "as published, imprecise",
+    }
+}
+
 /// Whether the values are those of the published method.
 fn is_published(found: &Identification) -> bool {
     found.method == "paper"
@@ -436,11 +454,7 @@ fn parameters(found: &Identification) -> Table {
             let [low, high] = p.interval_95.map_or([None; 2], |i| i.map(Some));
             let verdict = match (p.fixed, p.identified, p.on_bound) {
                 (true, ..) => "given",
-                _ if is_published(found) && p.optimum.is_none() => "no part of the method",
-                (_, true, true) if is_published(found) => "as published, on a bound",
-                (_, true, false) if is_published(found) => "as published",
-                (_, false, true) if is_published(found) => "as published, on a bound, refuted",
-                (_, false, false) if is_published(found) => "as published, refuted",
+                _ if is_published(found) => published_verdict(found, p),
                 (_, true, true) => "identified, on a bound",
                 (_, true, false) => "identified",
                 (_, false, true) => "not identified, on a bound",

@@ -246,5 +246,9 @@ fn by_condition(results: &StudyResults) -> Table {
         }
         cells
     };
-    Table::new("", columns, DEFINITIONS.iter().map(row))
+    Table::new(
+        "Mean and standard deviation over sessions, n of them, repetitions counted apart; none that left the road.",
+        columns,
+        DEFINITIONS.iter().map(row),
+    )
 }
