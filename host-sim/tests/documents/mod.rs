@@ -10,6 +10,22 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Crates whose README is checked; the bindings' are checked by their own tools.
+const CRATES: [&str; 12] = [
+    "core",
+    "firmware",
+    "firmware/lockstep",
+    "host-sim",
+    "host-sim/sim",
+    "host-sim/log",
+    "host-sim/analysis",
+    "host-sim/batch",
+    "host-sim/campaign",
+    "host-sim/target",
+    "host-sim/report",
+    "xtask",
+];
+
 /// A directory's names in the directory that examples run in.
 const LENT: [&str; 5] = ["examples", "tests", "core", "docs", "bench"];
 
@@ -24,6 +40,7 @@ fn root() -> PathBuf {
 fn documents() -> BTreeMap<PathBuf, String> {
     let mut folders = vec![root().join("docs"), root().join("bench")];
     let mut found: Vec<PathBuf> = markdown(&root());
+    found.extend(CRATES.iter().flat_map(|name| markdown(&root().join(name))));
     while let Some(folder) = folders.pop() {
         found.extend(markdown(&folder));
         let entries = std::fs::read_dir(folder)
