@@ -51,8 +51,8 @@ const PACKAGES: Arrows = &[
     ("host-sim/sim", &["haptic-core", "haptic-log"]),
     ("host-sim/analysis", &["haptic-log"]),
     ("host-sim/batch", &["haptic-analysis", "haptic-core", "haptic-log", "haptic-sim"]),
-    ("host-sim/target", &["haptic-core", "haptic-lockstep"]),
-    ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-target"]),
+    ("host-sim/pil", &["haptic-core", "haptic-lockstep"]),
+    ("host-sim/campaign", &["haptic-core", "haptic-lockstep", "haptic-log", "haptic-sim", "haptic-pil"]),
     ("host-sim/report", &["haptic-analysis", "haptic-batch", "haptic-campaign", "haptic-log", "haptic-sim"]),
     ("bindings/c", &["haptic-core"]),
     // Driver and vehicle are the simulator's.

@@ -15,8 +15,8 @@ use haptic_core::bus::slcan;
 use haptic_core::download;
 use haptic_core::params::Params;
 use haptic_core::quantity::Speed;
-use haptic_target::live::{Listener, View};
-use haptic_target::parameters::Product;
+use haptic_pil::live::{Listener, View};
+use haptic_pil::parameters::Product;
 
 const BOARD: &str = "mps2-an386";
 const STANDBY: u64 = 1;

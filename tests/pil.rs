@@ -13,7 +13,7 @@ use haptic_core::ecu::Boot;
 use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_lockstep::{Start, StartState};
-use haptic_target::{Channel, Machine, Pil, PilError, Report, Target, image};
+use haptic_pil::{Channel, Machine, Pil, PilError, Report, Target, image};
 
 /// xorshift64: the same frames in every run.
 struct Random(u64);

@@ -1,7 +1,7 @@
 //! The workbench behind the command line: what needs both the simulator and a target.
 //!
 //! Everything else is in the crates that it is made of: `haptic-sim` (the world and the loop), `haptic-log`,
-//! `haptic-analysis`, `haptic-batch` (studies), `haptic-campaign` (faults), `haptic-target` (QEMU, boards) and
+//! `haptic-analysis`, `haptic-batch` (studies), `haptic-campaign` (faults), `haptic-pil` (QEMU, boards) and
 //! `haptic-report`. `docs/design.md` draws them. The program is `src/main.rs`, a file for each of its commands below
 //! `src/cli`.
 //!
@@ -10,7 +10,7 @@
 //!
 //! use haptic_sim::Scenario;
 //! use haptic_sim::scenario::Condition;
-//! use haptic_target::Target;
+//! use haptic_pil::Target;
 //! use host_sim::processor::{self, ProcessorError};
 //!
 //! // A scenario that cannot be compared is refused before any target is opened.

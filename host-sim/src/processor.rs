@@ -6,10 +6,10 @@ use std::ops::ControlFlow;
 use haptic_core::quantity::Instant;
 use haptic_lockstep::{Start, StartState};
 
+use haptic_pil::{Pil, PilError, Report, Target};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::scenario::{Condition, Scenario, Sensors};
 use haptic_sim::{Action, Simulation};
-use haptic_target::{Pil, PilError, Report, Target};
 
 /// Why there is no comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -32,7 +32,7 @@ impl Options {
 /// What a wheel must not link: the fault injector, serial ports, charts, the command line.
 const NOT_IN_A_WHEEL: [&str; 10] = [
     "haptic-campaign",
-    "haptic-target",
+    "haptic-pil",
     "haptic-report",
     "host-sim",
     "serial2",

@@ -23,8 +23,8 @@ use super::invariants::{InvariantChecker, Violation};
 use super::table::{Expect, FaultCase};
 use super::trial::World;
 use super::trial_record::{EcuTrace, Tick};
-use haptic_target::PilError;
-use haptic_target::stepped::Stepped;
+use haptic_pil::PilError;
+use haptic_pil::stepped::Stepped;
 
 /// A bit flips after at least so many ticks, and at most twice as many.
 const BEFORE: usize = 50;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use clap::Args;
-use haptic_target::image::checkout;
+use haptic_pil::image::checkout;
 
 use super::{BadInput, Outcome, print};
 

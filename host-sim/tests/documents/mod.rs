@@ -21,7 +21,7 @@ const CRATES: [&str; 12] = [
     "host-sim/analysis",
     "host-sim/batch",
     "host-sim/campaign",
-    "host-sim/target",
+    "host-sim/pil",
     "host-sim/report",
     "xtask",
 ];

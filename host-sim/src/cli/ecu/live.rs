@@ -10,8 +10,8 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_core::bus::Frame;
 use haptic_log::candump;
-use haptic_target::PilError;
-use haptic_target::live::{Counts, Listener, Status, View};
+use haptic_pil::PilError;
+use haptic_pil::live::{Counts, Listener, Status, View};
 use serde_json::json;
 
 use super::super::{BadInput, Outcome, print};

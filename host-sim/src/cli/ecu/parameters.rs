@@ -6,9 +6,9 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_core::bus::messages::{Identity, ParameterStatus};
 use haptic_core::params::{PARAMETERS, Parameter, Params};
+use haptic_pil::PilError;
+use haptic_pil::parameters::Product;
 use haptic_report::document::{Cell, Table};
-use haptic_target::PilError;
-use haptic_target::parameters::Product;
 use serde_json::json;
 
 use super::super::{BadInput, Outcome, print, print_json, width};

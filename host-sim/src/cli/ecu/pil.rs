@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
+use haptic_pil::{Channel, Machine, PilError, Target};
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
-use haptic_target::{Channel, Machine, PilError, Target};
 use host_sim::processor::{self, ProcessorError};
 
 use super::super::{BadInput, Outcome, print, print_json, progress};

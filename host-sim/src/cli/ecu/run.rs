@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use haptic_target::bench::Bench;
+use haptic_pil::bench::Bench;
 
 use super::super::{BadInput, Outcome, print};
 

@@ -16,8 +16,8 @@ use haptic_core::faults::Fault;
 use haptic_core::modes::Mode;
 use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::Speed;
-use haptic_target::PilError;
-use haptic_target::bench::Bench;
+use haptic_pil::PilError;
+use haptic_pil::bench::Bench;
 
 /// The ECU's warning, in somebody else's name.
 const FOREIGN: u16 = 0x0D0;
