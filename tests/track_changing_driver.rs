@@ -175,3 +175,18 @@ fn a_torque_sensor_that_changes_is_named_as_one() {
         found.refuted
     );
 }
+
+/// A camera that is mounted 0.1 m to the side is no driver without an integral.
+#[test]
+fn an_offset_of_e_y_is_named_as_one() {
+    let mut log = driver_of([0.8; 2]);
+    for e_y in &mut log.e_y_m {
+        *e_y += 0.1;
+    }
+    let found = identify_with_noise_model(&log, &Options::default());
+    let [only] = &found.refuted[..] else {
+        panic!("{:?}", found.refuted)
+    };
+    assert!(only.cause.starts_with("e_y_m has an offset"), "{only:?}");
+    assert!(found.parameters.list().iter().all(|p| !p.2.identified));
+}

@@ -120,7 +120,7 @@ pub fn evaluate(
         notes,
     };
     if claims::apply_to(base, window) {
-        results.claims = claims::check(&results);
+        results.claims = claims::check(&results, &runs);
     } else {
         results.notes.push(claims::NONE_APPLIES.into());
     }

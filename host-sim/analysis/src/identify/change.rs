@@ -4,8 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// The name of a change that is the torque sensor's.
-pub(crate) const OFFSET: &str = "driver_torque_nm";
+/// The names of changes that are sensors'.
+pub(crate) const T_D: &str = "driver_torque_nm";
+pub(crate) const E_Y: &str = "e_y_m";
 
 /// How constant the driver of a record was.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,13 +23,13 @@ pub struct Constancy {
 /// A change of the driver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
-    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p; driver_torque_nm for the offset of its sensor.
+    /// Key of what changed: k_hg, k_d (all gains by one factor) or t_p; driver_torque_nm or e_y_m for the offset of a sensor.
     pub parameter: &'static str,
     /// First and last instant of the change, s: the same for a step.
     pub at_s: [f64; 2],
     /// 95 % intervals of these instants, s.
     pub at_95_s: [[f64; 2]; 2],
-    /// By how much; of k_d the share of the gains.
+    /// By how much; of k_d the share of the gains, of e_y_m the slope that it makes of the torque, N.m/s.
     pub by: f64,
     /// What the change adds to twice the log likelihood.
     pub deviance: f64,
@@ -50,13 +51,15 @@ impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = match self.parameter {
             "k_d" => "k_d (all gains)",
-            OFFSET => "the offset of driver_torque_nm",
+            T_D => "the offset of driver_torque_nm",
+            E_Y => "the slope of driver_torque_nm",
             name => name,
         };
         let by = match self.parameter {
             "k_d" => format!("{:+.0} %", 100.0 * self.by),
             "t_p" => format!("{:+.3} s", self.by),
-            OFFSET => format!("{:+.3} N.m", self.by),
+            T_D => format!("{:+.3} N.m", self.by),
+            E_Y => format!("{:+.4} N.m/s", self.by),
             _ => format!("{:+.2}", self.by),
         };
         let [from, to] = self.at_s;

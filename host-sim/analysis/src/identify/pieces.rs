@@ -36,7 +36,7 @@ pub struct Pieces {
 }
 
 /// Shortest piece that is fitted, s.
-const SHORTEST_S: f64 = 10.0;
+pub(crate) const SHORTEST_S: f64 = 10.0;
 /// Most changes that are looked for: more is no driver who has parameters.
 const MOST: usize = 20;
 

@@ -8,7 +8,8 @@
 use serde::Serialize;
 
 use super::balance::Balance;
-use super::change::{Change, OFFSET};
+use super::change::{Change, E_Y, T_D};
+use super::pieces::SHORTEST_S;
 use super::result::{InputCorrelation, Whiteness};
 
 /// An assumption that the record refutes.
@@ -201,8 +202,8 @@ pub(crate) fn of_residuals(
     out
 }
 
-/// What a driver who changed refutes.
-pub(crate) fn of_change(change: &Change) -> Refutation {
+/// What a change refutes, in a record from and to an instant, s.
+pub(crate) fn of_change(change: &Change, record: [f64; 2]) -> Refutation {
     let [from, to] = change.at_s;
     let when = if change.is_drift() {
         format!("from {from:.0} to {to:.0} s")
@@ -211,19 +212,16 @@ pub(crate) fn of_change(change: &Change) -> Refutation {
     };
     let cause = match change.parameter {
         "k_d" => format!("the driver changed {when}, or the scale of the lane signals did"),
-        OFFSET => format!("the torque sensor's offset changed {when}"),
+        T_D => format!("the torque sensor's offset changed {when}"),
+        E_Y => format!("e_y_m has an offset, or gets one {when}: the driver's integral does not follow it"),
         _ => format!("the driver changed {when}"),
     };
-    let (assumption, cure) = if change.parameter == OFFSET {
-        (SAME_SENSORS, cure_of_sensor(change))
-    } else {
-        (SAME_DRIVER, cure_of(change))
-    };
+    let is_driver = ![T_D, E_Y].contains(&change.parameter);
     Refutation {
-        assumption,
+        assumption: if is_driver { SAME_DRIVER } else { SAME_SENSORS },
         evidence: evidence_of(change),
         cause,
-        cure,
+        cure: cure_of(change, record, is_driver),
     }
 }
 
@@ -234,17 +232,34 @@ fn evidence_of(change: &Change) -> String {
     )
 }
 
-fn cure_of(change: &Change) -> String {
-    format!("--pieces, or {}", cure_of_sensor(change))
-}
-
-fn cure_of_sensor(change: &Change) -> String {
+/// The parts of the record that the change leaves, if they are long enough to be fitted.
+fn cure_of(change: &Change, [start, end]: [f64; 2], is_driver: bool) -> String {
+    if change.parameter == E_Y {
+        return "calibrate the camera, or take its offset out of e_y_m in the log".to_owned();
+    }
     let [from, to] = change.within_s();
-    format!("one part alone: --to {from:.0}, or --from {to:.0}")
+    let parts = [
+        (from - start, format!("--to {from:.0}")),
+        (end - to, format!("--from {to:.0}")),
+    ];
+    let left: Vec<String> = parts
+        .into_iter()
+        .filter(|p| p.0 >= SHORTEST_S)
+        .map(|p| p.1)
+        .collect();
+    if left.is_empty() {
+        return "another record: the change may lie anywhere in this one".to_owned();
+    }
+    let pieces = if is_driver { "--pieces, or " } else { "" };
+    format!("{pieces}one part alone: {}", left.join(", or "))
 }
 
 /// A change that the balance of torques shows in the sensors, from the one before and the one after it.
-pub(crate) fn of_changed_sensor(change: &Change, before: &Balance, after: &Balance) -> Option<Refutation> {
+pub(crate) fn of_changed_sensor(
+    change: &Change,
+    record: [f64; 2],
+    [before, after]: [&Balance; 2],
+) -> Option<Refutation> {
     if before.explained.min(after.explained) < BALANCE_SEEN {
         return None;
     }
@@ -256,7 +271,7 @@ pub(crate) fn of_changed_sensor(change: &Change, before: &Balance, after: &Balan
         assumption: SAME_SENSORS,
         evidence: format!("{}, and there {how}", evidence_of(change)),
         cause: format!("{what} changed at {:.0} s", change.at_s[0]),
-        cure: cure_of_sensor(change),
+        cure: cure_of(change, record, false),
     };
     if let Some((was, is)) = before.scale.zip(after.scale)
         && let Some(factor) = moved(was, is)
@@ -283,3 +298,30 @@ pub(crate) const ASSUMED: [&str; 5] = [
     "driver_torque_nm, guidance_torque_nm and the column have one scale: a scale that all share is not seen",
     "e_y_m and e_theta_rad are those at the driver's own points (0.3 s and 1.0 s ahead)",
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a record of 200 s, a part of 10 s at least can be fitted.
+    #[test]
+    fn a_cure_leaves_something() {
+        let change = |from: f64, to: f64| Change {
+            parameter: "k_hg",
+            at_s: [0.5 * (from + to); 2],
+            at_95_s: [[from, to]; 2],
+            by: 0.5,
+            deviance: 100.0,
+        };
+        let cure = |from, to| of_change(&change(from, to), [0.0, 200.0]).cure;
+        assert_eq!(
+            cure(50.0, 60.0),
+            "--pieces, or one part alone: --to 50, or --from 60"
+        );
+        assert_eq!(cure(4.0, 60.0), "--pieces, or one part alone: --from 60");
+        assert_eq!(
+            cure(4.0, 195.0),
+            "another record: the change may lie anywhere in this one"
+        );
+    }
+}

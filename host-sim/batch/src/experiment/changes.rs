@@ -162,8 +162,10 @@ impl ChangesLine {
                 let error = (p.optimum.unwrap_or(f64::NAN) - truth).abs();
                 error > tolerance(name, *truth) && p.standard_error.is_some_and(|s| error > 4.0 * s)
             });
-            self.identified[place] += 1;
-            self.false_identifications[place] += usize::from(far.count() * 2 > truths.len());
+            // On a bound no value is named, but an interval.
+            let named = usize::from(truths[0][i].1.estimate.is_some());
+            self.identified[place] += named;
+            self.false_identifications[place] += named * usize::from(far.count() * 2 > truths.len());
             let middle = truths[truths.len() / 2][i];
             self.intervals[place] = self.intervals[place] + Held::of(std::iter::once(&middle));
         }

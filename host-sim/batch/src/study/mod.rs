@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use order::Order;
-pub use paired::Difference;
+pub use paired::{Difference, of_participants};
 
 use crate::lanes::drive_all;
 use crate::left_by_themselves;

@@ -31,29 +31,33 @@ pub struct Difference {
     pub effect_size: Option<f64>,
 }
 
+/// What each participant drives under a condition, as listed: the mean over the repetitions that did not leave the road; none of
+/// who has none.
+#[must_use]
+pub fn of_participants(sessions: &[SessionResult], condition: &str, metric: &Definition) -> Vec<Option<f64>> {
+    let of_one = |own: &[SessionResult]| {
+        let own = own.iter().filter(|s| s.condition == condition);
+        let records = own.filter_map(|s| Some(s.recorded.as_ref()?.record));
+        let values = records
+            .filter(|r| !r.diverged)
+            .filter_map(|r| (metric.value)(&r.metrics));
+        mean_of(&values.collect::<Vec<_>>())
+    };
+    let each = sessions.chunk_by(|a, b| a.participant == b.participant);
+    each.map(of_one).collect()
+}
+
 /// Every pair of conditions, the earlier taken off the later, in every metric that has values.
 pub(super) fn differences(conditions: &[String], sessions: &[SessionResult]) -> Vec<Difference> {
-    let mut participants: Vec<&str> = sessions.iter().map(|s| s.participant.as_str()).collect();
-    participants.dedup();
-    let value = |participant: &str, condition: &str, metric: &Definition| {
-        let own = sessions
-            .iter()
-            .filter(|s| s.participant == participant && s.condition == condition);
-        let recorded = own
-            .filter_map(|s| s.recorded.as_ref())
-            .filter(|r| !r.record.diverged);
-        mean_of(
-            &recorded
-                .filter_map(|r| (metric.value)(&r.record.metrics))
-                .collect::<Vec<_>>(),
-        )
-    };
     let mut all = Vec::new();
     for (place, from) in conditions.iter().enumerate() {
         for to in &conditions[place + 1..] {
             all.extend(DEFINITIONS.iter().filter_map(|metric| {
-                let of = |name: &&str| Some(value(name, to, metric)? - value(name, from, metric)?);
-                let found: Vec<f64> = participants.iter().filter_map(of).collect();
+                let [before, after] = [from, to].map(|name| of_participants(sessions, name, metric));
+                let pairs = before.into_iter().zip(after);
+                let found: Vec<f64> = pairs
+                    .filter_map(|(before, after)| Some(after? - before?))
+                    .collect();
                 let (mean, interval_95, effect_size) = paired(&found)?;
                 Some(Difference {
                     metric: metric.name,

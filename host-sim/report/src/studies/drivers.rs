@@ -19,7 +19,7 @@ pub fn report(found: &Drivers) -> Report {
     blocks.extend(tables(found).into_iter().map(Block::Table));
     Report {
         title: format!("{} drivers", found.drivers.len()),
-        summary: "Every drive is a driver of its own.".into(),
+        summary: "Every drive is a driver of its own. Of a drive in pieces each is listed, and the longest one is compared.".into(),
         sections: vec![Section::new("Drivers", blocks)],
         ..Report::default()
     }
@@ -154,7 +154,7 @@ fn figure(found: &Drivers) -> Figure {
         let mut series = Vec::new();
         if let Some(p) = found.population.iter().find(|p| p.parameter == wanted) {
             series.push(Series::interval(
-                "mean of the group",
+                "mean of the group, 95 %",
                 5,
                 &ends,
                 &[p.mean_interval_95; 2],

@@ -276,7 +276,8 @@ pub fn report(evaluation: &Evaluation) -> Report {
 /// What the evaluation must show, and whether it does.
 fn claims_table(results: &EvaluationResults) -> Table {
     let caption = if results.claims.len() > 1 {
-        "The independent implementation's numbers, and the paper's claims as orderings."
+        "The independent implementation's numbers, and the paper's claims as orderings. The paper has no thresholds: \
+         each number that a claim is judged by is this project's."
     } else {
         "What an evaluation on any course rests on."
     };

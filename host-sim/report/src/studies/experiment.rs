@@ -181,7 +181,7 @@ pub fn report(experiment: &Experiment) -> Report {
     }
     let truth = |guided| vec![Block::Table(truth_table(experiment, guided))];
     Report {
-        title: "Fourteen drivers, identified".into(),
+        title: format!("{} drives, identified", experiment.drives.len()),
         summary: format!(
             "The participants of tables 5 and 6 as drivers with a remnant on {}, which is ours; probe {} N.m, seed {}. Truth beside \
              estimate; a dash where the data do not identify a parameter. {FIT_IS_CALIBRATED}.",
@@ -210,8 +210,9 @@ fn means(experiment: &Experiment) -> String {
     let fit = |d: &Drive| Some(d.paper.identification.fit_percent);
     let [low, middle, high] = experiment.published_trajectory_error_m;
     format!(
-        "Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69).\n\
-         Mean trajectory error, guided: noise model {} m, published method {} m (the paper: {middle}, {low} to {high}).",
+        "Mean fit of the published method: manual {} % (the paper: 76), guided {} % (69). {FIT_IS_CALIBRATED}.\n\
+         Mean trajectory error, guided: noise model {} m, published method {} m (the paper, of people: {middle}, {low} to \
+         {high}; these drivers are the model and a remnant, so less is left over).",
         mean(false, fit),
         mean(true, fit),
         mean(true, |d| d.noise_model.trajectory_error_m),
@@ -273,7 +274,7 @@ fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     }
     Table::new(
         "Parameters with their standard errors; the truth's fit is the paper's. The published method's \
-                  come as it would print them, on a bound or not.",
+                  come as it would print them, on a bound or not, with errors that are too small where its residuals are not white.",
         headings,
         rows,
     )
@@ -293,7 +294,7 @@ fn trajectory_table(experiment: &Experiment) -> Table {
     });
     Table::new(
         format!(
-            "Mean absolute trajectory error, m. The paper's, with guidance: {low} to {high}, mean {mean}."
+            "Mean absolute trajectory error, m. The paper's, of people with guidance: {low} to {high}, mean {mean}."
         ),
         ["Participant", "Drive", "Noise model", "Published method"],
         rows,

@@ -108,12 +108,12 @@ fn intervals(found: &Identification) -> Option<Figure> {
             narrow.1.push(ends.map(|x| x / at));
         }
     }
-    let mut series = vec![Series::with_mark(
-        "95 % interval",
-        0,
-        Mark::Whiskers(wide.1),
-        wide.0,
-    )];
+    let label = if is_published(found) {
+        "interval as published"
+    } else {
+        "95 % interval"
+    };
+    let mut series = vec![Series::with_mark(label, 0, Mark::Whiskers(wide.1), wide.0)];
     if !narrow.0.is_empty() {
         series.push(Series::with_mark(
             "if t_nms is as assumed",
@@ -236,7 +236,11 @@ fn verdict_blocks(found: &Identification) -> Vec<Block> {
     verdict.extend(shown(
         "intervals",
         intervals(found),
-        "The 95 % intervals, and what they would be if t_nms were what is assumed.",
+        if is_published(found) {
+            "The intervals as the published method has them: 95 % only where its residuals do not refute them."
+        } else {
+            "The 95 % intervals, and what they would be if t_nms were what is assumed."
+        },
     ));
     verdict.extend(shown(
         "delay_profile",
@@ -362,7 +366,7 @@ fn verdicts(found: &Identification) -> Vec<String> {
             .map(|[low, high]| format!("between {low:.4} and {high:.4}{unit} (95 %)"));
         Some(match (p.estimate, within) {
             (Some(x), Some(within)) => format!("{name}, {what}, is {x:.4}{unit}: {within}."),
-            (None, Some(_)) if is_published(found) => {
+            (None, Some(_)) if is_refuted_as_published(found) => {
                 format!(
                     "{name}, {what}, comes out as {:.4}{unit}; the residuals refute it.",
                     p.optimum?
@@ -477,19 +481,26 @@ fn parameters(found: &Identification) -> Table {
                 number(narrow(name).map(|i| i[1])),
             ]
         });
+    let (caption, from) = if is_published(found) {
+        (
+            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not.",
+            "As published: from",
+        )
+    } else {
+        (
+            "An estimate is given only where the data identify the parameter.",
+            "95 % from",
+        )
+    };
     Table::new(
-        if is_published(found) {
-            "The values of the published method as it prints them, whether the record holds them or not."
-        } else {
-            "An estimate is given only where the data identify the parameter."
-        },
+        caption,
         [
             "",
             "Unit",
             "Verdict",
             "Estimate",
             "Standard error",
-            "95 % from",
+            from,
             "to",
             "t_nms known: from",
             "to",

@@ -7,8 +7,9 @@ use crate::document::{Cell, Table};
 use crate::plot::{Axis, Band, Figure, Panel, Series, Shade};
 
 /// What the figure shows.
-pub(super) const CAPTION: &str = "Each piece with its 95 % intervals, and the same drive followed by the Kalman filter. Shaded: where a \
-                                  change lies (95 %), which is of no piece.";
+pub(super) const CAPTION: &str = "Each piece with its 95 % intervals, and the same drive followed by the Kalman filter. A band \
+                                  without a line: not identified in that piece. Shaded: where a change lies (95 %), which is of \
+                                  no piece.";
 
 /// What a torque can tell, in order.
 const SHOWN: [&str; 5] = ["k_hg", "gain_1", "gain_2", "gain_3", "t_p"];
@@ -120,7 +121,7 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
     let band = |change: &Change| {
         let [from, to] = change.within_s();
         Band {
-            label: "the driver changes".into(),
+            label: "a change lies here (95 %)".into(),
             from,
             to,
             shade: Shade::Dark,

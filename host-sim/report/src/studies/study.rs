@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
-use haptic_batch::study::{Difference, Recorded, Session, SessionResult, StudyResults, Who};
+use haptic_batch::study::{Difference, Recorded, Session, SessionResult, StudyResults, Who, of_participants};
 
 /// The document of a study.
 pub fn report(results: &StudyResults) -> Report {
@@ -215,24 +215,18 @@ fn differences(results: &StudyResults) -> Table {
     )
 }
 
-/// Each metric by condition: mean and standard deviation over the sessions that did not leave the road, guided throughout
-/// or not; the study's notes say which were not.
+/// Each metric by condition: mean and standard deviation over the participants' own means of the sessions that did not leave
+/// the road, guided throughout or not; the study's notes say which were not.
 fn by_condition(results: &StudyResults) -> Table {
     let mut columns = vec!["Metric".to_owned(), "Unit".to_owned()];
     for condition in &results.conditions {
         columns.extend([condition.clone(), "SD".into(), "n".into()]);
     }
-    let values = |condition: &str, d: &Definition| -> Vec<f64> {
-        let of = results.sessions.iter().filter(|s| s.condition == condition);
-        let good = of
-            .filter_map(|s| s.recorded.as_ref())
-            .filter(|r| !r.record.diverged);
-        good.filter_map(|r| (d.value)(&r.record.metrics)).collect()
-    };
     let row = |d: &Definition| {
         let mut cells = vec![text(d.label), text(d.unit)];
         for condition in &results.conditions {
-            let values = values(condition, d);
+            let each = of_participants(&results.sessions, condition, d);
+            let values: Vec<f64> = each.into_iter().flatten().collect();
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
             let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
@@ -247,7 +241,7 @@ fn by_condition(results: &StudyResults) -> Table {
         cells
     };
     Table::new(
-        "Mean and standard deviation over sessions, n of them, repetitions counted apart; none that left the road.",
+        "Mean and standard deviation over n participants, each with the mean of the own repetitions; no session that left the road.",
         columns,
         DEFINITIONS.iter().map(row),
     )

@@ -192,7 +192,15 @@ impl Screen {
         }
         print(&line(
             [
-                "time", "mode", "T_h", "limit", "T_d", "wheel", "e_y'", "speed", "K_hg",
+                "time",
+                "mode",
+                "T_h",
+                "limit",
+                "T_d",
+                "wheel",
+                "e_y'",
+                "speed",
+                "K_hg noise arm",
             ]
             .map(String::from),
             "faults",
@@ -232,9 +240,9 @@ fn described(status: &Status) -> String {
     let number = |value: Option<f64>, factor: f64, digits: usize| {
         value.map_or("-".into(), |value| format!("{:+.digits$}", value * factor))
     };
-    let k_hg = match status.k_hg.zip(status.k_hg_deviation) {
-        Some((k_hg, deviation)) => format!("{k_hg:.2} +- {deviation:.2}"),
-        None => "-".into(),
+    let k_hg = match (status.k_hg, status.k_hg_noise, status.k_hg_arm) {
+        (Some(k_hg), Some(noise), Some(arm)) => format!("{k_hg:.2} {noise:.2} {arm:.2}"),
+        _ => "-".into(),
     };
     line(
         [
@@ -257,7 +265,7 @@ fn described(status: &Status) -> String {
 fn line(cells: [String; 9], faults: &str) -> String {
     let [time, mode, torque, limit, driver, wheel, e_y, speed, k_hg] = cells;
     let line = format!(
-        "{time:>9}  {mode:<8} {torque:>7}  {limit:<14} {driver:>6} {wheel:>7} {e_y:>6} {speed:>6}  {k_hg:<13} {faults}"
+        "{time:>9}  {mode:<8} {torque:>7}  {limit:<14} {driver:>6} {wheel:>7} {e_y:>6} {speed:>6}  {k_hg:<14} {faults}"
     );
     line.trim_end().to_owned()
 }

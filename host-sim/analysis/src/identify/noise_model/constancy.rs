@@ -3,70 +3,83 @@
 //! With the regressors x_t of a row (the negative derivatives of its prediction error e_t by gains, K_hg, t_p and the constants),
 //! a change by delta along the direction d, of which the share r_t has come at row t, is one more regressor,
 //! `z_t = r_t d' x_t`. What the other parameters take up of it is taken out, and so is an offset of T_d that changes with it:
-//! a sensor that drifts is no driver who changes. Such an offset is also tried alone. With `H = sum x x'` and z the rest, freeing delta adds
-//! `(sum e_t z_t)^2/(s^2 sum z_t^2)` to twice the log likelihood, to first order (Andrews, "Tests for parameter instability and
-//! structural change with unknown change point", Econometrica 61, 1993). The largest over instants and directions is held
-//! against [`LEVEL`]. Sums over blocks of [`BLOCK_S`] hold all that this takes.
+//! a sensor that drifts is no driver who changes. Such an offset is also tried alone, and so is one of e_y, which makes a slope of
+//! T_d. With z the rest, freeing delta adds `(sum e_t z_t)^2/(s^2 sum z_t^2)` to twice the log likelihood, to first order
+//! (Andrews, "Tests for parameter instability and structural change with unknown change point", Econometrica 61, 1993). The
+//! largest over instants and directions is held against [`LEVEL`]. Sums over blocks of [`BLOCK_S`] hold all that this takes.
 //!
-//! An instant's interval is where that falls short of its largest by at most [`super::change_score`]'s `WITHIN_95` (Hansen, "Sample splitting and
-//! threshold estimation", Econometrica 68, 2000).
-
-use nalgebra::{DMatrix, DVector};
+//! An instant's interval is where that falls short of its largest by at most [`super::change_score`]'s `WITHIN_95` (Hansen,
+//! "Sample splitting and threshold estimation", Econometrica 68, 2000).
 
 use std::ops::Range;
 
-use super::change_score::{BLOCK_S, Block, Fitted, LOCAL, Local, OWN, largest};
+use nalgebra::{DMatrix, DVector};
+
+use super::change_score::{BLOCK_S, Block, Fitted, Local, OFFSET, SLOPE, most};
 use super::sums::Rows;
 use super::{K_HG, Problem, T_P};
 use crate::identify::balance::balance;
-use crate::identify::change::{Change, Constancy, OFFSET};
+use crate::identify::change::{Change, Constancy, E_Y, T_D};
 use crate::identify::search::covariance;
 use crate::identify::verdict::{self, Refutation};
 
 /// What a change has to add to twice the log likelihood: two constant drivers in a hundred at most are said to have changed.
 const LEVEL: f64 = 16.0;
+/// From where on a change is likely enough to be an error of the estimates.
+const DOUBT: f64 = 10.0;
 
 impl Problem<'_> {
-    /// Whether the driver was the same throughout; none if there is nothing to estimate.
-    pub(super) fn constancy(&self, p: &[f64], kept: &Rows, variance: f64) -> Option<Constancy> {
-        let blocks = self.blocks_in_time(kept);
-        let fitted = self.fitted(&blocks, variance);
-        let free = |i: usize| if self.is_free(i) { 1.0 } else { 0.0 };
-        let mut directions: Vec<(&'static str, f64, Local)> = Vec::new();
-        let mut gains = [0.0; LOCAL];
-        for i in 0..3 {
-            gains[i] = free(i) * p[i];
-        }
-        directions.push(("k_d", 0.1, gains));
-        for (name, place, enough) in [("k_hg", K_HG, 0.05), ("t_p", T_P, 0.015)] {
-            let mut one = [0.0; LOCAL];
-            one[place] = free(place);
-            directions.push((name, enough, one));
-        }
-        let mut offset = [0.0; LOCAL];
-        offset[OWN] = 1.0;
-        directions.push((OFFSET, 0.02, offset));
-        let mut best: Option<Constancy> = None;
-        for (parameter, enough, direction) in directions.iter().filter(|d| d.2.iter().any(|&x| x != 0.0)) {
-            let along = fitted.along(*direction);
-            let steps = fitted.steps(&along);
-            let Some((at, step)) = largest(&steps) else {
+    /// Whether the driver was the same throughout; none if there is nothing to estimate. A change that is likely, but not sure,
+    /// widens `errors` by how far the driver then is from the estimate, over the time of the record.
+    pub(super) fn constancy(
+        &self,
+        p: &[f64],
+        kept: &Rows,
+        variance: f64,
+        errors: &mut DMatrix<f64>,
+    ) -> Option<Constancy> {
+        let fitted = self.fitted(kept, variance);
+        let unit = |i: usize| Local::from_fn(|j, _| f64::from(i == j && (i > T_P || self.is_free(i))));
+        let gains = (0..3).map(|i| unit(i) * p[i]).sum();
+        let directions: [(&'static str, f64, Local); 5] = [
+            ("k_d", 0.1, gains),
+            ("k_hg", 0.05, unit(K_HG)),
+            ("t_p", 0.015, unit(T_P)),
+            (T_D, 0.02, unit(OFFSET)),
+            (E_Y, 0.0005, unit(SLOPE)),
+        ];
+        let mut best: Option<(Constancy, [DVector<f64>; 2], f64)> = None;
+        for (parameter, enough, direction) in &directions {
+            let steps = fitted.steps(direction);
+            let Some((at, step)) = most(&steps) else {
                 continue;
             };
-            let wider = fitted.wider(&along, &fitted.shares([at, at]), step);
+            let wider = fitted.wider(*at, step);
             let deviance = step.deviance / wider;
-            if best.as_ref().is_some_and(|b| b.deviance >= deviance) {
+            if best.as_ref().is_some_and(|b| b.0.deviance >= deviance) {
                 continue;
             }
             let changed = deviance > LEVEL && step.by.abs() > *enough;
-            let change = changed.then(|| fitted.change(parameter, &along, &steps, (at, step), wider));
-            best = Some(Constancy {
+            let change = changed.then(|| fitted.change(parameter, direction, &steps, wider));
+            let constancy = Constancy {
                 deviance,
                 level: LEVEL,
-                change,
-            });
+                change: change.flatten(),
+            };
+            let after = fitted.shares([*at, *at]).sum::<f64>() / fitted.blocks.len() as f64;
+            best = Some((constancy, step.sides(), after));
         }
-        best
+        let (constancy, sides, after) = best?;
+        if constancy.deviance > DOUBT {
+            for (side, share) in sides.iter().zip([1.0 - after, after]) {
+                for i in 0..=T_P {
+                    for j in 0..=T_P {
+                        errors[(i, j)] += share * side[i] * side[j];
+                    }
+                }
+            }
+        }
+        Some(constancy)
     }
 
     /// What the torques on the column say of the sensors before and after the middle of a change.
@@ -74,20 +87,20 @@ impl Problem<'_> {
         let middle_s = 0.5 * (change.at_s[0] + change.at_s[1]);
         let side = |rows: Range<usize>| {
             let cut = |s: &Range<usize>| s.start.max(rows.start)..s.end.min(rows.end);
-            let stretches: Vec<Range<usize>> = self
-                .stretches
-                .iter()
-                .map(cut)
-                .filter(|s| s.start < s.end)
-                .collect();
-            balance(self.log, &stretches, manual)
+            let cut = self.stretches.iter().map(cut).filter(|s| s.start < s.end);
+            balance(self.log, &cut.collect::<Vec<_>>(), manual)
         };
         let middle = ((middle_s - self.log.start_s) / self.log.dt_s).max(0.0) as usize;
-        let sides = [side(0..middle), side(middle..self.log.len())];
-        let [Some(before), Some(after)] = sides else {
-            return None;
-        };
-        verdict::of_changed_sensor(change, &before, &after)
+        let sides = [side(0..middle)?, side(middle..self.log.len())?];
+        verdict::of_changed_sensor(change, self.span_s(), [&sides[0], &sides[1]])
+    }
+
+    /// From when to when rows are used, s.
+    pub(super) fn span_s(&self) -> [f64; 2] {
+        let ends = self.stretches.first().zip(self.stretches.last());
+        ends.map_or([0.0; 2], |(first, last)| {
+            [first.start, last.end].map(|k| self.log.time_s(k))
+        })
     }
 
     fn blocks_in_time(&self, kept: &Rows) -> Vec<Block> {
@@ -101,23 +114,16 @@ impl Problem<'_> {
                     stretch,
                     from_s: self.log.time_s(from),
                     to_s: self.log.time_s(from + count),
-                    score: [0.0; LOCAL],
-                    gram: [[0.0; LOCAL]; LOCAL],
+                    score: Local::zeros(),
+                    gram: Default::default(),
                 };
-                for (columns, error) in kept.columns[row..row + count].iter().zip(&kept.errors[row..]) {
-                    let mut x = [kept.by_constant; LOCAL];
-                    x[..OWN].copy_from_slice(&columns[..OWN]);
-                    for i in 0..LOCAL {
-                        block.score[i] += error * x[i];
-                        for j in 0..=i {
-                            block.gram[i][j] += x[i] * x[j];
-                        }
-                    }
-                }
-                for i in 0..LOCAL {
-                    for j in 0..i {
-                        block.gram[j][i] = block.gram[i][j];
-                    }
+                let rows = kept.columns[row..row + count].iter().zip(&kept.errors[row..]);
+                for (k, (columns, error)) in rows.enumerate() {
+                    let mut x = Local::repeat(kept.by_constant);
+                    x.as_mut_slice()[..OFFSET].copy_from_slice(&columns[..OFFSET]);
+                    x[SLOPE] *= self.log.time_s(from + k);
+                    block.score += x * *error;
+                    block.gram += x * x.transpose();
                 }
                 row += count;
                 out.push(block);
@@ -126,22 +132,22 @@ impl Problem<'_> {
         out
     }
 
-    fn fitted<'a>(&self, blocks: &'a [Block], variance: f64) -> Fitted<'a> {
-        let size = OWN + self.stretches.len();
+    fn fitted(&self, kept: &Rows, variance: f64) -> Fitted {
+        let blocks = self.blocks_in_time(kept);
+        let size = OFFSET + self.stretches.len();
         let (mut hessian, mut score) = (DMatrix::zeros(size, size), DVector::zeros(size));
-        for block in blocks {
-            for i in 0..LOCAL {
+        for block in &blocks {
+            for i in 0..SLOPE {
                 score[block.place(i)] += block.score[i];
-                for j in 0..LOCAL {
-                    hessian[(block.place(i), block.place(j))] += block.gram[i][j];
+                for j in 0..SLOPE {
+                    hessian[(block.place(i), block.place(j))] += block.gram[(i, j)];
                 }
             }
         }
-        let chosen: Vec<usize> = (0..size).filter(|&i| i >= OWN || self.is_free(i)).collect();
+        let chosen: Vec<usize> = (0..size).filter(|&i| i >= OFFSET || self.is_free(i)).collect();
         let inverse = covariance(&hessian, &chosen).map(|x| if x.is_finite() { x } else { 0.0 });
         Fitted {
             blocks,
-            size,
             step: &inverse * score,
             inverse,
             variance,

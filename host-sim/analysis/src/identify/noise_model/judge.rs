@@ -127,7 +127,7 @@ impl Problem<'_> {
         let change = change.filter(|c| sensor.is_some() || others.iter().all(|o| o.0 <= c.deviance));
         if let Some(change) = &change {
             others.clear();
-            refuted.push(sensor.unwrap_or_else(|| verdict::of_change(change)));
+            refuted.push(sensor.unwrap_or_else(|| verdict::of_change(change, self.span_s())));
         }
         others.sort_by(|a, b| b.0.total_cmp(&a.0));
         refuted.extend(others.into_iter().map(|o| o.1));

@@ -93,6 +93,7 @@ impl Problem<'_> {
         let unbiased = self.unbiased(p, &within, &optimum.quadratic.hessian, &kept);
         let trim = self.trim(optimum, &free, &errors, error_variance);
         errors += doubted.covariance(self.size());
+        let constancy = self.constancy(p, &kept, error_variance, &mut errors);
         let (mut drawn, mut at_t_nms) = (DVector::zeros(self.size()), None);
         if !options.t_nms_known && !self.is_free(T_NMS) {
             at_t_nms = Some(self.at_t_nms(&unbiased, &errors, &trim.pull));
@@ -124,19 +125,21 @@ impl Problem<'_> {
         } else {
             parameter(K_HG)
         };
-        // Where the search was stopped is no delay; the interval says how long it is at most.
-        let mut t_p = parameter(T_P);
-        t_p.estimate = t_p.estimate.filter(|_| t_p.fixed || !t_p.on_bound);
+        // Where the search was stopped is no value; the interval says how much it is at most. K_hg may be 0 or 1.
+        let named = |mut p: Parameter| {
+            p.estimate = p.estimate.filter(|_| p.fixed || !p.on_bound);
+            p
+        };
         let mut parameters = Parameters {
             a_1: a[0],
             a_2: a[1],
             a_3: a[2],
-            t_p,
+            t_p: named(parameter(T_P)),
             k_d,
             k_hg,
-            gain_1: gains[0],
-            gain_2: gains[1],
-            gain_3: gains[2],
+            gain_1: named(gains[0]),
+            gain_2: named(gains[1]),
+            gain_3: named(gains[2]),
         };
         if let Some(at_t_nms) = &at_t_nms {
             parameters.hold(at_t_nms);
@@ -157,7 +160,6 @@ impl Problem<'_> {
                     .to_owned(),
             );
         }
-        let constancy = self.constancy(p, &kept, error_variance);
         let (traces, predicted) = self.traces(log, kept);
         let fit = |model: &[f64]| diagnostics::fit_percent(&traces.measured_nm, model.iter().copied());
         let filtered = |u: &[f64]| self.filtered(p, u);
