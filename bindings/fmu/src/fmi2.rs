@@ -3,7 +3,7 @@
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use crate::unit::{self, DISCARD, ERROR, OK, Pointer, Unit, functions, unit};
+use crate::unit::{self, DISCARD, ERROR, OK, Pointer, Unit, functions, unit, values};
 use crate::variable::Kind;
 
 type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
@@ -92,43 +92,6 @@ functions! {
         OK
     }
 
-    /// Reads quantities.
-    fmi2GetReal(pointer: Pointer, references: *const u32, count: usize, values: *mut f64) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, count), Kind::Real, |x| x) }
-    }
-
-    /// Sets quantities.
-    fmi2SetReal(pointer: Pointer, references: *const u32, count: usize, values: *const f64) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::set(pointer, (references, count), (values, count), Kind::Real, |x| x) }
-    }
-
-    /// Reads codes and words. The fault word has 32 bits: the sign is its highest.
-    fmi2GetInteger(pointer: Pointer, references: *const u32, count: usize, values: *mut c_int) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, count), Kind::Integer, |x| x as i64 as c_int) }
-    }
-
-    /// Sets codes: there is none that can be set.
-    fmi2SetInteger(pointer: Pointer, references: *const u32, count: usize, values: *const c_int) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::set(pointer, (references, count), (values, count), Kind::Integer, f64::from) }
-    }
-
-    /// Reads flags.
-    fmi2GetBoolean(pointer: Pointer, references: *const u32, count: usize, values: *mut c_int) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, count), Kind::Boolean, |x| (x != 0.0).into()) }
-    }
-
-    /// Sets flags.
-    fmi2SetBoolean(pointer: Pointer, references: *const u32, count: usize, values: *const c_int) -> c_int {
-        let to = |x: c_int| f64::from(u8::from(x != 0));
-        // SAFETY: as the standard vouches.
-        unsafe { unit::set(pointer, (references, count), (values, count), Kind::Boolean, to) }
-    }
-
     /// Reads texts.
     fmi2GetString(pointer: Pointer, references: *const u32, count: usize, values: *mut *const c_char) -> c_int {
         // SAFETY: as the standard vouches.
@@ -141,6 +104,11 @@ functions! {
         unsafe { unit::set_texts(pointer, (references, count), (values, count)) }
     }
 }
+
+values! { fmi2GetReal fmi2SetReal(): f64, Kind::Real, |x| x, |x| x }
+// The fault word has 32 bits: the sign is its highest.
+values! { fmi2GetInteger fmi2SetInteger(): c_int, Kind::Integer, |x| x as i64 as c_int, f64::from }
+values! { fmi2GetBoolean fmi2SetBoolean(): c_int, Kind::Boolean, |x| (x != 0.0).into(), |x| f64::from(u8::from(x != 0)) }
 
 /// The platform.
 #[unsafe(no_mangle)]

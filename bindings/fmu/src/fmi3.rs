@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 
-use crate::unit::{self, ERROR, OK, Pointer, Unit, functions, unit};
+use crate::unit::{self, ERROR, OK, Pointer, Unit, functions, unit, values};
 use crate::variable::Kind;
 
 type Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
@@ -60,54 +60,6 @@ functions! {
         unit.answer(result)
     }
 
-    /// Reads quantities.
-    fmi3GetFloat64(
-        pointer: Pointer, references: *const u32, count: usize, values: *mut f64, places: usize,
-    ) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, places), Kind::Real, |x| x) }
-    }
-
-    /// Sets quantities.
-    fmi3SetFloat64(
-        pointer: Pointer, references: *const u32, count: usize, values: *const f64, places: usize,
-    ) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::set(pointer, (references, count), (values, places), Kind::Real, |x| x) }
-    }
-
-    /// Reads codes and words. The fault word has 32 bits: the sign is its highest.
-    fmi3GetInt32(
-        pointer: Pointer, references: *const u32, count: usize, values: *mut i32, places: usize,
-    ) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, places), Kind::Integer, |x| x as i64 as i32) }
-    }
-
-    /// Sets codes and words.
-    fmi3SetInt32(
-        pointer: Pointer, references: *const u32, count: usize, values: *const i32, places: usize,
-    ) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::set(pointer, (references, count), (values, places), Kind::Integer, f64::from) }
-    }
-
-    /// Reads flags.
-    fmi3GetBoolean(
-        pointer: Pointer, references: *const u32, count: usize, values: *mut u8, places: usize,
-    ) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::get(pointer, (references, count), (values, places), Kind::Boolean, |x| (x != 0.0).into()) }
-    }
-
-    /// Sets flags.
-    fmi3SetBoolean(
-        pointer: Pointer, references: *const u32, count: usize, values: *const u8, places: usize,
-    ) -> c_int {
-        // SAFETY: as the standard vouches.
-        unsafe { unit::set(pointer, (references, count), (values, places), Kind::Boolean, |x| f64::from(u8::from(x != 0))) }
-    }
-
     /// Reads texts.
     fmi3GetString(
         pointer: Pointer, references: *const u32, count: usize, values: *mut *const c_char, places: usize,
@@ -124,6 +76,11 @@ functions! {
         unsafe { unit::set_texts(pointer, (references, count), (values, places)) }
     }
 }
+
+values! { fmi3GetFloat64 fmi3SetFloat64(places): f64, Kind::Real, |x| x, |x| x }
+// The fault word has 32 bits: the sign is its highest.
+values! { fmi3GetInt32 fmi3SetInt32(places): c_int, Kind::Integer, |x| x as i64 as c_int, f64::from }
+values! { fmi3GetBoolean fmi3SetBoolean(places): u8, Kind::Boolean, |x| (x != 0.0).into(), |x| f64::from(u8::from(x != 0)) }
 
 /// Model exchange is not offered.
 #[unsafe(no_mangle)]

@@ -224,6 +224,29 @@ macro_rules! constant {
 }
 pub(crate) use constant;
 
+/// Declares the functions that read and set variables of a type, and how a number becomes one and back. FMI 3.0 says how many
+/// values there are (`places`); in FMI 2.0 each variable has one.
+macro_rules! values {
+    ($get:ident $set:ident($($places:ident)?): $type:ty, $kind:expr, $from:expr, $to:expr) => {
+        unit::functions! {
+            /// Reads variables of this type.
+            $get(pointer: Pointer, references: *const u32, count: usize, values: *mut $type $(, $places: usize)?) -> c_int {
+                let values = (values, [count $(, $places)?].into_iter().last().unwrap_or(count));
+                // SAFETY: as the standard vouches.
+                unsafe { unit::get(pointer, (references, count), values, $kind, $from) }
+            }
+
+            /// Sets variables of this type: all of them, or none.
+            $set(pointer: Pointer, references: *const u32, count: usize, values: *const $type $(, $places: usize)?) -> c_int {
+                let values = (values, [count $(, $places)?].into_iter().last().unwrap_or(count));
+                // SAFETY: as the standard vouches.
+                unsafe { unit::set(pointer, (references, count), values, $kind, $to) }
+            }
+        }
+    };
+}
+pub(crate) use values;
+
 /// Declares functions that both standards have, with the same arguments, by either name.
 macro_rules! both {
     ($($(#[$doc:meta])+ $two:ident $three:ident($($argument:ident: $type:ty),*) -> $answer:ty $body:block)*) => {

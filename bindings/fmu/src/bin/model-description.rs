@@ -14,8 +14,8 @@ fn main() {
     };
     let about = MODELS.into_iter().find(|about| about.name == name);
     match (about, version.as_str()) {
-        (Some(about), "2") => version_2(about),
-        (Some(about), "3") => version_3(about),
+        (Some(about), "2") => describe(about, &FMI_2, variables_2, outputs_2),
+        (Some(about), "3") => describe(about, &FMI_3, variables_3, outputs_3),
         _ => {
             eprintln!("error: {name} {version}: a model's name and 2 or 3 are wanted");
             std::process::exit(2);
@@ -38,103 +38,122 @@ fn print_units(about: &About) {
     println!("  </UnitDefinitions>");
 }
 
-fn version_2(about: &About) {
-    let About {
-        name, token, meaning, ..
-    } = about;
-    let version = env!("CARGO_PKG_VERSION");
-    println!(
-        r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{token}" version="{version}"
-    description="{meaning}" generationTool="haptic-guidance">
-  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"
-      canGetAndSetFMUstate="true" canSerializeFMUstate="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
-    );
-    print_units(about);
-    println!("  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>");
-    for (reference, variable) in about.variables.iter().enumerate() {
-        let (causality, variability) = roles(variable);
-        let initial = if variable.role == Role::Output {
-            r#" initial="exact""#
-        } else {
-            ""
-        };
-        println!(
-            r#"    <ScalarVariable name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}">"#,
-            variable.name,
-            escaped(variable.meaning.trim())
-        );
-        let element = match variable.kind {
-            Kind::Real => "Real",
-            Kind::Integer => "Integer",
-            Kind::Boolean => "Boolean",
-            Kind::Text => "String",
-        };
-        println!("      <{element} {}/>\n    </ScalarVariable>", value(variable));
-    }
-    println!("  </ModelVariables>\n  <ModelStructure>\n    <Outputs>");
-    for (i, variable) in about.variables.iter().enumerate() {
-        if variable.role == Role::Output {
-            // Outputs change with steps, so that no input reaches one within an instant.
-            println!(r#"      <Unknown index="{}" dependencies=""/>"#, i + 1);
-        }
-    }
-    println!("    </Outputs>\n  </ModelStructure>\n</fmiModelDescription>");
+/// What the two versions of the standard call alike things.
+struct Words {
+    version: &'static str,
+    token: &'static str,
+    state: &'static str,
+    /// Elements of a quantity, a code, a flag and a text.
+    types: [&'static str; 4],
 }
 
-fn version_3(about: &About) {
+const FMI_2: Words = Words {
+    version: "2.0",
+    token: "guid",
+    state: "FMUstate",
+    types: ["Real", "Integer", "Boolean", "String"],
+};
+const FMI_3: Words = Words {
+    version: "3.0",
+    token: "instantiationToken",
+    state: "FMUState",
+    types: ["Float64", "Int32", "Boolean", "String"],
+};
+
+impl Words {
+    fn element(&self, kind: Kind) -> &'static str {
+        self.types[match kind {
+            Kind::Real => 0,
+            Kind::Integer => 1,
+            Kind::Boolean => 2,
+            Kind::Text => 3,
+        }]
+    }
+}
+
+fn describe(about: &About, words: &Words, variables: fn(&About, &Words), outputs: fn(&About)) {
     let About {
         name, token, meaning, ..
     } = about;
+    let Words {
+        version: fmi,
+        token: token_name,
+        state,
+        ..
+    } = words;
     let version = env!("CARGO_PKG_VERSION");
     println!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{token}" version="{version}"
+<fmiModelDescription fmiVersion="{fmi}" modelName="{name}" {token_name}="{token}" version="{version}"
     description="{meaning}" generationTool="haptic-guidance">
   <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"
-      canGetAndSetFMUState="true" canSerializeFMUState="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
+      canGetAndSet{state}="true" canSerialize{state}="true" canBeInstantiatedOnlyOncePerProcess="false"/>"#
     );
     print_units(about);
     println!("  <DefaultExperiment startTime=\"0\" stepSize=\"0.001\"/>\n  <ModelVariables>");
+    variables(about, words);
+    println!("  </ModelVariables>\n  <ModelStructure>");
+    outputs(about);
+    println!("  </ModelStructure>\n</fmiModelDescription>");
+}
+
+/// What either version writes of a variable.
+fn attributes(reference: usize, variable: &Variable) -> String {
+    let (causality, variability) = roles(variable);
+    let initial = if variable.role == Role::Output {
+        r#" initial="exact""#
+    } else {
+        ""
+    };
+    format!(
+        r#"name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}""#,
+        variable.name,
+        escaped(variable.meaning.trim())
+    )
+}
+
+fn variables_2(about: &About, words: &Words) {
     for (reference, variable) in about.variables.iter().enumerate() {
-        let (causality, variability) = roles(variable);
-        let initial = if variable.role == Role::Output {
-            r#" initial="exact""#
-        } else {
-            ""
+        println!("    <ScalarVariable {}>", attributes(reference, variable));
+        let element = words.element(variable.kind);
+        println!("      <{element} {}/>\n    </ScalarVariable>", value(variable));
+    }
+}
+
+fn variables_3(about: &About, words: &Words) {
+    for (reference, variable) in about.variables.iter().enumerate() {
+        let element = words.element(variable.kind);
+        let end = match variable.kind {
+            // A text has its start inside.
+            Kind::Text => format!(r#"><Start value="{}"/></String>"#, escaped(variable.text)),
+            _ => format!("{}/>", value(variable)),
         };
-        let element = match variable.kind {
-            Kind::Real => "Float64",
-            Kind::Integer => "Int32",
-            Kind::Boolean => "Boolean",
-            Kind::Text => "String",
-        };
-        // A text has its start inside.
-        let (value, end) = match variable.kind {
-            Kind::Text => (
-                String::new(),
-                format!(r#"><Start value="{}"/></String>"#, escaped(variable.text)),
-            ),
-            _ => (value(variable), "/>".to_owned()),
-        };
-        println!(
-            r#"    <{element} name="{}" valueReference="{reference}" causality="{causality}" variability="{variability}"{initial} description="{}" {value}{end}"#,
-            variable.name,
-            escaped(variable.meaning.trim())
-        );
+        println!("    <{element} {} {end}", attributes(reference, variable));
     }
     let time = about.variables.len();
     println!(
-        r#"    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous" description="Time"/>
-  </ModelVariables>
-  <ModelStructure>"#
+        r#"    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous" description="Time"/>"#
     );
-    for (reference, variable) in about.variables.iter().enumerate() {
-        if variable.role == Role::Output {
-            println!(r#"    <Output valueReference="{reference}" dependencies=""/>"#);
-        }
+}
+
+/// References of the outputs. They change with steps, so that no input reaches one within an instant.
+fn outputs(about: &About) -> impl Iterator<Item = usize> {
+    let outputs = about.variables.iter().enumerate();
+    outputs.filter_map(|(reference, variable)| (variable.role == Role::Output).then_some(reference))
+}
+
+fn outputs_2(about: &About) {
+    println!("    <Outputs>");
+    for reference in outputs(about) {
+        println!(r#"      <Unknown index="{}" dependencies=""/>"#, reference + 1);
     }
-    println!("  </ModelStructure>\n</fmiModelDescription>");
+    println!("    </Outputs>");
+}
+
+fn outputs_3(about: &About) {
+    for reference in outputs(about) {
+        println!(r#"    <Output valueReference="{reference}" dependencies=""/>"#);
+    }
 }
 
 fn roles(variable: &Variable) -> (&'static str, &'static str) {
