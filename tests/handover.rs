@@ -13,7 +13,10 @@ fn peak_m(t_p: f64, kind: FailureKind) -> f64 {
             t_p,
             ..Default::default()
         })
-        .failure(Failure { kind, time_s: 70.0 });
+        .failure(Failure {
+            kind,
+            ..Failure::default()
+        });
     let run = simulate(&scenario.build().unwrap());
     assert!(!run.diverged());
     let in_curve = |s: &&haptic_log::trace::Sample| (1080.0..=1740.0).contains(&s.s_m);

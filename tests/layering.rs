@@ -351,8 +351,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
     ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),
     ("host-sim/sim/src/scenario/file.rs", "one document: the form of a scenario's file"),
-    ("host-sim/sim/src/scenario/mod.rs", "one document: the fields of a scenario and their meaning"),
-    ("host-sim/sim/src/simulation.rs", "one loop with its tests, which look into it"),
 ];
 
 #[test]

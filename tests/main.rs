@@ -17,6 +17,7 @@ mod layering;
 mod machine;
 mod paper_claims;
 mod parameters;
+mod parts;
 mod pil;
 mod product_image;
 mod reliance;

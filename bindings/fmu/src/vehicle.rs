@@ -2,9 +2,9 @@
 //! has no gain and whose guidance is an input.
 
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
-use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::parts::PaperPair;
 use haptic_sim::scenario::Condition;
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Scenario, Simulation};
@@ -250,13 +250,6 @@ impl Model for Vehicle {
         let [m, i, l_f, l_r, k_f, k_r, k_s, e_t, b_s, j_s, k_t] = values[FIRST..COURSE] else {
             return Err("variables are missing".into());
         };
-        let driver = DriverParameters {
-            a_1: 0.0,
-            a_2: 0.0,
-            a_3: 0.0,
-            k_nms: 0.0,
-            ..DriverParameters::default()
-        };
         let scenario = Scenario::builder()
             .course(course(texts)?)
             .condition(Condition::High)
@@ -274,11 +267,13 @@ impl Model for Vehicle {
                 j_s,
                 k_t,
             })
-            .driver(driver)
-            .gains(ArmGains { k_d: 0.0, k_hg: 0.0 })
             .build()
             .map_err(|e| e.to_string())?;
-        self.simulation = Some(Simulation::with(&scenario, Told::default()));
+        self.simulation = Some(Simulation::of(
+            &scenario,
+            PaperPair::without_driver(&scenario),
+            Told::default(),
+        ));
         (self.lateral_error_m, self.s_m) = (0.0, 0.0);
         self.look(values)
     }

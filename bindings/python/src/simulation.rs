@@ -3,11 +3,14 @@
 use haptic_core::faults::FaultSet;
 use haptic_log::trace::CHANNELS;
 use haptic_sim::action::WorldFaults;
+use haptic_sim::guidance::AnyGuidance;
+use haptic_sim::parts::PaperPair;
 use haptic_sim::simulation::Ending;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::bus::Frame;
+use crate::driver_view::DriverView;
 use crate::ecu::fault_names;
 use crate::errors::{finite, whole, within};
 use crate::pickle::{Parts, attributes, part};
@@ -49,7 +52,6 @@ impl Action {
                 torque_lost,
                 lane_lost,
             },
-            ..
         } = self.inner;
         (engage, authority, probe, hand_torque_nm, torque_lost, lane_lost)
     }
@@ -81,7 +83,6 @@ impl Action {
                 torque_lost,
                 lane_lost,
             },
-            ..haptic_sim::Action::default()
         };
         Ok(Self { inner })
     }
@@ -213,10 +214,13 @@ fn outcome(py: Python<'_>, from: &haptic_sim::Outcome<'_>) -> PyResult<Outcome> 
 /// Parameters
 /// ----------
 /// scenario : Scenario
+/// own_driver : bool, optional
+///     Whether you drive: nobody is at the wheel but the hand of each action, and :meth:`view` says what you see.
 #[pyclass(module = "haptic_guidance")]
 pub(crate) struct Simulation {
     inner: haptic_sim::Simulation,
     scenario: Py<Scenario>,
+    own_driver: bool,
     /// Each action, with the number of steps that it lasted.
     actions: Vec<(u32, Action)>,
 }
@@ -233,12 +237,30 @@ impl Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    fn new(scenario: Py<Scenario>) -> Self {
+    #[pyo3(signature = (scenario, own_driver = false))]
+    fn new(scenario: Py<Scenario>, own_driver: bool) -> Self {
+        let of = &scenario.get().inner;
+        let pair = if own_driver {
+            PaperPair::without_driver(of)
+        } else {
+            PaperPair::new(of)
+        };
         Self {
-            inner: haptic_sim::Simulation::new(&scenario.get().inner),
+            inner: haptic_sim::Simulation::of(of, pair, AnyGuidance::of(of)),
             scenario,
+            own_driver,
             actions: Vec::new(),
         }
+    }
+
+    /// What the driver sees and feels in the next step.
+    ///
+    /// Returns
+    /// -------
+    /// DriverView or None
+    ///     None once the run has ended.
+    fn view(&self) -> Option<DriverView> {
+        self.inner.view().map(DriverView::from)
     }
 
     /// Moves the loop.
@@ -327,6 +349,7 @@ impl Simulation {
         Self {
             inner: self.inner.clone(),
             scenario: self.scenario.clone_ref(py),
+            own_driver: self.own_driver,
             actions: self.actions.clone(),
         }
     }
@@ -352,7 +375,7 @@ impl Simulation {
         Ok(())
     }
 
-    fn __getnewargs__(&self, py: Python<'_>) -> (Py<Scenario>,) {
-        (self.scenario.clone_ref(py),)
+    fn __getnewargs__(&self, py: Python<'_>) -> (Py<Scenario>, bool) {
+        (self.scenario.clone_ref(py), self.own_driver)
     }
 }

@@ -20,6 +20,12 @@ def test_figure_9(tmp_path, monkeypatch):
     assert (tmp_path / "figure-9.png").stat().st_size > 10_000
 
 
+def test_a_driver_of_ones_own_stepped_from_outside_drives_as_in_rust():
+    errors_m = runpy.run_path(str(EXAMPLES / "own_driver.py"))["drive"]()
+    # tests/parts.rs has the same figure of examples/own_driver.rs, to the last digit.
+    assert max(map(abs, errors_m)) == 0.4080224580491433
+
+
 @pytest.mark.parametrize("vehicle", ["SingleTrack", "MultiBody"])
 def test_a_plant_of_ones_own(vehicle):
     pytest.importorskip("vehiclemodels")

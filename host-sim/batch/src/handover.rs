@@ -143,6 +143,7 @@ fn scenarios_of(speed_kmh: f64, t_p: f64) -> Result<Vec<Scenario>, String> {
             .failure(Failure {
                 kind,
                 time_s: FAILURE_S,
+                duration_s: None,
             });
         scenario.build().map_err(String::from)
     };

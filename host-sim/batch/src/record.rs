@@ -192,6 +192,7 @@ mod tests {
             let failure = haptic_sim::scenario::Failure {
                 kind: FailureKind::Torque,
                 time_s,
+                duration_s: None,
             };
             Scenario::builder().failure(failure).build().unwrap()
         };

@@ -36,6 +36,7 @@ use haptic_sim::models::real::WorldParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::parts::DriverVehicle;
 use haptic_sim::scenario::{Scenario, ScenarioBuilder, Speed};
 use haptic_sim::seeds::{Stream, named};
 use haptic_sim::stability::{Guided, growth_per_s};
@@ -429,10 +430,11 @@ type Trial<'a> = Simulation<EcuHarness<'a>>;
 
 /// One step, with the hand on the wheel that the row has; whether there was one.
 fn step(simulation: &mut Trial<'_>, takes_over: bool) -> bool {
-    let (step, arm_nm) = (simulation.steps(), simulation.arm_torque_nm());
+    let (step, pair) = (simulation.steps(), simulation.driver_vehicle_mut());
+    pair.take_over(takes_over);
+    let arm_nm = pair.arm_torque_nm();
     let action = Action {
         hand_torque_nm: simulation.guidance().hand_torque_nm(step, arm_nm),
-        takes_over,
         ..Action::default()
     };
     simulation.step(&action).is_some()
@@ -440,9 +442,10 @@ fn step(simulation: &mut Trial<'_>, takes_over: bool) -> bool {
 
 /// Distance from another vehicle, across its direction, m.
 fn apart_m(simulation: &Trial<'_>, from: &Trial<'_>) -> f64 {
-    let ([x, y], _) = simulation.place();
-    let ([x_0, y_0], direction) = from.place();
-    ((y - y_0) * direction.cos() - (x - x_0) * direction.sin()).abs()
+    let there = simulation.driver_vehicle().motion();
+    let here = from.driver_vehicle().motion();
+    let [x, y] = [0, 1].map(|axis| there.position_m[axis] - here.position_m[axis]);
+    (y * here.direction_rad.cos() - x * here.direction_rad.sin()).abs()
 }
 
 /// To the end, with the forks beside it if asked for.

@@ -12,8 +12,6 @@ pub struct Action {
     pub probe: Option<bool>,
     /// Torque of a hand on the wheel beside the driver model's, N.m, positive turns left. The torque sensor sees it.
     pub hand_torque_nm: f64,
-    /// Whether the driver drives as manually in this step, as one does who has understood that there is no guidance.
-    pub takes_over: bool,
     /// What the world does wrong, beside the failure that the scenario plans.
     pub world: WorldFaults,
 }

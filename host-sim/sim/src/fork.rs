@@ -88,7 +88,11 @@ mod tests {
             .driver(driver)
             .build()
             .unwrap();
-        let failure = |kind, time_s| Failure { kind, time_s };
+        let failure = |kind, time_s| Failure {
+            kind,
+            time_s,
+            duration_s: None,
+        };
         let failures = [
             failure(FailureKind::Input, 75.003),
             failure(FailureKind::Torque, 70.0),

@@ -3,7 +3,7 @@
 //! A driver and a guidance turn one steering wheel; column and vehicle answer; the road ahead is what both look at.
 //! The driver is the model of Wang, Zheng, Nacpil and Nakano 2022: eyes with a delay, and an arm that weighs vision
 //! (K_d) against the guidance torque (K_hg: 0 relies on it, 1 resists it). The guidance is the shipping controller of
-//! `haptic-core`, behind its bus frames or past them, or any [`guidance::Guidance`] of your own.
+//! `haptic-core`, behind its bus frames or past them. Driver, vehicle and guidance are [`parts`]: each may be one of your own.
 //!
 //! A [`Scenario`] is everything that decides a run; its builder refuses what cannot be. A [`Simulation`] is the run
 //! as a value: `Clone + Send`, moved by [`Simulation::step`], one millisecond a call. What comes from outside in a step
@@ -11,6 +11,7 @@
 //! and [`seeds`] names the stream of each source of noise.
 //!
 //! ```
+//! use haptic_sim::parts::DriverVehicle;
 //! use haptic_sim::scenario::Condition;
 //! use haptic_sim::{Action, Scenario, Simulation};
 //!
@@ -29,7 +30,7 @@
 //!     simulation.step(&Action::default());
 //!     pulled.step(&hand);
 //! }
-//! assert!(pulled.arm_torque_nm() != simulation.arm_torque_nm());
+//! assert!(pulled.driver_vehicle().motion() != simulation.driver_vehicle().motion());
 //! # Ok::<(), haptic_sim::scenario::ScenarioError>(())
 //! ```
 //!
@@ -45,6 +46,7 @@ pub mod input;
 pub mod lanes;
 pub mod models;
 pub mod participants;
+pub mod parts;
 pub mod population;
 mod preview;
 pub mod scenario;

@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::guidance::LaneErrors;
-use crate::models::plant::Plant;
 use crate::models::road::{Centreline, Tracker};
+use crate::parts::{DriverVehicle, Motion};
 
 /// A near and a far point along the direction of movement.
 #[derive(Debug, Clone)]
@@ -35,17 +35,23 @@ impl PreviewPoints {
         [self.near_m, self.far_m] = self.times_s.map(|time_s| v_m_per_s * time_s);
     }
 
-    /// The errors and the far point's arc length; `None` where there is no road to look at.
+    /// The errors, and the arc lengths of both points, m; `None` where there is no road to look at.
     #[inline]
-    pub(crate) fn look(&mut self, road: &Centreline, plant: &Plant) -> Option<(LaneErrors, f64)> {
-        let [x, y] = plant.ahead_m(self.near_m);
+    pub(crate) fn look(
+        &mut self,
+        road: &Centreline,
+        from: &impl DriverVehicle,
+        motion: &Motion,
+    ) -> Option<(LaneErrors, [f64; 2])> {
+        let [x, y] = from.ahead_m(self.near_m);
         let near = road.project(x, y, &mut self.near)?;
-        let [x, y] = plant.ahead_m(self.far_m);
+        let [x, y] = from.ahead_m(self.far_m);
         let far = road.project(x, y, &mut self.far)?;
         // The target line lies to the left of a point that lies to the right of it.
         let e_y_m = -near.offset_m;
-        let e_theta_rad = wrapped(far.heading_rad - plant.direction_rad());
-        (e_theta_rad.abs() < FRAC_PI_2).then_some((LaneErrors { e_y_m, e_theta_rad }, far.s_m))
+        let e_theta_rad = wrapped(far.heading_rad - motion.direction_rad);
+        let errors = LaneErrors { e_y_m, e_theta_rad };
+        (e_theta_rad.abs() < FRAC_PI_2).then_some((errors, [near.s_m, far.s_m]))
     }
 }
 

@@ -220,6 +220,7 @@ fn a_failure_in_mid_braking_and_a_clone_there_are_the_runs_that_they_are_of() {
     let failures = [FailureKind::Torque, FailureKind::Input].map(|kind| Failure {
         kind,
         time_s: braking,
+        duration_s: None,
     });
     let (nominal, forks) = simulate_forked(&base, &failures).unwrap();
     assert_eq!(nominal, simulate(&base));

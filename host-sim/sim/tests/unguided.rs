@@ -124,7 +124,11 @@ fn what_the_scenario_lets_fail_is_asked_for() {
             // The last picture is up to a camera's period old, and good for 30 ms; past the bus there is none in the next step.
             let over_bus = kind == FailureKind::Input && sensors == Sensors::Paper;
             let left_s = if over_bus { 20.003 + 0.03 - 0.004 } else { 20.003 };
-            let failure = Failure { kind, time_s: 20.003 };
+            let failure = Failure {
+                kind,
+                time_s: 20.003,
+                duration_s: None,
+            };
             let scenario = Scenario::builder()
                 .course(held_curve())
                 .failure(failure)

@@ -16,6 +16,7 @@ from ._identify import Change, Fit, Parameter, Piece, identify
 from ._native import (
     Action,
     Bus,
+    DriverView,
     Ecu,
     Frame,
     Outcome,
@@ -31,6 +32,7 @@ from ._sweep import SweepResult, sweep
 __all__ = [
     "Action",
     "Bus",
+    "DriverView",
     "Ecu",
     "Evaluation",
     "Experiment",

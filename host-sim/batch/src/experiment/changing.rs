@@ -98,7 +98,7 @@ pub(super) fn driven_changing(
                 ..*scenario.driver()
             };
             let to = scenario.to_builder().driver(driver).gains(now.gains());
-            simulation.change_driver(&to.build()?);
+            simulation.driver_vehicle_mut().change_driver(&to.build()?);
         }
         let Some(outcome) = simulation.step(&host(time_s)) else {
             return Ok(recorder.into_log());

@@ -125,7 +125,7 @@ fn the_heading_passes_pi_at_the_onset_while_the_speed_changes() {
         while simulation.steps() < onset_ms {
             simulation.step(&Action::default()).expect("a road until then");
         }
-        let direction = simulation.place().1.abs();
+        let direction = simulation.driver_vehicle().motion().direction_rad.abs();
         assert!(
             (direction - std::f64::consts::PI).abs() < 0.03,
             "seed {seed}: {direction}"

@@ -18,6 +18,8 @@ pub enum Reason {
     TooSlow,
     /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
     EarlyFailure,
+    /// A failure that ends: the ECU comes back.
+    FailureEnds,
     /// Longer than the lanes' clock counts.
     TooLong,
 }
@@ -29,6 +31,7 @@ impl fmt::Display for Reason {
             Self::ExactSensors => "exact sensors, past the bus",
             Self::TooSlow => "slower than is guided",
             Self::EarlyFailure => "a lane preview that fails within the first 2 s",
+            Self::FailureEnds => "a failure that ends",
             Self::TooLong => "longer than 2000 s",
         })
     }
@@ -69,6 +72,10 @@ pub fn why_not(scenario: &Scenario) -> Option<Reason> {
         (
             failure.kind == FailureKind::Input && failure.time_s < SETTLED_S,
             Reason::EarlyFailure,
+        ),
+        (
+            failure.kind != FailureKind::None && failure.duration_s.is_some(),
+            Reason::FailureEnds,
         ),
         (scenario.duration_s() > LONGEST_S, Reason::TooLong),
     ];

@@ -15,12 +15,14 @@ use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, Worlds, YAW_RATE};
 use super::{ALIVE, Step};
 use crate::guidance::NoGuidance;
 use crate::models::driver::Remnant;
+use crate::models::plant::Transition;
 use crate::models::road::Centreline;
 use crate::models::sensors::camera_looks;
-use crate::models::{STEP_S, STEPS_PER_SECOND};
+use crate::models::{STEP_S, STEPS_PER_SECOND, step_of};
+use crate::parts::ByReliance;
 use crate::preview::wrapped;
 use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
-use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Simulation, step_of};
+use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Simulation};
 use crate::unguided::Cause;
 
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
@@ -47,7 +49,7 @@ thread_local! {
 struct Slot {
     /// The scenario's number, while its run is under way or not yet handed on.
     scenario: Option<usize>,
-    plan: Option<Plan>,
+    plan: Option<(Plan, ByReliance<Transition>)>,
     remnant: Option<Remnant>,
     run: Run,
     /// Why the guidance is away, as a sample has it: it leaves only where the scenario lets something fail.
@@ -119,7 +121,9 @@ impl<const N: usize> Lanes<N> {
         let mut simulation = Simulation::with(scenario, NoGuidance);
         self.worlds.begin(lane, &simulation);
         let has_banks = !scenario.course().is_level();
-        self.worlds.real.begin(lane, simulation.real.take(), has_banks);
+        self.worlds
+            .real
+            .begin(lane, simulation.driver_vehicle.nonlinear.take(), has_banks);
         self.speeds.begin(lane, scenario, &simulation.plan);
         self.senses.begin(lane, simulation.sensing.take());
         self.ecus.begin(lane, scenario);
@@ -138,13 +142,14 @@ impl<const N: usize> Lanes<N> {
         slot.is_whole = false;
         slot.timeout = u32::MAX;
         if failure.kind == FailureKind::Input {
-            let last = (0..simulation.plan.failure_step)
+            let last = (0..simulation.plan.failure_steps[0])
                 .rev()
                 .find(|step| camera_looks(*step));
             slot.timeout = last.map_or(0, |last| last + TIMEOUT_MS);
         }
-        slot.remnant = (simulation.remnant.scale_nm != 0.0).then_some(simulation.remnant);
-        slot.plan = Some(simulation.plan);
+        let pair = simulation.driver_vehicle;
+        slot.remnant = (pair.remnant.scale_nm != 0.0).then_some(pair.remnant);
+        slot.plan = Some((simulation.plan, pair.arm));
         self.has_remnants = self.slots.iter().any(|slot| slot.remnant.is_some());
         self.happen(lane);
     }
@@ -155,10 +160,11 @@ impl<const N: usize> Lanes<N> {
     fn happen(&mut self, lane: usize) {
         let step = self.own[lane] as u32;
         let slot = &mut self.slots[lane];
-        let Some(plan) = &slot.plan else { return };
+        let Some((plan, arm)) = &slot.plan else { return };
         let faults = plan.faults(step);
-        let failed_at = faults.any().then_some(plan.failure_step);
-        self.worlds.set_transition(lane, plan.transition(step, failed_at));
+        let [failed_at, _] = plan.failure_steps;
+        let noticed = failed_at.saturating_add(step_of(FAILURE_REACTION_S));
+        self.worlds.set_transition(lane, arm.at(step, step >= noticed));
         if faults.torque_lost {
             self.ecus.lose_torque(lane);
             slot.unguided_cause = Cause::TorqueLost.code();
@@ -170,9 +176,8 @@ impl<const N: usize> Lanes<N> {
             self.ecus.hand_over(lane, step);
             slot.unguided_cause = Cause::LaneLost.code();
         }
-        let noticed = plan.failure_step.saturating_add(step_of(FAILURE_REACTION_S));
-        let changed = plan.changed.as_ref().map_or(u32::MAX, |(at, _)| *at);
-        let events = [plan.failure_step, noticed, changed, slot.timeout];
+        let changed = arm.changed.as_ref().map_or(u32::MAX, |(at, _)| *at);
+        let events = [failed_at, noticed, changed, slot.timeout];
         let next = events.into_iter().filter(|event| *event > step).min();
         slot.event = next.unwrap_or(u32::MAX);
     }

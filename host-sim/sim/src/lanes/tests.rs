@@ -165,7 +165,11 @@ fn random(count: usize, seed: u64, beside: Beside) -> Vec<Scenario> {
         builder = if manual {
             builder.condition(Condition::Manual)
         } else {
-            let failure = Failure { kind, time_s };
+            let failure = Failure {
+                kind,
+                time_s,
+                duration_s: None,
+            };
             builder
                 .gains(ArmGains {
                     k_d: between(1.0, 5.0),
@@ -218,7 +222,10 @@ fn the_papers_drives_are_the_same_in_lanes() {
     }
     for kind in [FailureKind::Torque, FailureKind::Input] {
         for condition in [Condition::High, Condition::Low] {
-            let failure = Failure { kind, time_s: 70.0 };
+            let failure = Failure {
+                kind,
+                ..Failure::default()
+            };
             let builder = Scenario::builder().condition(condition).failure(failure);
             scenarios.push(builder.build().unwrap());
         }

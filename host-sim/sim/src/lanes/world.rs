@@ -101,7 +101,7 @@ impl<const N: usize> Worlds<N> {
             state[lane] = 0.0;
         }
         (self.direction[0][lane], self.direction[1][lane]) = (1.0, 0.0);
-        let vision = &simulation.vision;
+        let vision = &simulation.driver_vehicle.vision;
         [self.a[0][lane], self.a[1][lane], self.a[2][lane]] = [vision.a_1, vision.a_2, vision.a_3];
         (self.whole[lane], self.fraction[lane]) = (vision.delay.whole, vision.delay.fraction);
         for row in &mut self.delayed {

@@ -9,7 +9,8 @@ use super::driver::{ArmGains, DriverParameters};
 #[derive(Debug, Clone)]
 pub struct Arm {
     k_nms: f64,
-    gains: ArmGains,
+    /// How it weighs vision against guidance from the next step on.
+    pub gains: ArmGains,
     /// What is left of a torque after a step.
     decay: f64,
     /// Share of a ramp over the step that has come through at its end.

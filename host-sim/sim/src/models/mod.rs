@@ -18,3 +18,8 @@ pub mod vehicle;
 pub const STEP_S: f64 = 1e-3;
 /// Steps per second.
 pub const STEPS_PER_SECOND: u32 = 1000;
+
+/// The step at or next to a time.
+pub fn step_of(time_s: f64) -> u32 {
+    (time_s / STEP_S).round() as u32
+}

@@ -10,6 +10,7 @@ use super::{
     Speed, Values, file,
 };
 use crate::input::{InputError, RangeError, in_range};
+use crate::models::STEP_S;
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::real::WorldParameters;
@@ -236,6 +237,9 @@ impl ScenarioBuilder {
         in_range("t_f", values.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
         let setup = Setup::new(&values.controller_params()).map_err(|e| in_words_of_the_file(&e))?;
         in_range("time", values.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
+        if let Some(duration_s) = values.failure.duration_s {
+            in_range("duration", duration_s, STEP_S..=1e6, "s").map_err(within("failure"))?;
+        }
         if let Some(change) = &values.driver_change {
             in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
             check_gains(change.gains()).map_err(within("driver_change"))?;

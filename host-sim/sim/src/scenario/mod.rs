@@ -6,21 +6,25 @@
 //! drives as manually.
 
 mod builder;
+mod condition;
+mod failure;
 mod file;
 mod guidance_file;
 mod speed;
 #[cfg(test)]
 mod tests;
-
-use std::fmt;
+mod values;
 
 use haptic_core::config::Setup;
-use haptic_core::params::{Params, VehicleParams};
-use serde::{Deserialize, Serialize};
+use haptic_core::params::Params;
 
 pub use builder::{ScenarioBuilder, ScenarioError};
+pub use condition::{Condition, Sensors};
+pub use failure::{DEFAULT_FAILURE_TIME_S, DriverChange, FAILURE_REACTION_S, Failure, FailureKind};
 pub(crate) use speed::SpeedProfile;
 pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_KMH, SPEED_KMH, Speed};
+pub use values::GuidanceParameters;
+use values::Values;
 
 use crate::input::{InputError, in_range};
 use crate::models::disturbances::SensorErrors;
@@ -33,168 +37,10 @@ use crate::seeds::Stream;
 
 /// Speed of the paper's experiment and evaluation, km/h.
 pub const DEFAULT_SPEED_KMH: f64 = 60.0;
-/// When the paper lets the guidance fail, s.
-pub const DEFAULT_FAILURE_TIME_S: f64 = 70.0;
-/// How long the driver takes to notice a failure, s (section 5.2).
-pub const FAILURE_REACTION_S: f64 = 1.0;
 
 /// Shortest run, s. A course has to be longer than the look-ahead by as much, so that there is something to
 /// measure.
 const LEAST_DURATION_S: f64 = 1.0;
-
-/// How the driver drives (section 5.1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Condition {
-    /// Without guidance.
-    Manual,
-    /// Relying on the guidance.
-    High,
-    /// In between; table 4's gains.
-    Mid,
-    /// Hardly relying on it.
-    Low,
-    /// With other gains than the paper's.
-    #[serde(skip_deserializing)]
-    Custom,
-}
-
-impl Condition {
-    /// The paper's four.
-    pub const ALL: [Self; 4] = [Self::Manual, Self::High, Self::Mid, Self::Low];
-
-    /// The arm's gains under this condition; table 4's for gains of one's own.
-    pub fn gains(self) -> ArmGains {
-        match self {
-            Self::Manual => ArmGains::MANUAL,
-            Self::High => ArmGains { k_d: 2.0, k_hg: 0.0 },
-            Self::Mid | Self::Custom => ArmGains { k_d: 3.0, k_hg: 0.5 },
-            Self::Low => ArmGains { k_d: 4.0, k_hg: 1.0 },
-        }
-    }
-}
-
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Manual => "manual",
-            Self::High => "high",
-            Self::Mid => "mid",
-            Self::Low => "low",
-            Self::Custom => "custom",
-        })
-    }
-}
-
-/// What the controller sees of the world.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Sensors {
-    /// Full resolution every millisecond, past the bus: shows the controller alone.
-    Exact,
-    /// The paper's resolutions and 120 Hz, over the bus frames.
-    #[default]
-    Paper,
-}
-
-/// What fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FailureKind {
-    /// Nothing.
-    #[default]
-    None,
-    /// The guidance torque drops to zero (section 5.2).
-    Torque,
-    /// The lane preview stops; the ECU lives and hands over.
-    Input,
-}
-
-impl fmt::Display for FailureKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::None => "none",
-            Self::Torque => "torque",
-            Self::Input => "input",
-        })
-    }
-}
-
-/// A failure and its time.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Failure {
-    /// What fails.
-    pub kind: FailureKind,
-    /// When, s after the start.
-    #[serde(rename = "time")]
-    pub time_s: f64,
-}
-
-impl Failure {
-    /// When something fails, if anything does, s.
-    pub fn at_s(&self) -> Option<f64> {
-        (self.kind != FailureKind::None).then_some(self.time_s)
-    }
-}
-
-impl Default for Failure {
-    fn default() -> Self {
-        Self {
-            kind: FailureKind::None,
-            time_s: DEFAULT_FAILURE_TIME_S,
-        }
-    }
-}
-
-/// A driver who changes in mid-drive, before a failure is noticed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DriverChange {
-    /// When, s after the start.
-    #[serde(rename = "time")]
-    pub time_s: f64,
-    /// K_d from then on, N.m/rad.
-    #[serde(rename = "K_d", alias = "k_d")]
-    pub k_d: f64,
-    /// K_hg from then on.
-    #[serde(rename = "K_hg", alias = "k_hg")]
-    pub k_hg: f64,
-}
-
-impl DriverChange {
-    /// The arm's gains from then on.
-    pub fn gains(&self) -> ArmGains {
-        ArmGains {
-            k_d: self.k_d,
-            k_hg: self.k_hg,
-        }
-    }
-}
-
-/// The controller and the camera that feeds it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GuidanceParameters {
-    /// The controller's own parameters; the default is table 8.
-    pub controller: Params,
-    /// t'_n, look-ahead time of the camera's near point, s.
-    pub t_n: f64,
-    /// t'_f, look-ahead time of its far point, s.
-    pub t_f: f64,
-    /// Whether the host asks for the probe. Seen only by the shipping controller.
-    pub probe: bool,
-}
-
-impl Default for GuidanceParameters {
-    fn default() -> Self {
-        Self {
-            controller: Params::PAPER,
-            t_n: 0.3,
-            t_f: 0.7,
-            probe: false,
-        }
-    }
-}
 
 /// Everything that decides a run, checked: whoever holds one may simulate it. Made by a [`ScenarioBuilder`] or from
 /// the text of a file.
@@ -204,48 +50,6 @@ pub struct Scenario {
     /// These follow from the values.
     setup: Setup,
     speed: SpeedProfile,
-}
-
-/// The values that a person chooses.
-#[derive(Debug, Clone, PartialEq)]
-struct Values {
-    course: Course,
-    speed: Speed,
-    manual: bool,
-    driver: DriverParameters,
-    gains: ArmGains,
-    manual_k_d: f64,
-    vehicle: VehicleParameters,
-    guidance: GuidanceParameters,
-    sensors: Sensors,
-    failure: Failure,
-    driver_change: Option<DriverChange>,
-    world: WorldParameters,
-    sensor_errors: SensorErrors,
-    tolerances: Tolerances,
-    seed: u64,
-}
-
-impl Default for Values {
-    fn default() -> Self {
-        Self {
-            course: Course::paper(),
-            speed: Speed::Constant(DEFAULT_SPEED_KMH),
-            manual: false,
-            driver: DriverParameters::default(),
-            gains: Condition::Mid.gains(),
-            manual_k_d: ArmGains::MANUAL.k_d,
-            vehicle: VehicleParameters::default(),
-            guidance: GuidanceParameters::default(),
-            sensors: Sensors::default(),
-            failure: Failure::default(),
-            driver_change: None,
-            world: WorldParameters::default(),
-            sensor_errors: SensorErrors::default(),
-            tolerances: Tolerances::default(),
-            seed: 1,
-        }
-    }
 }
 
 impl PartialEq for Scenario {
@@ -500,49 +304,5 @@ impl Scenario {
         let DriverParameters { t_n, t_f, .. } = self.values.driver;
         let guidance = &self.values.guidance;
         t_n.max(t_f).max(guidance.t_n).max(guidance.t_f)
-    }
-}
-
-impl Values {
-    /// The controller's parameters with what it knows of the vehicle.
-    fn controller_params(&self) -> Params {
-        Params {
-            vehicle: self.vehicle_for_plausibility(),
-            ..self.guidance.controller
-        }
-    }
-
-    /// The vehicle as the controller's plausibility checks know it: the true one, from tables 8 and 9.
-    fn vehicle_for_plausibility(&self) -> VehicleParams {
-        let (near_time_s, far_time_s) = (self.guidance.t_n, self.guidance.t_f);
-        if self.vehicle == VehicleParameters::default() {
-            // The constants of the shipped image, so that host and target hold the same bits.
-            return VehicleParams {
-                far_time_s,
-                near_time_s,
-                ..Params::PAPER.vehicle
-            };
-        }
-        let VehicleParameters {
-            m,
-            l_f,
-            l_r,
-            k_f,
-            k_r,
-            k_t,
-            b_s,
-            ..
-        } = self.vehicle;
-        let l = l_f + l_r;
-        // The ECU knows understeering vehicles alone: a neutral or oversteering one is told as neutral.
-        let stability = m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r);
-        VehicleParams {
-            curvature_gain_per_m: k_t / l,
-            stability_factor_s2_per_m2: stability.max(0.0),
-            aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            column_damping_nm_s: b_s,
-            far_time_s,
-            near_time_s,
-        }
     }
 }

@@ -182,6 +182,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
         let failure = Failure {
             kind,
             time_s: failure_s,
+            duration_s: None,
         };
         let course = Course::from_toml("c", "[[segment]]\nlength = 516.7").unwrap();
         let scenario = Scenario::builder().course(course).failure(failure);

@@ -1,0 +1,233 @@
+//! The paper's driver in the paper's vehicle, as one system.
+
+use super::{Acting, DriverVehicle, DriverView, Motion};
+use crate::models::driver::{ArmGains, DriverParameters, Remnant, Vision};
+use crate::models::plant::{Plant, PlantInput, Transition};
+use crate::models::real::RealPlant;
+use crate::models::step_of;
+use crate::models::tolerances::Car;
+use crate::scenario::{FAILURE_REACTION_S, Scenario};
+use crate::seeds::Stream;
+
+/// The driver of equations (7) and (8) whose arm is a state of the vehicle's plant: the exact step of the linear one, or
+/// the nonlinear plant that a scenario asks for.
+#[derive(Debug, Clone)]
+pub struct PaperPair {
+    look_ahead_s: [f64; 2],
+    pub(crate) vision: Vision,
+    pub(crate) remnant: Remnant,
+    pub(crate) arm: ByReliance<Transition>,
+    notices: Notices,
+    takes_over: bool,
+    step: u32,
+    /// phi_target at the start and at the end of the step, rad.
+    target_rad: [f64; 2],
+    /// Torque on the column beside the arm's and the guidance's, N.m.
+    held_nm: f64,
+    plant: Plant,
+    pub(crate) nonlinear: Option<Box<RealPlant>>,
+    motor_torque_nm: f64,
+}
+
+impl PaperPair {
+    /// A scenario's driver in the car that its tolerances draw.
+    pub fn new(scenario: &Scenario) -> Self {
+        let arm = ByReliance::new(scenario, |gains| transition(scenario, scenario.driver(), gains));
+        Self::moved_by(scenario, scenario.driver(), arm)
+    }
+
+    /// The same car with nobody at the wheel: whatever steers it is a hand's torque.
+    pub fn without_driver(scenario: &Scenario) -> Self {
+        let nobody = DriverParameters {
+            a_1: 0.0,
+            a_2: 0.0,
+            a_3: 0.0,
+            k_nms: 0.0,
+            remnant_sd_nm: 0.0,
+            ..*scenario.driver()
+        };
+        let slack = ArmGains { k_d: 0.0, k_hg: 0.0 };
+        let arm = ByReliance::constant(transition(scenario, &nobody, slack));
+        Self::moved_by(scenario, &nobody, arm)
+    }
+
+    fn moved_by(scenario: &Scenario, driver: &DriverParameters, arm: ByReliance<Transition>) -> Self {
+        let Car { world, vehicle, .. } = scenario.car();
+        // The linear plant is exact at one speed alone.
+        let is_linear = world.is_ideal() && scenario.course().is_level() && !scenario.changes_speed();
+        let seed = Stream::World.seed(scenario.seed());
+        Self {
+            look_ahead_s: [driver.t_n, driver.t_f],
+            vision: Vision::new(driver),
+            remnant: Remnant::new(driver, Stream::Remnant.seed(scenario.seed())),
+            arm,
+            notices: Notices::default(),
+            takes_over: false,
+            step: 0,
+            target_rad: [0.0; 2],
+            held_nm: 0.0,
+            plant: Plant::default(),
+            nonlinear: (!is_linear).then(|| Box::new(RealPlant::new(world, &vehicle, driver, seed))),
+            motor_torque_nm: 0.0,
+        }
+    }
+
+    /// From the next step on the driver is that of another scenario in weights, delay and gains of the arm. Muscle, remnant
+    /// and look-ahead stay what they were.
+    pub fn change_driver(&mut self, to: &Scenario) {
+        self.arm.relying = transition(to, to.driver(), to.gains());
+        self.vision.change(to.driver());
+    }
+
+    /// Whether the driver drives as manually from now on, as one does who has understood that there is no guidance.
+    pub fn take_over(&mut self, takes_over: bool) {
+        self.takes_over = takes_over;
+    }
+
+    /// Torque of the driver's arm at the start of the next step, without remnant and hand, N.m.
+    pub fn arm_torque_nm(&self) -> f64 {
+        self.plant.arm_torque_nm()
+    }
+
+    /// A torque on the column in the place of a driver's.
+    pub(super) fn hold(&mut self, torque_nm: f64) {
+        self.held_nm = torque_nm;
+    }
+}
+
+impl DriverVehicle for PaperPair {
+    fn look_ahead_s(&self) -> [f64; 2] {
+        self.look_ahead_s
+    }
+
+    #[inline]
+    fn drive(&mut self, view: &DriverView, hand_torque_nm: f64) -> f64 {
+        self.step = view.step;
+        self.notices.step(view.is_lost);
+        self.target_rad[1] = self.vision.step(view.lane.e_y_m, view.lane.e_theta_rad);
+        self.held_nm = self.remnant.step() + hand_torque_nm;
+        self.plant.arm_torque_nm() + self.held_nm
+    }
+
+    #[inline]
+    fn advance(&mut self, acting: &Acting) {
+        let input = PlantInput {
+            target_now_rad: self.target_rad[0],
+            target_next_rad: self.target_rad[1],
+            guidance_torque_nm: acting.guidance_torque_nm,
+            remnant_nm: self.held_nm,
+        };
+        let is_manual = self.takes_over || self.notices.is_manual();
+        let transition = self.arm.at(self.step, is_manual);
+        self.motor_torque_nm = match &mut self.nonlinear {
+            None => {
+                self.plant.step(transition, &input);
+                acting.guidance_torque_nm
+            }
+            Some(plant) => {
+                let speeds = acting.speed_m_per_s;
+                plant.step(
+                    &mut self.plant,
+                    speeds,
+                    transition.gains(),
+                    &input,
+                    acting.bank_rad,
+                );
+                plant.motor_torque_nm()
+            }
+        };
+        self.target_rad[0] = self.target_rad[1];
+    }
+
+    #[inline]
+    fn motion(&self) -> Motion {
+        let plant = &self.plant;
+        Motion {
+            position_m: plant.position_m(),
+            direction_rad: plant.direction_rad(),
+            sideslip_rad: plant.sideslip_rad(),
+            yaw_rate_rad_per_s: plant.yaw_rate_rad_per_s(),
+            wheel_angle_rad: plant.wheel_angle_rad(),
+            wheel_rate_rad_per_s: plant.wheel_rate_rad_per_s(),
+        }
+    }
+
+    #[inline]
+    fn ahead_m(&self, distance_m: f64) -> [f64; 2] {
+        self.plant.ahead_m(distance_m)
+    }
+
+    #[inline]
+    fn motor_torque_nm(&self) -> f64 {
+        self.motor_torque_nm
+    }
+}
+
+fn transition(scenario: &Scenario, driver: &DriverParameters, gains: ArmGains) -> Transition {
+    Transition::new(scenario.speed_m_per_s(), &scenario.car().vehicle, driver, gains)
+}
+
+/// What follows from the gains of a driver's arm, for each way in which a scenario has the driver rely on guidance.
+#[derive(Debug, Clone)]
+pub(crate) struct ByReliance<T> {
+    relying: T,
+    /// From this step on in the place of `relying`.
+    pub(crate) changed: Option<(u32, T)>,
+    manual: T,
+}
+
+impl<T: Clone> ByReliance<T> {
+    pub(crate) fn new(scenario: &Scenario, of: impl Fn(ArmGains) -> T) -> Self {
+        let change = scenario.driver_change();
+        Self {
+            relying: of(scenario.gains()),
+            changed: change.map(|change| (step_of(change.time_s), of(change.gains()))),
+            manual: of(scenario.manual_gains()),
+        }
+    }
+
+    fn constant(always: T) -> Self {
+        Self {
+            relying: always.clone(),
+            changed: None,
+            manual: always,
+        }
+    }
+}
+
+impl<T> ByReliance<T> {
+    #[inline]
+    pub(crate) fn at(&self, step: u32, is_manual: bool) -> &T {
+        match &self.changed {
+            _ if is_manual => &self.manual,
+            Some((from, changed)) if step >= *from => changed,
+            _ => &self.relying,
+        }
+    }
+}
+
+/// A driver who notices a second later that the guidance is lost, and as much later that it is back.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Notices {
+    is_manual: bool,
+    /// Steps for which it has been otherwise than the driver believes.
+    unnoticed: u32,
+}
+
+impl Notices {
+    #[inline]
+    pub(crate) fn step(&mut self, is_lost: bool) {
+        if is_lost == self.is_manual {
+            self.unnoticed = 0;
+        } else if self.unnoticed == step_of(FAILURE_REACTION_S) {
+            (self.is_manual, self.unnoticed) = (is_lost, 0);
+        } else {
+            self.unnoticed += 1;
+        }
+    }
+
+    #[inline]
+    pub(crate) fn is_manual(&self) -> bool {
+        self.is_manual
+    }
+}

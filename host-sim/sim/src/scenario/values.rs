@@ -1,0 +1,121 @@
+//! The values that a person chooses, and what the controller knows of them.
+
+use haptic_core::params::{Params, VehicleParams};
+
+use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Sensors, Speed};
+use crate::models::disturbances::SensorErrors;
+use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::real::WorldParameters;
+use crate::models::road::Course;
+use crate::models::tolerances::Tolerances;
+use crate::models::vehicle::VehicleParameters;
+
+/// The controller and the camera that feeds it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GuidanceParameters {
+    /// The controller's own parameters; the default is table 8.
+    pub controller: Params,
+    /// t'_n, look-ahead time of the camera's near point, s.
+    pub t_n: f64,
+    /// t'_f, look-ahead time of its far point, s.
+    pub t_f: f64,
+    /// Whether the host asks for the probe. Seen only by the shipping controller.
+    pub probe: bool,
+}
+
+impl Default for GuidanceParameters {
+    fn default() -> Self {
+        Self {
+            controller: Params::PAPER,
+            t_n: 0.3,
+            t_f: 0.7,
+            probe: false,
+        }
+    }
+}
+
+/// The values that a person chooses.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Values {
+    pub(super) course: Course,
+    pub(super) speed: Speed,
+    pub(super) manual: bool,
+    pub(super) driver: DriverParameters,
+    pub(super) gains: ArmGains,
+    pub(super) manual_k_d: f64,
+    pub(super) vehicle: VehicleParameters,
+    pub(super) guidance: GuidanceParameters,
+    pub(super) sensors: Sensors,
+    pub(super) failure: Failure,
+    pub(super) driver_change: Option<DriverChange>,
+    pub(super) world: WorldParameters,
+    pub(super) sensor_errors: SensorErrors,
+    pub(super) tolerances: Tolerances,
+    pub(super) seed: u64,
+}
+
+impl Default for Values {
+    fn default() -> Self {
+        Self {
+            course: Course::paper(),
+            speed: Speed::Constant(DEFAULT_SPEED_KMH),
+            manual: false,
+            driver: DriverParameters::default(),
+            gains: Condition::Mid.gains(),
+            manual_k_d: ArmGains::MANUAL.k_d,
+            vehicle: VehicleParameters::default(),
+            guidance: GuidanceParameters::default(),
+            sensors: Sensors::default(),
+            failure: Failure::default(),
+            driver_change: None,
+            world: WorldParameters::default(),
+            sensor_errors: SensorErrors::default(),
+            tolerances: Tolerances::default(),
+            seed: 1,
+        }
+    }
+}
+
+impl Values {
+    /// The controller's parameters with what it knows of the vehicle.
+    pub(super) fn controller_params(&self) -> Params {
+        Params {
+            vehicle: self.vehicle_for_plausibility(),
+            ..self.guidance.controller
+        }
+    }
+
+    /// The vehicle as the controller's plausibility checks know it: the true one, from tables 8 and 9.
+    fn vehicle_for_plausibility(&self) -> VehicleParams {
+        let (near_time_s, far_time_s) = (self.guidance.t_n, self.guidance.t_f);
+        if self.vehicle == VehicleParameters::default() {
+            // The constants of the shipped image, so that host and target hold the same bits.
+            return VehicleParams {
+                far_time_s,
+                near_time_s,
+                ..Params::PAPER.vehicle
+            };
+        }
+        let VehicleParameters {
+            m,
+            l_f,
+            l_r,
+            k_f,
+            k_r,
+            k_t,
+            b_s,
+            ..
+        } = self.vehicle;
+        let l = l_f + l_r;
+        // The ECU knows understeering vehicles alone: a neutral or oversteering one is told as neutral.
+        let stability = m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r);
+        VehicleParams {
+            curvature_gain_per_m: k_t / l,
+            stability_factor_s2_per_m2: stability.max(0.0),
+            aligning_gain_nm_s2_per_m: self.vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
+            column_damping_nm_s: b_s,
+            far_time_s,
+            near_time_s,
+        }
+    }
+}
