@@ -2,7 +2,6 @@
 //!
 //! It only runs tools and looks at what they say. Exit codes: 0 well, 1 a check failed, 2 bad usage.
 
-mod account;
 mod bench;
 mod bindings_agree;
 mod boards;
@@ -26,7 +25,6 @@ mod qemu;
 mod seal;
 mod size;
 mod speed;
-mod sweep;
 mod tool;
 mod trace;
 mod web;
@@ -137,8 +135,6 @@ enum Bench {
     Speed(speed::Options),
     /// The identification of a recorded drive: ours and SciPy's, to the same loss.
     Identify,
-    /// Large sweeps: time, memory and size over the number of drives, and what a second thread gives.
-    Sweep(sweep::Options),
 }
 
 fn main() -> ExitCode {
@@ -166,10 +162,6 @@ fn main() -> ExitCode {
             what: Some(Bench::Identify),
             ..
         } => identify::run(),
-        Command::Bench {
-            what: Some(Bench::Sweep(options)),
-            ..
-        } => sweep::run(&options),
         Command::Bench {
             board: Some(board), ..
         } => boards::bench(board),

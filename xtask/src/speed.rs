@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{account, callgrind, tool};
+use crate::{callgrind, tool};
 
 /// Runs of a loop within a round; the fastest of them counts.
 const REPEAT: &str = "5";
@@ -21,11 +21,8 @@ const SAME_DRIVE: [&str; 8] = ["--t-p", "0.1", "--k-d", "3", "--k-hg", "0.5", "-
 #[derive(Debug, Args)]
 pub(crate) struct Options {
     /// Print one JSON object.
-    #[arg(long, conflicts_with = "account")]
-    json: bool,
-    /// Print what the nanoseconds of a lane's millisecond go to instead, beside C's loop (needs perf).
     #[arg(long)]
-    account: bool,
+    json: bool,
     /// Rounds, each with every program once.
     #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
@@ -53,9 +50,6 @@ struct Figures {
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
-    if options.account {
-        return account(options.rounds);
-    }
     tool::ensure(&[("gcc", "gcc"), ("python3", "python3-venv")])?;
     let ours = callgrind::build_closed_loop()?;
     let c = build_c("target/closed_loop_c", &[])?;
@@ -96,46 +90,6 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     } else {
         print(&figures);
     }
-    Ok(())
-}
-
-/// Lanes by stage, beside the whole of C. The fastest round of each counts, since stages are of one program.
-fn account(rounds: u32) -> Result<()> {
-    tool::ensure(&[("gcc", "gcc")])?;
-    account::ensure_tools()?;
-    let c = build_c("target/closed_loop_c", &[])?;
-    let lanes = callgrind::build("lanes")?;
-    let widths = ["widest", "avx2"];
-    let mut fastest = [0.0_f64; 3];
-    for _ in 0..rounds {
-        fastest[2] = fastest[2].max(times_real_time(&c, &SAME_DRIVE)?);
-        for (fastest, width) in fastest.iter_mut().zip(widths) {
-            *fastest = fastest.max(times_real_time(&lanes, &["--width", width, "--repeat", REPEAT])?);
-        }
-    }
-    // A simulated millisecond at so many times real time, ns.
-    let [widest_ns, avx2_ns, c_ns] = fastest.map(|speed| 1e6 / speed);
-    let (widest, avx2) = (
-        account::shares(&lanes, widths[0])?,
-        account::shares(&lanes, widths[1])?,
-    );
-    println!("a millisecond of one lane, ns (fastest of {rounds} rounds)");
-    println!("  {:<50}{:>10}{:>10}", "", "widest", "AVX2");
-    for ((stage, share), (_, of_avx2)) in widest.iter().zip(&avx2) {
-        println!(
-            "  {stage:<50}{:>10.1}{:>10.1}",
-            share * widest_ns,
-            of_avx2 * avx2_ns
-        );
-    }
-    println!("  {:<50}{widest_ns:>10.1}{avx2_ns:>10.1}", "all");
-    println!("  {:<50}{c_ns:>10.1}", "a millisecond of C's loop");
-    println!(
-        "  {:<50}{:>10.2}{:>10.2}",
-        "C's over a lane's",
-        c_ns / widest_ns,
-        c_ns / avx2_ns
-    );
     Ok(())
 }
 
