@@ -23,7 +23,7 @@ use haptic_core::params::Params;
 use haptic_core::rejections::Rejections;
 
 use crate::boards::{Board, ThisBoard};
-use crate::service::{STEPS_TO_SETTLE, Service};
+use crate::service::Service;
 use crate::storage::{self, Found};
 use crate::{analogue, image, reset, stack};
 
@@ -194,7 +194,7 @@ fn step(board: &mut ThisBoard, ecu: &mut Ecu, service: &mut Service, counts: &mu
         .status()
         .set_state(step.command.mode.may_have_torque().into());
     counts.steps = counts.steps.wrapping_add(1);
-    if counts.steps == STEPS_TO_SETTLE {
+    if counts.steps == reset::STEPS_TO_SETTLE {
         reset::settled();
     }
     if counts.steps.is_multiple_of(STEPS_PER_REPORT) {

@@ -22,6 +22,14 @@ use haptic_core::faults::{Fault, FaultSet};
 /// So many resets since power-up lock the ECU, however far apart they are.
 const RESETS_SINCE_POWER_UP_TO_LOCK: u32 = 10;
 
+/// Steps of 1 ms after which earlier resets no longer count: 10 s.
+pub const STEPS_TO_SETTLE: u32 = 10_000;
+
+/// Whether a start has run long enough for new parameters, which cost a reset: one after power-up has at once.
+pub fn has_settled(cause: ResetCause, steps: u32) -> bool {
+    cause == ResetCause::PowerOn || steps >= STEPS_TO_SETTLE
+}
+
 /// What the hardware says about the last reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hardware {
@@ -337,6 +345,17 @@ mod tests {
             recent,
             ..Record::default()
         }
+    }
+
+    /// The requirement says ten seconds, and a step is a millisecond.
+    #[test]
+    fn a_start_after_a_reset_has_settled_after_ten_seconds() {
+        for cause in [ResetCause::Watchdog, ResetCause::Panic] {
+            assert!(!has_settled(cause, 9_999), "{cause:?}");
+            assert!(has_settled(cause, 10_000), "{cause:?}");
+        }
+        assert!(has_settled(ResetCause::PowerOn, 0));
+        assert_eq!(STEPS_TO_SETTLE, 10_000);
     }
 
     /// How the next start comes up when this record lies in memory.

@@ -2,7 +2,7 @@
 //! bus. Behind the torque, which is on its way by then. Not here: where a set is stored, and the restart that it causes.
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Identity, Message, Rejection, ResetCause};
+use haptic_core::bus::messages::{Identity, Message, Rejection};
 use haptic_core::controller::Command;
 use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
 use haptic_core::ecu::{Boot, Ecu};
@@ -13,6 +13,7 @@ use haptic_core::stored::Set;
 use heapless::Vec;
 
 use crate::boards::{Board, ThisBoard};
+use crate::reset;
 use crate::storage::Found;
 
 /// Steps between two statuses: one second.
@@ -22,8 +23,6 @@ const STEPS_PER_STATUS: u32 = 1000;
 const STEPS_PER_LINE: u32 = 100;
 const VALUE_AT: u32 = 25;
 const REJECTION_AT: u32 = 75;
-/// Steps after which earlier resets no longer count: 10 s.
-pub const STEPS_TO_SETTLE: u32 = 10_000;
 
 /// What has to do with parameters.
 pub struct Service {
@@ -63,7 +62,7 @@ impl Service {
         let conditions = Conditions {
             mode: self.mode,
             stands: ecu.stands(),
-            settled: self.boot.reset == ResetCause::PowerOn || steps >= STEPS_TO_SETTLE,
+            settled: reset::has_settled(self.boot.reset, steps),
             in_use: self.found.stored.map_or(0, |stored| stored.sequence),
             now_ms: steps,
         };
