@@ -10,13 +10,13 @@
 //!     cargo run --release --example lanes -p haptic-guidance -- --beside wind --alone
 
 use cpu_time::ThreadTime;
-use haptic_sim::lanes::{LANES, Width, drive};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::real::WorldParameters;
 use haptic_sim::scenario::{Condition, Scenario, ScenarioBuilder};
 use haptic_sim::simulation::{Run, simulate};
 use haptic_sim::worlds::WORLDS;
+use haptic_vectorised::{BATCH, Event, Options, Width, run_batch};
 
 const USAGE: &str = "usage: lanes [--width widest|avx2|portable] [--repeat N] [--alone] \
     [--beside probe|sensors|wind|everything], the fastest of N rounds is timed";
@@ -47,16 +47,21 @@ fn main() {
     let scenarios = drives(beside);
     let _built = scenarios[0].course().centreline();
     let (mut processor_seconds, mut alone_seconds) = (f64::INFINITY, f64::INFINITY);
-    let (mut steps, mut peak_m, mut handed_back) = (0, 0.0, 0);
+    let (mut steps, mut peak_m, mut rejected) = (0, 0.0, 0);
     for _ in 0..repeat {
         let start = ThreadTime::now();
-        (steps, handed_back) = (0, 0);
-        drive(&scenarios, width, |number, run| {
+        (steps, rejected) = (0, 0);
+        let options = Options {
+            width,
+            ..Options::default()
+        };
+        run_batch(&scenarios, options, |number, event| {
             let given_back;
-            let run = match run {
-                Some(run) => run,
-                None => {
-                    handed_back += 1;
+            let run = match event {
+                Event::Steps(_) => return,
+                Event::Ended(run) => run,
+                Event::Rejected(_) => {
+                    rejected += 1;
                     given_back = simulate(&scenarios[number]);
                     &given_back
                 }
@@ -67,7 +72,7 @@ fn main() {
             }
         });
         processor_seconds = processor_seconds.min(start.elapsed().as_secs_f64());
-        let is_nominal = beside != Beside::Nothing || handed_back == 0;
+        let is_nominal = beside != Beside::Nothing || rejected == 0;
         assert!(is_nominal, "the evaluation's drives are nominal");
         if alone {
             let start = ThreadTime::now();
@@ -85,14 +90,14 @@ fn main() {
         serde_json::json!({
             "program": "haptic-guidance, lanes",
             "sensors": "paper",
-            "lanes": LANES,
+            "lanes": BATCH,
             "simulated_seconds": simulated_seconds,
             "processor_seconds": processor_seconds,
             "times_real_time": simulated_seconds / processor_seconds,
             "steps": steps,
             "peak_lateral_error_m": peak_m,
             "drives": scenarios.len(),
-            "handed_back": handed_back,
+            "rejected": rejected,
             "over_one_by_one": alone.then(|| alone_seconds / processor_seconds),
         })
     );

@@ -47,7 +47,7 @@ words! {
 const MAX_GAIN: f64 = 32.0;
 const PROBE_SLOPE: &str = "2 * pi * probe_amplitude_nm * probe_frequency_hz";
 /// Half the monitor's band, N.m: at least, and at most. As wide as the absolute limit it would guard nothing.
-const LEAST_BAND_NM: f64 = 0.3;
+pub const LEAST_BAND_NM: f64 = 0.3;
 const MOST_BAND_NM: f64 = 5.0;
 const BAND: &str = "the monitor's band for k_1 * (a_1, a_2, a_3, a_4) at rate_corner_hz";
 /// Steepest slope of the probe, N.m/s.

@@ -89,14 +89,14 @@ pub struct Situation {
 }
 
 /// Growth per [`WINDOW`].
-const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
+pub const WINDOW_GROWTH: Torque = Torque::from_nm(1.2);
 /// How many times as fast a distrusted torque falls. At 8 N.m/s a lie of 5 N.m moves the vehicle by 0.25 m beyond where it
 /// goes without any torque, at 16 by 0.12 m, at 32 by 0.06 m (docs/decisions). At once it would be a blow.
 const DISTRUSTED: i32 = 4;
 /// Opposing driver torque at which the bound begins to shrink.
-const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
+pub const OVERRIDE_FROM: Torque = Torque::from_nm(0.8);
 /// How fast it shrinks, N.m per N.m.
-const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
+pub const OVERRIDE_SLOPE: Ratio = Ratio::from_si(3.0);
 
 /// Length of the window. Growth is counted from an anchor that moves up every 250 ms.
 pub const WINDOW: Micros = Micros::from_ms(250);

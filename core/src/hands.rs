@@ -13,11 +13,11 @@ use crate::quantity::{Micros, Torque};
 use crate::redundant::words;
 
 /// A change of the driver torque that only a hand makes: beyond the sensor's noise and the inertia of the wheel's rim.
-const FELT: Torque = Torque::from_nm(0.08);
+pub const FELT: Torque = Torque::from_nm(0.08);
 /// A driver torque that only a hand makes, whatever it was before: above the largest offset of a sensor.
-const HELD: Torque = Torque::from_nm(0.35);
+pub const HELD: Torque = Torque::from_nm(0.35);
 /// A guidance torque that a hand would answer.
-const ACTS: Torque = Torque::from_nm(0.05);
+pub const ACTS: Torque = Torque::from_nm(0.05);
 /// No hand for so long: the driver is warned.
 pub const WARN: Micros = Micros::from_ms(15_000);
 /// No hand for so long: the guidance ends.

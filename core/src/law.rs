@@ -167,7 +167,7 @@ const RATE_BITS: u32 = 20;
 
 /// Largest rate the filter may hold, 1000 m/s or rad/s. No road or vehicle comes near it; the clamp keeps
 /// every product of the step inside an `i64` whatever the samples are.
-const MAX_RATE: u32 = 1000 << RATE_BITS;
+pub const MAX_RATE: u32 = 1000 << RATE_BITS;
 
 impl Law {
     /// The torque that the law asks for now, from the latest sample received; `since` is what the vehicle did since that

@@ -108,7 +108,7 @@ const DISTRUSTED: i32 = 4;
 /// The probe ends within a period, and none is slower than 1 Hz; a command is stale after 30 ms.
 const PROBE_END_US: i32 = 1_030_000;
 /// For how long the torque may be outside that band.
-const ASTRAY_MS: i32 = 20;
+pub const ASTRAY_MS: i32 = 20;
 /// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
 const OLDEST_LANE_US: i32 = 360_000;
 /// A sample older than this is continued at its rates.
@@ -120,7 +120,7 @@ const OVERRIDE_SLACK_MNM: i32 = 50;
 /// How many rules there are to try.
 pub const RULES: u32 = 7;
 /// Rates are taken over at least this.
-const RATE_SPAN_US: i32 = 50_000;
+pub const RATE_SPAN_US: i32 = 50_000;
 
 impl MonitorState {
     /// Nothing seen, permission granted.

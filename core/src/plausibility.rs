@@ -202,11 +202,11 @@ impl PlausibilityState {
 
 /// Largest honest change of the near-point error between two samples: 0.3 m, twenty times what 40 m/s and a
 /// yaw error of 0.1 rad give in 8.3 ms.
-const LANE_STEP: Metres = Metres::from_m(0.3);
+pub const LANE_STEP: Metres = Metres::from_m(0.3);
 /// Likewise for the yaw error: 0.1 rad in 8.3 ms would be 12 rad/s.
-const YAW_STEP: Radians = Radians::from_rad(0.1);
+pub const YAW_STEP: Radians = Radians::from_rad(0.1);
 /// Largest honest change of a speed between two messages: 1 m/s in 10 ms is 10 g.
-const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
+pub const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
 /// One message may be that of a wheel that slips.
 const SPEEDS_PATIENCE: u32 = 3;
 /// Two sources that differ by this much are not both right.
@@ -250,15 +250,16 @@ pub fn speeds_agree(a: Speed, b: Speed) -> bool {
     a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
 }
 
-/// Margins of the checks.
-const LANE_MARGIN: Metres = Metres::from_m(0.4);
-const COLUMN_MARGIN: AngularImpulse = AngularImpulse::from_nm_s(0.6);
+/// What a lane may miss of the motion predicted within a second.
+pub const LANE_MARGIN: Metres = Metres::from_m(0.4);
+/// What torques may lack on the column within a second.
+pub const COLUMN_MARGIN: AngularImpulse = AngularImpulse::from_nm_s(0.6);
 /// So far within a second no vehicle goes beyond what its yaw rate says, 2^-24 m.
-const UNREAL: i32 = Metres::from_m(0.8).bits();
+pub const UNREAL: i32 = Metres::from_m(0.8).bits();
 /// Power assist: all that acts on the column is at most so many times the driver's torque.
 pub const ASSIST: i32 = 5;
 /// Friction of the column, and what else holds it without a sign.
-const FRICTION: Torque = Torque::from_nm(0.5);
+pub const FRICTION: Torque = Torque::from_nm(0.5);
 /// What is beyond these is as wrong as they are: driver and aligning torque, and what damping takes in the time between two
 /// checks. With them, and a guidance of 5 N.m that its frame has room for, no sum of the column check reaches 128, the end
 /// of an `i32`: 100 + 5 + 16.3 at most before the time, which at least halves it, and 60.7 + 60 + 0.3 + 2.7 after.
@@ -266,16 +267,17 @@ const MOST_DRIVER: Torque = Torque::from_nm(20.0);
 const MOST_ALIGNING: i32 = Torque::from_nm(16.0).bits();
 const MOST_DAMPED: i32 = AngularImpulse::from_nm_s(60.0).bits();
 /// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank, 2^-24 N.m.
-const PUSHED: i32 = Torque::from_nm(0.3).bits();
+pub const PUSHED: i32 = Torque::from_nm(0.3).bits();
 /// So much of the aligning torque may be wrong, in 2^-32: 77/256, 30 %.
-const ALIGNING_ERROR: i32 = 77 << (32 - 8);
+pub const ALIGNING_ERROR: i32 = 77 << (32 - 8);
 /// Inertia of column and wheel: 2^-3 kg.m2, a little more than the 0.11 of table 9.
 const INERTIA_SHIFT: u32 = 3;
 /// Bounds of what is learnt slowly: a bank of 5 %, or a pull; 5 mrad of camera and yaw rate at 30 m/s.
-const COLUMN_BIAS: Torque = Torque::from_nm(0.5);
-const LANE_BIAS: Speed = Speed::from_m_per_s(0.15);
+pub const COLUMN_BIAS: Torque = Torque::from_nm(0.5);
+/// Likewise of the lane.
+pub const LANE_BIAS: Speed = Speed::from_m_per_s(0.15);
 /// It is learnt within 2^4 s.
-const BIAS_SHIFT: u32 = 4;
+pub const BIAS_SHIFT: u32 = 4;
 
 impl Plausibility {
     /// Takes the speed in use and the measured yaw rate; returns nothing, for neither has a counterpart here. How fast

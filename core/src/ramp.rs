@@ -17,9 +17,9 @@ const WITHOUT_COLUMN: u32 = 2;
 const IMPLAUSIBLE_COLUMN: u32 = 4;
 /// Where the driver pushes against it, it goes so many times as fast. From 5 N.m that is 7.5 N.m/s: the largest whole
 /// number that keeps the reduction limit.
-const OPPOSED: u32 = 3;
+pub const OPPOSED: u32 = 3;
 /// From here on the driver pushes against it: the largest offset of an ordinary torque sensor.
-const OPPOSES: Torque = Torque::from_nm(0.1);
+pub const OPPOSES: Torque = Torque::from_nm(0.1);
 
 /// How many times as fast a handover goes beside a driver torque, `None` without one; `is_plausible` says whether it may be
 /// believed.
@@ -109,7 +109,8 @@ pub struct History {
     coarse: Outputs,
 }
 
-const FINE: Micros = Micros::from_ms(5);
+/// From one output that is remembered to the next, of the newest.
+pub const FINE: Micros = Micros::from_ms(5);
 const COARSE: Micros = Micros::from_ms(40);
 /// What the fine history reaches back to, with a place to spare.
 const FINE_SPAN: Micros = Micros::from_ms(300);

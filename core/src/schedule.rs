@@ -20,10 +20,12 @@ words! {
     }
 }
 
-/// 20, 60 and 130 km/h.
-const SLOW_M_PER_S: f64 = 20.0 / 3.6;
-const MIDDLE: Speed = Speed::from_m_per_s(60.0 / 3.6);
-const FAST_M_PER_S: f64 = 130.0 / 3.6;
+/// Where the low share is reached: 20 km/h.
+pub const SLOW_M_PER_S: f64 = 20.0 / 3.6;
+/// Where all of the torque is there: 60 km/h.
+pub const MIDDLE: Speed = Speed::from_m_per_s(60.0 / 3.6);
+/// Where the high share is reached: 130 km/h.
+pub const FAST_M_PER_S: f64 = 130.0 / 3.6;
 
 impl Schedule {
     /// From the shares at the ends.

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::RunRecord;
 use super::claims::{self, Claim};
-use super::lanes::first_in_lanes;
 use super::record::{default_window, failure_notes, nominal_peak_m};
+use super::vectorised::run_batched;
 use haptic_analysis::metrics::Window;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::driver::DriverParameters;
@@ -164,7 +164,7 @@ fn families(base: &Scenario) -> Result<Vec<Family>, ScenarioError> {
     Ok(families)
 }
 
-/// All runs, family by family: in lanes, and a family of which one is handed back as a fork with the shipping ECU.
+/// All runs, family by family: side by side, and a family of which one is rejected as a fork with the shipping ECU.
 fn drive(
     families: Vec<Family>,
     seed: u64,
@@ -174,7 +174,7 @@ fn drive(
         .iter()
         .flat_map(|family| std::iter::once(&family.nominal).chain(&family.failing));
     let scenarios: Vec<Scenario> = all.cloned().collect();
-    let mut runs = first_in_lanes(&scenarios, seed, |_, run| Ok(run.clone()))?.into_iter();
+    let mut runs = run_batched(&scenarios, seed, |_, run| Ok(run.clone()))?.into_iter();
     let with_runs: Vec<(Family, Vec<Option<Run>>)> = families
         .into_iter()
         .map(|family| {

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::Away;
 use super::evaluate::DRIVERS_T_P;
-use super::lanes::drive_all;
+use super::vectorised::run_all;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenario};
@@ -87,8 +87,8 @@ pub struct HandoverResults {
 /// Runs every row on all cores; `progress` is called after each.
 ///
 /// # Errors
-/// As [`haptic_sim::scenario::ScenarioBuilder::build`], none of these scenarios meets one; a run for which lanes and
-/// shipping ECU differ.
+/// As [`haptic_sim::scenario::ScenarioBuilder::build`], none of these scenarios meets one; a run that differs
+/// from the shipping ECU's.
 pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
@@ -99,7 +99,7 @@ pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
         .map(|(kmh, t_p)| scenarios_of(*kmh, *t_p))
         .collect::<Result<Vec<_>, _>>()?
         .concat();
-    let drives = drive_all(&scenarios, scenarios[0].seed(), |number, run| {
+    let drives = run_all(&scenarios, scenarios[0].seed(), |number, run| {
         if number % RUNS_OF_A_CASE != 0 && scenarios[number].failure().kind == FailureKind::None {
             progress();
         }

@@ -43,17 +43,19 @@ pub mod experiment;
 pub mod files;
 pub mod handover;
 pub mod identify;
-mod lanes;
 mod record;
 pub mod reliance;
 pub mod run;
+mod shares;
 pub mod study;
 pub mod sweep;
+mod vectorised;
 
 pub mod stability;
 
 pub use away::{Away, left_by_themselves};
 pub use record::{RunRecord, check_window};
+pub use shares::shares;
 
 /// Version and commit of this program, as results name it.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("HAPTIC_COMMIT"));

@@ -18,7 +18,7 @@ use haptic_sim::stability::{Guided, growth_per_s};
 
 use crate::Away;
 use crate::handover::{peak_m, stretched_curve};
-use crate::lanes::drive_all;
+use crate::vectorised::run_all;
 
 /// Speeds of the map, km/h.
 pub const SPEEDS_KMH: [f64; 12] = [
@@ -111,7 +111,7 @@ pub fn map(base: &Scenario, progress: impl Fn() + Sync) -> Result<Vec<Place>, St
         .iter()
         .flat_map(|(speed_kmh, t_p)| Condition::ALL.map(|condition| at(base, *speed_kmh, *t_p, condition)))
         .collect::<Result<Vec<_>, _>>()?;
-    let drives = drive_all(&scenarios, base.seed(), |number, run| {
+    let drives = run_all(&scenarios, base.seed(), |number, run| {
         if number % Condition::ALL.len() == 0 {
             progress();
         }

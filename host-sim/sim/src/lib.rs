@@ -43,7 +43,6 @@ pub mod ecu_events;
 pub mod fork;
 pub mod guidance;
 pub mod input;
-pub mod lanes;
 pub mod models;
 pub mod participants;
 pub mod parts;

@@ -1,20 +1,21 @@
 //! The points ahead that a driver or a camera looks at (section 2.4).
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use crate::guidance::LaneErrors;
 use crate::models::road::{Centreline, Tracker};
+use crate::models::wrapped;
 use crate::parts::{DriverVehicle, Motion};
 
 /// A near and a far point along the direction of movement.
 #[derive(Debug, Clone)]
 pub(crate) struct PreviewPoints {
     /// How far ahead they are, s.
-    pub(crate) times_s: [f64; 2],
-    pub(crate) near_m: f64,
-    pub(crate) far_m: f64,
-    pub(crate) near: Tracker,
-    pub(crate) far: Tracker,
+    times_s: [f64; 2],
+    near_m: f64,
+    far_m: f64,
+    near: Tracker,
+    far: Tracker,
 }
 
 impl PreviewPoints {
@@ -53,14 +54,4 @@ impl PreviewPoints {
         let errors = LaneErrors { e_y_m, e_theta_rad };
         (e_theta_rad.abs() < FRAC_PI_2).then_some((errors, [near.s_m, far.s_m]))
     }
-}
-
-/// An angle in (-pi, pi].
-#[inline]
-pub(crate) fn wrapped(angle: f64) -> f64 {
-    if angle > -PI && angle <= PI {
-        return angle;
-    }
-    let positive = angle.rem_euclid(TAU);
-    if positive > PI { positive - TAU } else { positive }
 }

@@ -89,6 +89,9 @@ impl Results<'_> {
             print(&report.to_text(width()))?;
         }
         print_notes(&report.notes);
+        if let Some(shares) = haptic_batch::shares() {
+            eprintln!("Vectorised: {shares}");
+        }
         if let Some(directory) = &self.arguments.out {
             eprintln!("Report: {}", directory.join("report.html").display());
         }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use haptic_batch::VERSION;
-use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Sweep, drive_all};
+use haptic_batch::sweep::{Progress, Shard, Store, StoreError, Sweep, run_all};
 use haptic_report::document::{SeriesFormat, write_file, write_json};
 use haptic_report::studies::run as run_files;
 use haptic_report::studies::sweep as files;
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         |threads| threads as usize,
     );
     let bar = Bar::new();
-    drive_all(&store, &sweep, arguments.shard, threads, |progress| {
+    run_all(&store, &sweep, arguments.shard, threads, |progress| {
         bar.show(progress)
     })?;
     bar.finish();

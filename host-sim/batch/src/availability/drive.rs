@@ -1,4 +1,4 @@
-//! The drives of legs: with guidance and by hand, side by side where lanes can.
+//! The drives of legs: with guidance and by hand, side by side where that can be.
 
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
@@ -6,14 +6,14 @@ use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_log::trace::{Sample, Trace};
 use haptic_sim::guidance::{NoGuidance, OverBus};
-use haptic_sim::lanes::{Asked, Event};
 use haptic_sim::models::driver::ArmGains;
 use haptic_sim::scenario::Condition;
 use haptic_sim::simulation::{Ending, Run, SAMPLE_RATE_HZ};
 use haptic_sim::{Action, Outcome, Scenario, Simulation};
+use haptic_vectorised::{Event, Options};
 
 use super::{ByHand, Declaration, LEG_S, Leg, LegNumber};
-use crate::lanes::{Checked, Group};
+use crate::vectorised::{Checked, Group};
 
 const LEG_STEPS: u32 = (LEG_S * 1e3) as u32;
 /// The driver asks for guidance again so long after it has left, ms.
@@ -22,11 +22,11 @@ const AGAIN_MS: u32 = 5000;
 const ASKS_EVERY_MS: u32 = 1000;
 const LOW_MS: u32 = 100;
 
-/// Drives legs, in lanes where these can, both with guidance and by hand; `done` gets each with its place, in no order. A run
-/// that lanes drive with guidance is one in which the ECU leaves nothing.
+/// Drives legs, side by side where that can be, both with guidance and by hand; `done` gets each with its place, in no order. A run
+/// that is vectorised with guidance is one in which the ECU leaves nothing.
 ///
 /// # Errors
-/// As [`LegNumber::scenario`]; a drive for which lanes and shipping ECU differ; what `done` says.
+/// As [`LegNumber::scenario`]; a drive that differs from the shipping ECU's; what `done` says.
 pub(super) fn side_by_side(
     legs: &[LegNumber],
     root: u64,
@@ -36,9 +36,9 @@ pub(super) fn side_by_side(
     let guided = legs.iter().map(|leg| leg.scenario(root));
     let guided: Vec<Scenario> = guided.collect::<Result<_, _>>()?;
     let manual: Vec<Scenario> = guided.iter().map(manual).collect::<Result<_, _>>()?;
-    let asked = Asked {
+    let options = Options {
         most_s: Some(LEG_S as u32),
-        ..Asked::default()
+        ..Options::default()
     };
     let group = |scenarios| Group {
         scenarios,
@@ -46,8 +46,8 @@ pub(super) fn side_by_side(
         checked: Checked::new(root, of as u64),
     };
     let mut hands: Vec<Option<ByHand>> = vec![None; legs.len()];
-    let handed_back = group(&manual).in_lanes(
-        asked,
+    let rejected = group(&manual).run_batch(
+        options,
         |place| by_hand(&guided[place]),
         |place, event| {
             if let Event::Ended(run) = event {
@@ -56,12 +56,12 @@ pub(super) fn side_by_side(
             Ok(())
         },
     )?;
-    for place in handed_back {
+    for place in rejected {
         hands[place] = Some(ByHand::of(&by_hand(&guided[place])));
     }
     let hands: Vec<ByHand> = hands.into_iter().flatten().collect();
-    let handed_back = group(&guided).in_lanes(
-        asked,
+    let rejected = group(&guided).run_batch(
+        options,
         |place| with_ecu(&guided[place]).0,
         |place, event| match event {
             Event::Ended(run) => {
@@ -78,7 +78,7 @@ pub(super) fn side_by_side(
             _ => Ok(()),
         },
     )?;
-    handed_back.into_iter().try_for_each(|place| {
+    rejected.into_iter().try_for_each(|place| {
         let (run, reported) = with_ecu(&guided[place]);
         done(
             place,

@@ -26,7 +26,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 pub use leg::{ByHand, Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
 
-use crate::lanes::in_groups;
+use crate::vectorised::in_groups;
 
 /// Length of a leg, s.
 pub const LEG_S: f64 = 300.0;
@@ -215,7 +215,7 @@ impl Availability {
 /// Drives every leg of the plan that is not yet on record, on every core. `done` gets each new leg, from any thread.
 ///
 /// # Errors
-/// A world that is no scenario, the built-in ones are; what `done` says; a drive for which lanes and shipping ECU differ.
+/// A world that is no scenario, the built-in ones are; what `done` says; a drive that differs from the shipping ECU's.
 pub fn study(
     plan: &Plan,
     on_record: &[Leg],

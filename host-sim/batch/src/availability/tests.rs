@@ -250,8 +250,8 @@ fn braking_in_a_real_world_is_no_fault() {
     assert!(active_s > 1790.0, "{active_s}");
 }
 
-/// Every field of every leg: side by side as alone with the shipping ECU, where all lanes drive, where none can for the
-/// camera, and where some drives are handed back.
+/// Every field of every leg: side by side as alone with the shipping ECU, where all can be vectorised, where none can for the
+/// camera, and where some drives are rejected.
 #[test]
 fn legs_are_the_same_side_by_side() {
     for name in ["calibrated", "everything", "camera", "slippery"] {

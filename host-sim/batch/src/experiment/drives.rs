@@ -1,16 +1,16 @@
-//! The drives of published drivers, logged: side by side in lanes where these can, which report every step.
+//! The drives of published drivers, logged: side by side where that can be, every step reported.
 
 use haptic_analysis::identify::DriveLog;
-use haptic_sim::lanes::{Asked, Event};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::participants::PublishedDriver;
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
 use haptic_sim::simulation;
+use haptic_vectorised::{Event, Options};
 
 use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, path_of};
 use crate::Away;
-use crate::lanes::{Checked, Group, in_groups};
+use crate::vectorised::{Checked, Group, in_groups};
 
 /// A drive with what is needed to judge it.
 pub(crate) struct Driven {
@@ -71,11 +71,11 @@ pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
     }
 }
 
-/// Drives a scenario for each job on all cores, in lanes where these can, and gives what `judge` makes of its log. Group by
+/// Drives a scenario for each job on all cores, side by side where that can be, and gives what `judge` makes of its log. Group by
 /// group: the logs of all drives at once may be too many.
 ///
 /// # Errors
-/// What `scenario` says; a drive for which lanes and shipping ECU differ.
+/// What `scenario` says; a drive that differs from the shipping ECU's.
 pub(crate) fn log_each<J: Sync, T: Send>(
     jobs: &[J],
     seed: u64,
@@ -101,14 +101,14 @@ pub(crate) fn log_each<J: Sync, T: Send>(
 /// The drives of a group, logged.
 fn log_group(group: Group) -> Result<Vec<Driven>, String> {
     let scenarios = group.scenarios;
-    let asked = Asked {
+    let options = Options {
         every_step: true,
-        ..Asked::default()
+        ..Options::default()
     };
     let mut recorders = vec![Recorder::new(true); scenarios.len()];
     let mut all: Vec<Option<Driven>> = scenarios.iter().map(|_| None).collect();
     let alone = |place: usize| simulation::simulate(&scenarios[place]);
-    let handed_back = group.in_lanes(asked, alone, |place, event| {
+    let rejected = group.run_batch(options, alone, |place, event| {
         match event {
             Event::Steps(steps) => steps.iter().for_each(|step| recorders[place].take(*step)),
             Event::Ended(run) => {
@@ -119,11 +119,11 @@ fn log_group(group: Group) -> Result<Vec<Driven>, String> {
                     away: Away::new(&scenarios[place], &run.trace),
                 });
             }
-            Event::HandedBack => (),
+            Event::Rejected(_) => (),
         }
         Ok(())
     })?;
-    for place in handed_back {
+    for place in rejected {
         all[place] = Some(driven_alone(&scenarios[place]));
     }
     Ok(all.into_iter().flatten().collect())
@@ -193,8 +193,8 @@ mod tests {
     use super::*;
     use crate::experiment::chosen;
 
-    /// Every value of every row: from the steps of the lanes as from those of the shipping ECU, with and without guidance
-    /// and probe, and where lanes hand a run back.
+    /// Every value of every row: from the steps of vectorised runs as from those of the shipping ECU, with and without guidance
+    /// and probe, and where a run is rejected.
     #[test]
     fn a_log_does_not_depend_on_lanes() {
         let plan = |probe_nm| Plan {
@@ -216,7 +216,7 @@ mod tests {
             .to_builder()
             .sensors(haptic_sim::scenario::Sensors::Exact);
         scenarios.push(exact.build().unwrap());
-        let out = |scenario: &&Scenario| haptic_sim::lanes::why_not(scenario).is_some();
+        let out = |scenario: &&Scenario| haptic_vectorised::unsupported_reason(scenario).is_some();
         assert_eq!(scenarios.iter().filter(out).count(), 1);
         let bits = |driven: &Driven| {
             let log = &driven.log;

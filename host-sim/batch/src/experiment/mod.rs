@@ -46,7 +46,7 @@ use haptic_sim::participants::{Participant, PublishedDriver, participants};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
 
 use crate::Away;
-use crate::lanes::drive_all;
+use crate::vectorised::run_all;
 pub use drives::recorded;
 use drives::{Driven, scenario_of_drive};
 pub(crate) use drives::{guided_drive, log_each};
@@ -130,7 +130,7 @@ pub struct Finding {
 /// Drives, identifies and validates; `done` is called after each drive, from any thread.
 ///
 /// # Errors
-/// An unknown participant; a probe that the controller refuses; a drive for which lanes and shipping ECU differ.
+/// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
 pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, String> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
@@ -148,7 +148,7 @@ pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, Str
     });
     let found: Vec<[Identified; 2]> = found.collect::<Result<_, _>>()?;
     let again: Vec<Scenario> = found.iter().flatten().map(|f| f.driver.clone()).collect();
-    let paths = drive_all(&again, plan.seed, |number, run| {
+    let paths = run_all(&again, plan.seed, |number, run| {
         let away = Away::new(&again[number], &run.trace);
         Ok((path_of(&run.trace), run.diverged(), away))
     })?;

@@ -6,8 +6,8 @@
 
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::Outcome;
-use haptic_sim::lanes::Step;
 use haptic_sim::models::{STEPS_PER_SECOND, sensors};
+use haptic_vectorised::Step;
 
 /// Rows a second.
 const RATE_HZ: u32 = 120;
@@ -47,7 +47,7 @@ impl Recorder {
         self.take(Step::from(outcome));
     }
 
-    /// Takes in one step of the lanes: without errors of sensors, what they have is what is observed.
+    /// Takes in one step of a vectorised run: without errors of sensors, what is true is what is observed.
     pub(super) fn take(&mut self, now: Step) {
         let Some(last) = self.last.replace(now) else {
             return;

@@ -26,9 +26,9 @@ use serde::{Deserialize, Serialize};
 pub use order::Order;
 pub use paired::{Difference, of_participants};
 
-use crate::lanes::drive_all;
 use crate::left_by_themselves;
 use crate::record::RunRecord;
+use crate::vectorised::run_all;
 
 /// A study, checked.
 #[derive(Debug, Clone)]
@@ -188,12 +188,12 @@ impl Study {
     /// checked first: with another session in a place nothing is driven.
     ///
     /// # Errors
-    /// A place with another session in it; what the disk says; a drive for which lanes and shipping ECU differ.
+    /// A place with another session in it; what the disk says; a drive that differs from the shipping ECU's.
     pub fn run(&self, out: &Path, done: impl Fn() + Sync) -> Result<(), String> {
         let missing = self.missing(out)?;
         let scenarios: Vec<Scenario> = missing.iter().map(|session| session.scenario.clone()).collect();
         let seed = scenarios.first().map_or(0, Scenario::seed);
-        drive_all(&scenarios, seed, |number, run| {
+        run_all(&scenarios, seed, |number, run| {
             store::keep_run(self, missing[number], out, run)?;
             done();
             Ok(())

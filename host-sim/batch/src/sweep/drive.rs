@@ -29,11 +29,11 @@ impl Sweep {
     /// # Errors
     /// As [`Sweep::scenario`].
     pub fn drive(&self, point: &Point) -> Result<Driven, InputError> {
-        self.drive_alone(&self.scenario(point)?)
+        self.run_alone(&self.scenario(point)?)
     }
 
     /// Drives a scenario with the shipping ECU.
-    pub(super) fn drive_alone(&self, scenario: &Scenario) -> Result<Driven, InputError> {
+    pub(super) fn run_alone(&self, scenario: &Scenario) -> Result<Driven, InputError> {
         let Some(time_s) = self.recovers_from(scenario) else {
             return Ok(self.measured(scenario, &simulate(scenario), None));
         };

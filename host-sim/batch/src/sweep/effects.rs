@@ -342,7 +342,7 @@ mod tests {
         );
         let folder = tempfile::tempdir().unwrap();
         let store = crate::sweep::Store::open(&sweep, "test 1", folder.path()).unwrap();
-        crate::sweep::drive_all(&store, &sweep, crate::sweep::Shard::WHOLE, 1, |_| ()).unwrap();
+        crate::sweep::run_all(&store, &sweep, crate::sweep::Shard::WHOLE, 1, |_| ()).unwrap();
         let summary = store.finish().unwrap();
         assert_eq!(summary.compare.as_deref(), Some("failure.kind"));
         let csv = std::fs::read_to_string(folder.path().join("drives.csv")).unwrap();

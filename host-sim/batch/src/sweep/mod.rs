@@ -6,7 +6,7 @@
 //! [`Store::finish`] makes the table and the [`Summary`] of them, in order. No trace is kept longer than its drive.
 //!
 //! - [`Sweep::load`], [`Sweep::from_text`]: the file, checked.
-//! - [`drive_all`]: all chunks of a shard, on threads.
+//! - [`run_all`]: all chunks of a shard, on threads.
 //! - [`Store`]: chunks on a disk, resumed, merged.
 //! - [`Summary`]: distributions, what matters most, the worst drives.
 //!
@@ -18,7 +18,6 @@ mod drive;
 mod effects;
 mod file;
 mod groups;
-mod lanes;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod point;
@@ -34,13 +33,14 @@ mod tests;
 mod units;
 mod value;
 mod vary;
+mod vectorised;
 
 pub use chunk::Chunk;
 pub use drive::Driven;
 pub use effects::{Compared, Effect, Level};
 pub use file::{Design, Stop};
 pub use groups::Drives;
-pub use run::{Progress, Shard, drive_all};
+pub use run::{Progress, Shard, run_all};
 pub use saltelli::SobolIndex;
 pub use store::{Store, StoreError};
 pub use summary::{Distribution, Summary, Worst};

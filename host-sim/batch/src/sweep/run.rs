@@ -63,7 +63,7 @@ pub struct Progress {
 ///
 /// # Errors
 /// A drive that cannot be; what the disk says. Chunks that were finished stay.
-pub fn drive_all(
+pub fn run_all(
     store: &Store,
     sweep: &Sweep,
     shard: Shard,

@@ -91,12 +91,12 @@ impl DriverParameters {
 /// Equation (7) with its delay: errors in, delayed target angle out.
 #[derive(Debug, Clone)]
 pub struct Vision {
-    pub(crate) a_1: f64,
-    pub(crate) a_2: f64,
-    pub(crate) a_3: f64,
+    a_1: f64,
+    a_2: f64,
+    a_3: f64,
     integral: f64,
     last_e_y_m: f64,
-    pub(crate) delay: Delay,
+    delay: Delay,
 }
 
 impl Vision {
@@ -128,29 +128,34 @@ impl Vision {
     }
 }
 
+/// The whole steps of a delay, and what is left of one.
+pub fn delay_steps(delay_s: f64) -> (usize, f64) {
+    let steps = delay_s / STEP_S;
+    (steps.floor() as usize, steps - steps.floor())
+}
+
 /// A pure delay of at least one step, linear between samples; zero before the first.
 #[derive(Debug, Clone)]
-pub(crate) struct Delay {
+struct Delay {
     ring: Vec<f64>,
     mask: usize,
     next: usize,
     /// Whole steps, one at least.
-    pub(crate) whole: usize,
+    whole: usize,
     /// What is left of a step.
-    pub(crate) fraction: f64,
+    fraction: f64,
 }
 
 impl Delay {
     fn new(delay_s: f64) -> Self {
-        let steps = delay_s / STEP_S;
-        let whole = steps.floor() as usize;
+        let (whole, fraction) = delay_steps(delay_s);
         let size = (whole + 1).next_power_of_two();
         Self {
             ring: vec![0.0; size],
             mask: size - 1,
             next: 0,
             whole,
-            fraction: steps - steps.floor(),
+            fraction,
         }
     }
 
@@ -182,7 +187,7 @@ impl Delay {
 #[derive(Debug, Clone)]
 pub struct Remnant {
     decay: f64,
-    pub(crate) scale_nm: f64,
+    scale_nm: f64,
     value_nm: f64,
     generator: Xoshiro256PlusPlus,
 }

@@ -14,6 +14,8 @@ pub mod sensors;
 pub mod tolerances;
 pub mod vehicle;
 
+use std::f64::consts::{PI, TAU};
+
 /// One step of the simulation, s: the control period of the ECU, and the grid of every delay and hold.
 pub const STEP_S: f64 = 1e-3;
 /// Steps per second.
@@ -22,4 +24,14 @@ pub const STEPS_PER_SECOND: u32 = 1000;
 /// The step at or next to a time.
 pub fn step_of(time_s: f64) -> u32 {
     (time_s / STEP_S).round() as u32
+}
+
+/// An angle in (-pi, pi].
+#[inline]
+pub fn wrapped(angle: f64) -> f64 {
+    if angle > -PI && angle <= PI {
+        return angle;
+    }
+    let positive = angle.rem_euclid(TAU);
+    if positive > PI { positive - TAU } else { positive }
 }

@@ -19,12 +19,13 @@ use super::driver::{ArmGains, DriverParameters};
 use super::vehicle::VehicleParameters;
 
 /// Number of linear states.
-pub(crate) const STATES: usize = 6;
+pub const STATES: usize = 6;
 /// States that drive others; the yaw angle drives none.
 const COUPLED: usize = 5;
 /// Inputs: target angle now, target angle one step ahead, guidance torque, remnant.
 const INPUTS: usize = 4;
-pub(crate) const COLUMNS: usize = COUPLED + INPUTS;
+/// Columns of a transition: the coupled states, then the inputs.
+pub const COLUMNS: usize = COUPLED + INPUTS;
 
 const BETA: usize = 0;
 const YAW_RATE: usize = 1;
@@ -49,9 +50,10 @@ pub struct PlantInput {
 /// One step of the linear part, for given parameters and arm gains.
 #[derive(Debug, Clone)]
 pub struct Transition {
-    pub(crate) columns: [[f64; STATES]; COLUMNS],
+    /// What each coupled state and each input adds to each state.
+    pub columns: [[f64; STATES]; COLUMNS],
     /// Distance travelled in a step, m.
-    pub(crate) distance_m: f64,
+    pub distance_m: f64,
     gains: ArmGains,
 }
 

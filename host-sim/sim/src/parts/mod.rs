@@ -14,8 +14,8 @@ mod paper_pair;
 mod vehicle;
 
 pub use driver::{Driver, DriverView, NoDriver, PaperDriver};
-pub use paper_pair::PaperPair;
-pub(crate) use paper_pair::{ByReliance, Notices};
+pub(crate) use paper_pair::Notices;
+pub use paper_pair::{ByReliance, PaperPair};
 pub use vehicle::{Acting, Motion, PaperVehicle, Vehicle};
 
 /// A driver and a vehicle as one system: what a simulation moves.

@@ -14,9 +14,11 @@ use crate::seeds::Stream;
 #[derive(Debug, Clone)]
 pub struct PaperPair {
     look_ahead_s: [f64; 2],
-    pub(crate) vision: Vision,
-    pub(crate) remnant: Remnant,
-    pub(crate) arm: ByReliance<Transition>,
+    vision: Vision,
+    /// The part of the driver's torque that no model explains.
+    pub remnant: Remnant,
+    /// How arm, column and vehicle move.
+    pub arm: ByReliance<Transition>,
     notices: Notices,
     takes_over: bool,
     step: u32,
@@ -25,7 +27,8 @@ pub struct PaperPair {
     /// Torque on the column beside the arm's and the guidance's, N.m.
     held_nm: f64,
     plant: Plant,
-    pub(crate) nonlinear: Option<Box<RealPlant>>,
+    /// What moves in the place of the linear plant, where a scenario asks for what that cannot do.
+    pub nonlinear: Option<Box<RealPlant>>,
     motor_torque_nm: f64,
 }
 
@@ -169,15 +172,16 @@ fn transition(scenario: &Scenario, driver: &DriverParameters, gains: ArmGains) -
 
 /// What follows from the gains of a driver's arm, for each way in which a scenario has the driver rely on guidance.
 #[derive(Debug, Clone)]
-pub(crate) struct ByReliance<T> {
+pub struct ByReliance<T> {
     relying: T,
     /// From this step on in the place of `relying`.
-    pub(crate) changed: Option<(u32, T)>,
+    changed: Option<(u32, T)>,
     manual: T,
 }
 
 impl<T: Clone> ByReliance<T> {
-    pub(crate) fn new(scenario: &Scenario, of: impl Fn(ArmGains) -> T) -> Self {
+    /// What `of` makes of each of a scenario's gains.
+    pub fn new(scenario: &Scenario, of: impl Fn(ArmGains) -> T) -> Self {
         let change = scenario.driver_change();
         Self {
             relying: of(scenario.gains()),
@@ -196,8 +200,14 @@ impl<T: Clone> ByReliance<T> {
 }
 
 impl<T> ByReliance<T> {
+    /// The step from which on the driver relies otherwise, if there is one.
+    pub fn changes_at(&self) -> Option<u32> {
+        self.changed.as_ref().map(|(from, _)| *from)
+    }
+
+    /// In a step, for a driver who drives as manually or not.
     #[inline]
-    pub(crate) fn at(&self, step: u32, is_manual: bool) -> &T {
+    pub fn at(&self, step: u32, is_manual: bool) -> &T {
         match &self.changed {
             _ if is_manual => &self.manual,
             Some((from, changed)) if step >= *from => changed,

@@ -6,8 +6,8 @@ use haptic_core::config::Setup;
 
 use super::guidance_file::in_words_of_the_file;
 use super::{
-    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, Scenario, Sensors,
-    Speed, Values, file,
+    Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, Scenario,
+    ScenarioValues, Sensors, Speed, file,
 };
 use crate::input::{InputError, RangeError, in_range};
 use crate::models::STEP_S;
@@ -22,7 +22,7 @@ use crate::models::vehicle::VehicleParameters;
 #[derive(Debug, Clone, Default)]
 #[must_use]
 pub struct ScenarioBuilder {
-    pub(super) values: Values,
+    pub(super) values: ScenarioValues,
 }
 
 /// Why there is no such scenario.

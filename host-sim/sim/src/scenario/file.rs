@@ -91,7 +91,7 @@ pub(super) fn parse(
 /// A scenario as the text of a file that needs no other file: the course stands in it. Read again it is the same
 /// scenario, bit for bit.
 pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
-    let super::Values {
+    let super::ScenarioValues {
         course,
         speed,
         manual: _,

@@ -21,10 +21,8 @@ use haptic_core::params::Params;
 pub use builder::{ScenarioBuilder, ScenarioError};
 pub use condition::{Condition, Sensors};
 pub use failure::{DEFAULT_FAILURE_TIME_S, DriverChange, FAILURE_REACTION_S, Failure, FailureKind};
-pub(crate) use speed::SpeedProfile;
-pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_KMH, SPEED_KMH, Speed};
-pub use values::GuidanceParameters;
-use values::Values;
+pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_KMH, SPEED_KMH, Speed, SpeedProfile};
+pub use values::{GuidanceParameters, ScenarioValues};
 
 use crate::input::{InputError, in_range};
 use crate::models::disturbances::SensorErrors;
@@ -46,7 +44,7 @@ const LEAST_DURATION_S: f64 = 1.0;
 /// the text of a file.
 #[derive(Debug, Clone)]
 pub struct Scenario {
-    values: Values,
+    values: ScenarioValues,
     /// These follow from the values.
     setup: Setup,
     speed: SpeedProfile,
@@ -62,7 +60,7 @@ impl Default for Scenario {
     /// Driver 1 with medium reliance on the evaluation's course, tables 7 to 9.
     fn default() -> Self {
         Self {
-            values: Values::default(),
+            values: ScenarioValues::default(),
             setup: Setup::PAPER,
             speed: SpeedProfile::constant(DEFAULT_SPEED_KMH),
         }
@@ -102,6 +100,11 @@ impl Scenario {
     pub fn to_toml(&self) -> String {
         // Only a map whose keys are no strings cannot be written, and there is none.
         file::write(self).unwrap_or_default()
+    }
+
+    /// Every value that a person chose.
+    pub fn values(&self) -> &ScenarioValues {
+        &self.values
     }
 
     /// Whether what is to happen in mid-drive happens before the run ends.
@@ -228,7 +231,7 @@ impl Scenario {
 
     /// The car that drives: what vehicle, world and sensor errors say, with what the tolerances draw.
     pub fn car(&self) -> Car {
-        let Values {
+        let ScenarioValues {
             vehicle,
             world,
             sensor_errors,

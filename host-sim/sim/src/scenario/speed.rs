@@ -102,7 +102,7 @@ struct Point {
 
 /// A speed over a run, checked.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SpeedProfile {
+pub struct SpeedProfile {
     axis: Axis,
     /// The first is the start; behind the last the speed stays.
     points: Vec<Point>,
@@ -211,7 +211,7 @@ impl SpeedProfile {
     }
 
     /// Speed at a time at which the vehicle is at some place, m/s.
-    pub(crate) fn at(&self, time_s: f64, place_m: f64) -> f64 {
+    pub fn at(&self, time_s: f64, place_m: f64) -> f64 {
         match self.axis {
             Axis::Time => {
                 let point = self.last_before(|p| p.time_s, time_s);

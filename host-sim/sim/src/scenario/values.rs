@@ -34,27 +34,42 @@ impl Default for GuidanceParameters {
     }
 }
 
-/// The values that a person chooses.
+/// The values that a person chooses: every field of a scenario.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Values {
-    pub(super) course: Course,
-    pub(super) speed: Speed,
-    pub(super) manual: bool,
-    pub(super) driver: DriverParameters,
-    pub(super) gains: ArmGains,
-    pub(super) manual_k_d: f64,
-    pub(super) vehicle: VehicleParameters,
-    pub(super) guidance: GuidanceParameters,
-    pub(super) sensors: Sensors,
-    pub(super) failure: Failure,
-    pub(super) driver_change: Option<DriverChange>,
-    pub(super) world: WorldParameters,
-    pub(super) sensor_errors: SensorErrors,
-    pub(super) tolerances: Tolerances,
-    pub(super) seed: u64,
+pub struct ScenarioValues {
+    /// The road.
+    pub course: Course,
+    /// How fast the vehicle goes.
+    pub speed: Speed,
+    /// Whether there is no guidance.
+    pub manual: bool,
+    /// Vision, delay, arm and remnant.
+    pub driver: DriverParameters,
+    /// The arm's gains until a failure is noticed.
+    pub gains: ArmGains,
+    /// K_d once a failure is noticed, N.m/rad.
+    pub manual_k_d: f64,
+    /// The vehicle on paper, which the controller knows.
+    pub vehicle: VehicleParameters,
+    /// The controller and its camera.
+    pub guidance: GuidanceParameters,
+    /// What the controller sees.
+    pub sensors: Sensors,
+    /// What fails.
+    pub failure: Failure,
+    /// When the driver changes, if that happens.
+    pub driver_change: Option<DriverChange>,
+    /// What is less than ideal in the world.
+    pub world: WorldParameters,
+    /// What the sensors add to the truth.
+    pub sensor_errors: SensorErrors,
+    /// How far cars of this kind differ.
+    pub tolerances: Tolerances,
+    /// Root of all random numbers.
+    pub seed: u64,
 }
 
-impl Default for Values {
+impl Default for ScenarioValues {
     fn default() -> Self {
         Self {
             course: Course::paper(),
@@ -76,7 +91,7 @@ impl Default for Values {
     }
 }
 
-impl Values {
+impl ScenarioValues {
     /// The controller's parameters with what it knows of the vehicle.
     pub(super) fn controller_params(&self) -> Params {
         Params {

@@ -33,33 +33,33 @@ use crate::preview::PreviewPoints;
 use crate::scenario::Scenario;
 use crate::unguided::{Circumstances, Watch};
 use plan::AskingDriver;
-pub(crate) use plan::Plan;
+pub use plan::Plan;
 use record::record;
 pub use record::{SAMPLE_RATE_HZ, STEPS_PER_SAMPLE};
 pub use run::{Ending, Outcome, Run, observe, simulate};
-pub(crate) use sensing::Sensing;
+pub use sensing::Sensing;
 
 /// Nobody is on the road that far from the middle of a lane; a wide exit that comes back is no divergence.
-pub(crate) const DIVERGED_M: f64 = 10.0;
+pub const DIVERGED_M: f64 = 10.0;
 
 /// A closed loop under way: a guidance, and a driver with a vehicle.
 #[derive(Debug, Clone)]
 pub struct Simulation<G = AnyGuidance, S = PaperPair> {
-    pub(crate) road: Arc<Centreline>,
-    pub(crate) plan: Plan,
+    road: Arc<Centreline>,
+    plan: Plan,
     guidance: G,
-    pub(crate) driver_vehicle: S,
+    driver_vehicle: S,
     /// What the sensors add, if they add anything.
-    pub(crate) sensing: Option<Box<Sensing>>,
-    pub(crate) driver_points: PreviewPoints,
-    pub(crate) camera: PreviewPoints,
-    pub(crate) body: Tracker,
+    sensing: Option<Box<Sensing>>,
+    driver_points: PreviewPoints,
+    camera: PreviewPoints,
+    body: Tracker,
     /// Speed of the vehicle now, and where along the road it is.
     speed_m_per_s: f64,
     place_m: f64,
     request: AskingDriver,
     /// The run ends when the driver's far point gets there.
-    pub(crate) end_m: f64,
+    end_m: f64,
     watch: Watch,
     warning: bool,
     last_s_m: f64,

@@ -14,9 +14,9 @@ const ASKS_AGAIN_STEPS: u32 = STEPS_PER_SECOND;
 
 /// What the scenario decides for every step.
 #[derive(Debug, Clone)]
-pub(crate) struct Plan {
+pub struct Plan {
     /// How the speed changes, if it does.
-    pub(crate) speed: Option<SpeedProfile>,
+    pub speed: Option<SpeedProfile>,
     /// How far ahead anybody looks, and the driver, s.
     ahead_s: [f64; 2],
     pub(super) duration_s: f64,
@@ -25,12 +25,12 @@ pub(crate) struct Plan {
     probe: bool,
     pub(super) failure: FailureKind,
     /// The first step of the failure, and the first behind it.
-    pub(crate) failure_steps: [u32; 2],
+    pub failure_steps: [u32; 2],
 }
 
 impl Plan {
     /// Of a scenario, for a driver whose points are as far ahead as these times.
-    pub(super) fn new(scenario: &Scenario, driver_s: [f64; 2]) -> Self {
+    pub fn new(scenario: &Scenario, driver_s: [f64; 2]) -> Self {
         let guidance = scenario.guidance();
         let [near_s, far_s] = driver_s;
         Self {
@@ -45,14 +45,14 @@ impl Plan {
     }
 
     /// Where the driver's far point is at a speed when the farthest that anybody looks at gets to the road's end, m.
-    pub(crate) fn end_m(&self, road: &Centreline, v_m_per_s: f64) -> f64 {
+    pub fn end_m(&self, road: &Centreline, v_m_per_s: f64) -> f64 {
         let [longest_s, driver_s] = self.ahead_s;
         road.length_m() - (v_m_per_s * longest_s - v_m_per_s * driver_s)
     }
 
     /// What the scenario lets go wrong.
     #[inline]
-    pub(crate) fn faults(&self, step: u32) -> WorldFaults {
+    pub fn faults(&self, step: u32) -> WorldFaults {
         let [first, behind] = self.failure_steps;
         let fails = (first..behind).contains(&step);
         WorldFaults {

@@ -4,9 +4,8 @@ use haptic_log::trace::Sample;
 
 use crate::guidance::{Actuation, LaneErrors, Observation};
 use crate::models::road::Projection;
-use crate::models::{STEP_S, STEPS_PER_SECOND};
+use crate::models::{STEP_S, STEPS_PER_SECOND, wrapped};
 use crate::parts::Motion;
-use crate::preview::wrapped;
 use crate::unguided::Cause;
 
 /// Samples per second of a trace.

@@ -5,16 +5,20 @@ use crate::models::disturbances::{ErringCamera, ErringGyro, SensorErrors};
 use crate::scenario::Scenario;
 use crate::seeds::Stream;
 
-/// The sensors of a world that is not the paper's.
+/// The sensors of a car, with their noise.
 #[derive(Debug, Clone)]
-pub(crate) struct Sensing {
-    pub(crate) errors: SensorErrors,
-    pub(crate) camera: ErringCamera,
-    pub(crate) gyro: ErringGyro,
+pub struct Sensing {
+    /// Gains and biases.
+    pub errors: SensorErrors,
+    /// The camera.
+    pub camera: ErringCamera,
+    /// The yaw-rate sensor.
+    pub gyro: ErringGyro,
 }
 
 impl Sensing {
-    pub(super) fn of(scenario: &Scenario) -> Option<Box<Self>> {
+    /// Those of a scenario's car; `None` where they add nothing.
+    pub fn of(scenario: &Scenario) -> Option<Box<Self>> {
         let errors = scenario.car().sensor_errors;
         if errors == SensorErrors::default() {
             return None;

@@ -3,22 +3,18 @@
 use super::WorldParameters;
 use crate::models::vehicle::VehicleParameters;
 
-/// Something that torques turn.
-pub trait Column {
-    /// Acceleration of the wheel (rad/s^2) and rate of the friction's deflection (rad/s), for the wheel's rate, the
-    /// deflection and the sum of all torques on the column.
-    fn respond(&self, wheel_rate: f64, deflection_rad: f64, torque_nm: f64) -> [f64; 2];
-}
-
 /// Equation (5) with friction: a spring that gives way at the friction torque (Dahl 1968), so that a small motion
 /// is held and a large one is opposed by all of it.
 #[derive(Debug, Clone)]
 pub struct SteeringColumn {
-    pub(crate) inertia: f64,
-    pub(crate) damping: f64,
-    pub(crate) friction_nm: f64,
+    /// kg.m^2.
+    pub inertia: f64,
+    /// N.m.s/rad.
+    pub damping: f64,
+    /// Friction torque at which the spring gives way, N.m.
+    pub friction_nm: f64,
     /// Deflection at which the friction gives way, rad.
-    pub(crate) give_rad: f64,
+    pub give_rad: f64,
 }
 
 impl SteeringColumn {
@@ -33,8 +29,10 @@ impl SteeringColumn {
     }
 }
 
-impl Column for SteeringColumn {
-    fn respond(&self, wheel_rate: f64, deflection_rad: f64, torque_nm: f64) -> [f64; 2] {
+impl SteeringColumn {
+    /// Acceleration of the wheel (rad/s^2) and rate of the friction's deflection (rad/s), for the wheel's rate, the
+    /// deflection and the sum of all torques on the column.
+    pub fn respond(&self, wheel_rate: f64, deflection_rad: f64, torque_nm: f64) -> [f64; 2] {
         let share = deflection_rad / self.give_rad;
         let against = self.damping * wheel_rate + self.friction_nm * share;
         [

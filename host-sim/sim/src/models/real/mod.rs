@@ -1,6 +1,6 @@
 //! A world that is less than ideal: vehicle, column and driver's arm apart, coupled at the column's torques.
 //!
-//! [`Vehicle`] gives an aligning torque for a wheel angle, [`Column`] an angle for torques, the arm of equation (8) a
+//! [`SingleTrack`] gives an aligning torque for a wheel angle, [`SteeringColumn`] an angle for torques, the arm of equation (8) a
 //! torque for an angle; the motor stands between what the guidance asks for and what acts. All are stepped together
 //! by the classical Runge-Kutta method, 1 ms at a time. The linear plant of the paper stays in `plant`, exact and
 //! fast; this one is used where a scenario asks for something that it cannot do, and agrees with it where slip is
@@ -13,12 +13,10 @@ mod parameters;
 mod single_track;
 mod wind;
 
-pub use column::{Column, SteeringColumn};
-pub(crate) use parameters::FULL_ASSIST_AT_NM;
-pub use parameters::{Tyres, WorldParameters};
-pub(crate) use single_track::TRAIL_SHAPE;
-pub use single_track::{Response, SingleTrack, Surroundings, Vehicle};
-pub(crate) use wind::Wind;
+pub use column::SteeringColumn;
+pub use parameters::{FULL_ASSIST_AT_NM, Tyres, WorldParameters};
+pub use single_track::{Response, SingleTrack, Surroundings, TRAIL_SHAPE};
+pub use wind::Wind;
 
 use super::STEP_S;
 use super::driver::{ArmGains, DriverParameters};
@@ -28,21 +26,27 @@ use super::vehicle::VehicleParameters;
 /// Acceleration of gravity, m/s^2.
 pub const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Ripples of the motor in a turn of the wheel.
-pub(crate) const RIPPLES: f64 = 24.0;
+pub const RIPPLES: f64 = 24.0;
 
-pub(crate) const STATES: usize = 8;
+/// Number of states.
+pub const STATES: usize = 8;
 /// Lateral velocity (m/s), yaw rate, wheel angle, wheel rate, friction's deflection (rad), arm's torque, motor's
 /// torque, yaw angle.
 type State = [f64; STATES];
 
 /// Vehicle, column, arm and motor of a less than ideal world.
 #[derive(Debug, Clone)]
-pub struct RealPlant<V = SingleTrack, C = SteeringColumn> {
-    pub(crate) vehicle: V,
-    pub(crate) column: C,
-    pub(crate) world: WorldParameters,
-    pub(crate) driver: DriverParameters,
-    pub(crate) wind: Wind,
+pub struct RealPlant {
+    /// The vehicle.
+    pub vehicle: SingleTrack,
+    /// Its column.
+    pub column: SteeringColumn,
+    /// What the world is like.
+    pub world: WorldParameters,
+    /// Whose arm is on the wheel.
+    pub driver: DriverParameters,
+    /// The wind.
+    pub wind: Wind,
     /// Deflection of the friction and the motor's torque; the rest is the plant's.
     deflection_rad: f64,
     motor_nm: f64,
@@ -75,9 +79,7 @@ impl RealPlant {
             world,
         }
     }
-}
 
-impl<V: Vehicle, C: Column> RealPlant<V, C> {
     /// Advances by one step on a road with a bank (rad, left edge higher: positive). The speed changes evenly from its
     /// start to its end; the lateral velocity has its own equation, and the side-slip angle follows from both.
     pub fn step(

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::input::{RangeError, in_range};
 
 /// Driver torque at which the power assist is whole, N.m.
-pub(crate) const FULL_ASSIST_AT_NM: f64 = 3.0;
+pub const FULL_ASSIST_AT_NM: f64 = 3.0;
 
 /// How tyres answer slip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use super::{GRAVITY_M_PER_S2, Tyres};
 use crate::models::vehicle::VehicleParameters;
 
 /// Shape factor of the trail; passenger cars' lie about here.
-pub(crate) const TRAIL_SHAPE: f64 = 1.2;
+pub const TRAIL_SHAPE: f64 = 1.2;
 
 /// What a vehicle drives in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,23 +28,19 @@ pub struct Response {
     pub aligning_nm: f64,
 }
 
-/// Something that is steered.
-pub trait Vehicle {
-    /// The rates and the torque on the column at a speed, for lateral velocity and yaw rate and a wheel angle.
-    fn respond(&self, v_m_per_s: f64, motion: [f64; 2], wheel_rad: f64, around: &Surroundings) -> Response;
-}
-
 /// Equations (1) to (4), with tyres that may saturate.
 #[derive(Debug, Clone)]
 pub struct SingleTrack {
-    pub(crate) vehicle: VehicleParameters,
-    pub(crate) tyres: Tyres,
+    /// Its parameters.
+    pub vehicle: VehicleParameters,
+    /// How its tyres answer slip.
+    pub tyres: Tyres,
     /// Share of the trail that the castor makes: it stays while the pneumatic trail falls.
-    pub(crate) castor_share: f64,
+    pub castor_share: f64,
     /// Aligning torque on the column per side force of the front axle, at no slip, N.m/N.
-    pub(crate) lever: f64,
+    pub lever: f64,
     /// Weight on the front and on the rear axle, N.
-    pub(crate) load_n: [f64; 2],
+    pub load_n: [f64; 2],
 }
 
 impl SingleTrack {
@@ -85,8 +81,9 @@ impl SingleTrack {
     }
 }
 
-impl Vehicle for SingleTrack {
-    fn respond(
+impl SingleTrack {
+    /// The rates and the torque on the column at a speed, for lateral velocity and yaw rate and a wheel angle.
+    pub fn respond(
         &self,
         v_m_per_s: f64,
         [lateral_m_per_s, yaw_rate]: [f64; 2],

@@ -9,7 +9,7 @@ use crate::models::STEP_S;
 
 /// Draws the wind of every step.
 #[derive(Debug, Clone)]
-pub(crate) struct Wind {
+pub struct Wind {
     steady_n: f64,
     /// Yaw moment per side force, m.
     lever_m: f64,
@@ -33,7 +33,7 @@ impl Wind {
     }
 
     /// Side force (N, to the left) and yaw moment (N.m) of this step.
-    pub(crate) fn step(&mut self) -> [f64; 2] {
+    pub fn step(&mut self) -> [f64; 2] {
         if self.scale_n != 0.0 {
             let white: f64 = StandardNormal.sample(&mut self.generator);
             self.gust_n = self.decay * self.gust_n + self.scale_n * white;

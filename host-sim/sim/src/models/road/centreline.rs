@@ -16,35 +16,40 @@ const MAX_CELL_M: f64 = 1.0;
 const MAX_CELL_TURN_RAD: f64 = 0.005;
 /// A Newton step below this ends the search, m. Convergence is quadratic with a factor below 1 per metre, so
 /// the foot is then within 1e-8 m along the curve, and its distance within 1e-16 m.
-pub(crate) const CONVERGED_M: f64 = 1e-4;
+pub const CONVERGED_M: f64 = 1e-4;
 /// A point that needs more steps has left the region where its perpendicular is unique.
 const MAX_NEWTON_STEPS: usize = 20;
 /// The projection is refused where 1 - curvature * offset falls below this: so close to the centre of the
 /// curve that the foot of the perpendicular is not unique any more.
-pub(crate) const MIN_DETERMINANT: f64 = 0.1;
+pub const MIN_DETERMINANT: f64 = 0.1;
 /// How far beyond its ends the centreline is continued, m: enough for the step that finds the end.
-pub(crate) const OVERRUN_M: f64 = 2.0;
+pub const OVERRUN_M: f64 = 2.0;
 /// A lane of a file may have kinks, where a perpendicular has no foot on one side and two on the other: the search
 /// goes to and fro across the kink in steps of this length at most, m, and the kink itself is the answer.
 const KINK_M: f64 = 0.5;
 
 /// A piece of the centreline, expanded about its middle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cell {
+pub struct Cell {
     /// Arc length at the middle, m.
-    pub(crate) s_m: f64,
+    pub s_m: f64,
     /// Half the arc length, m.
-    pub(crate) half_m: f64,
-    pub(crate) x_m: f64,
-    pub(crate) y_m: f64,
+    pub half_m: f64,
+    /// Position of the middle, m.
+    pub x_m: f64,
+    /// See `x_m`.
+    /// See `x_m`.
+    pub y_m: f64,
     /// Unit tangent.
-    pub(crate) tangent: [f64; 2],
-    pub(crate) heading_rad: f64,
-    pub(crate) curvature_1pm: f64,
+    pub tangent: [f64; 2],
+    /// Heading at the middle, rad.
+    pub heading_rad: f64,
+    /// Curvature at the middle, 1/m.
+    pub curvature_1pm: f64,
     /// Change of curvature with arc length, 1/m^2.
-    pub(crate) curvature_slope_1pm2: f64,
+    pub curvature_slope_1pm2: f64,
     /// Square of the curvature over six, and its third power: a division less in each projection.
-    pub(crate) curvature_powers: [f64; 2],
+    pub curvature_powers: [f64; 2],
 }
 
 /// A point in the frame of a place on the centreline.
@@ -171,9 +176,12 @@ pub struct Projection {
 /// Where a moving point was last projected, and how far it had come since the time before.
 #[derive(Debug, Clone, Copy)]
 pub struct Tracker {
-    pub(crate) cell: usize,
-    pub(crate) s_m: f64,
-    pub(crate) advance_m: f64,
+    /// Number of the cell.
+    pub cell: usize,
+    /// Arc length, m.
+    pub s_m: f64,
+    /// How far it had come, m.
+    pub advance_m: f64,
 }
 
 impl Centreline {
@@ -308,7 +316,7 @@ impl Centreline {
     }
 
     /// Its cells in order.
-    pub(crate) fn cells(&self) -> &[Cell] {
+    pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
 

@@ -9,7 +9,7 @@ mod course;
 mod opendrive;
 mod piece;
 
-pub(crate) use centreline::{CONVERGED_M, MIN_DETERMINANT, OVERRUN_M};
+pub use centreline::{CONVERGED_M, Cell, MIN_DETERMINANT, OVERRUN_M};
 pub use centreline::{Centreline, Projection, Tracker};
 pub use course::{Course, CourseError, DEFAULT_LANE_WIDTH_M, MAX_CURVATURE_1PM, PAPER_COURSE, Segment};
 pub use opendrive::{LaneChoice, RoadUsed};

@@ -1,13 +1,16 @@
 //! The band of the shipping ECU's monitor in several runs, a little narrower: whoever is within this one is within that.
 
+use haptic_core::config::LEAST_BAND_NM;
+use haptic_core::monitor::{ASTRAY_MS, RATE_SPAN_US};
+
 use super::counts::{flag, whole};
 use super::ecu::GUIDED;
+use super::rejected::Reason;
 
 /// Half the band of the monitor at least, mN.m, and for how many steps a torque may be beyond it.
-const BAND_MNM: f64 = 300.0;
-const ASTRAY_MS: i32 = 20;
+const BAND_MNM: f64 = LEAST_BAND_NM * 1e3;
 /// The monitor takes rates over at least this, ms.
-const RATE_SPAN_MS: i32 = 50;
+const RATE_SPAN_MS: i32 = RATE_SPAN_US / 1000;
 
 /// What the monitor compares the torque with.
 #[repr(C, align(64))]
@@ -125,7 +128,9 @@ impl<const N: usize> Band<N> {
             let is_falling = torque.wrapping_abs() < self.torque[l].wrapping_abs();
             let longer = self.astray[l].wrapping_add(if is_falling { 0 } else { 1 });
             self.astray[l] = if is_within { 0 } else { longer };
-            suspect[l] |= flag((self.astray[l] > ASTRAY_MS) & (mode[l] == GUIDED)) & matters[l];
+            suspect[l] |= flag((self.astray[l] > ASTRAY_MS) & (mode[l] == GUIDED))
+                & matters[l]
+                & Reason::MonitorBand.bit();
             self.torque[l] = torque;
         }
     }

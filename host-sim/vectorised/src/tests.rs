@@ -1,4 +1,4 @@
-//! Lanes against runs one by one: the shipping ECU is the oracle.
+//! Vectorised runs against runs one by one: the shipping ECU is the oracle.
 
 use haptic_core::params::Params;
 use haptic_log::trace::Sample;
@@ -6,15 +6,15 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use super::*;
-use crate::models::disturbances::SensorErrors;
-use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::real::{Tyres, WorldParameters};
-use crate::models::road::Course;
-use crate::models::tolerances::Tolerances;
-use crate::scenario::{
+use haptic_sim::models::disturbances::SensorErrors;
+use haptic_sim::models::driver::{ArmGains, DriverParameters};
+use haptic_sim::models::real::{Tyres, WorldParameters};
+use haptic_sim::models::road::Course;
+use haptic_sim::models::tolerances::Tolerances;
+use haptic_sim::scenario::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
 };
-use crate::simulation::simulate;
+use haptic_sim::simulation::simulate;
 
 /// Every field of every sample, signs of zeros included.
 fn bits(run: &Run) -> Vec<u64> {
@@ -23,12 +23,16 @@ fn bits(run: &Run) -> Vec<u64> {
     run.trace.samples.iter().flat_map(fields).collect()
 }
 
-/// Drives scenarios in lanes and one by one; returns how many were suspect.
+/// Drives scenarios side by side and one by one; returns how many were rejected.
 fn compare(scenarios: &[Scenario], width: Width) -> usize {
     let (mut suspects, mut seen) = (0, vec![0; scenarios.len()]);
-    drive(scenarios, width, |number, run| {
+    let options = Options {
+        width,
+        ..Options::default()
+    };
+    run_batch(scenarios, options, |number, event| {
         seen[number] += 1;
-        let Some(run) = run else {
+        let Event::Ended(run) = event else {
             suspects += 1;
             return;
         };
@@ -215,7 +219,7 @@ fn random(count: usize, seed: u64, beside: Beside) -> Vec<Scenario> {
 }
 
 #[test]
-fn the_papers_drives_are_the_same_in_lanes() {
+fn the_papers_drives_are_the_same_side_by_side() {
     let mut scenarios = Vec::new();
     for condition in [Condition::Manual, Condition::High, Condition::Mid, Condition::Low] {
         scenarios.push(Scenario::builder().condition(condition).build().unwrap());
@@ -243,19 +247,19 @@ fn the_papers_drives_are_the_same_in_lanes() {
 }
 
 #[test]
-fn random_drives_are_the_same_in_lanes_and_few_are_suspect() {
+fn random_drives_are_the_same_side_by_side_and_few_are_suspect() {
     let suspects = compare(&random(80, 1, |builder, _| builder), Width::Widest);
     assert!(suspects < 30, "{suspects} of 80");
 }
 
 #[test]
-fn sensors_with_errors_are_the_same_in_lanes_and_few_are_suspect() {
+fn sensors_with_errors_are_the_same_side_by_side_and_few_are_suspect() {
     let suspects = compare(&random(80, 3, erring), Width::Widest);
     assert!(suspects < 50, "{suspects} of 80");
 }
 
 #[test]
-fn real_worlds_are_the_same_in_lanes_and_few_are_suspect() {
+fn real_worlds_are_the_same_side_by_side_and_few_are_suspect() {
     let suspects = compare(&random(80, 4, real), Width::Widest);
     assert!(suspects < 50, "{suspects} of 80");
     let both: Beside = |builder, between| real(erring(builder, between), between);
@@ -264,7 +268,7 @@ fn real_worlds_are_the_same_in_lanes_and_few_are_suspect() {
 }
 
 #[test]
-fn speeds_that_change_are_the_same_in_lanes_and_few_are_suspect() {
+fn speeds_that_change_are_the_same_side_by_side_and_few_are_suspect() {
     let suspects = compare(&random(40, 8, changing), Width::Widest);
     assert!(suspects < 25, "{suspects} of 40");
     let all: Beside = |builder, between| changing(real(erring(builder, between), between), between);
@@ -274,35 +278,35 @@ fn speeds_that_change_are_the_same_in_lanes_and_few_are_suspect() {
 
 /// Every step that is reported, and the samples of runs that are cut after 7 s, against the shipping ECU.
 #[test]
-fn every_step_is_reported_and_runs_are_cut_where_it_is_asked() {
+fn every_step_is_reported_and_runs_are_cut_where_it_is_options() {
     let mut scenarios = random(20, 11, |builder, _| builder);
     scenarios.extend(random(12, 12, real));
     let mut steps: Vec<Vec<Step>> = vec![Vec::new(); scenarios.len()];
     let (mut cut, mut whole) = (Vec::new(), 0);
-    let mut asked = Asked {
+    let mut options = Options {
         every_step: true,
-        ..Asked::default()
+        ..Options::default()
     };
-    drive_asked(&scenarios, asked, |number, event| match event {
+    run_batch(&scenarios, options, |number, event| match event {
         Event::Steps(more) => steps[number].extend(more),
         Event::Ended(run) => {
             whole += 1;
             let mut alone = Vec::new();
-            crate::simulation::observe(&scenarios[number], |outcome| {
+            haptic_sim::simulation::observe(&scenarios[number], |outcome| {
                 alone.push(Step::from(outcome));
             });
             assert_eq!(run.steps as usize, alone.len());
             // Debug has the shortest digits that give the same bits back, and signs of zeros.
             assert_eq!(format!("{:?}", steps[number]), format!("{alone:?}"), "{number}");
         }
-        Event::HandedBack => (),
+        Event::Rejected(_) => (),
     });
     assert!(whole > 12, "{whole}");
-    asked = Asked {
+    options = Options {
         most_s: Some(7),
-        ..Asked::default()
+        ..Options::default()
     };
-    drive_asked(&scenarios, asked, |number, event| {
+    run_batch(&scenarios, options, |number, event| {
         if let Event::Ended(run) = event {
             cut.push((number, run.clone()));
         }
@@ -329,9 +333,17 @@ fn every_width_gives_the_same() {
 }
 
 #[test]
-fn what_lanes_cannot_drive_is_named_and_handed_back() {
+fn what_cannot_be_vectorised_is_named_and_rejected() {
     let exact = Scenario::builder().sensors(Sensors::Exact).build().unwrap();
-    assert_eq!(why_not(&exact), Some(Reason::ExactSensors));
-    assert_eq!(why_not(&Scenario::default()), None);
+    assert_eq!(unsupported_reason(&exact), Some(Reason::ExactSensors));
+    assert_eq!(unsupported_reason(&Scenario::default()), None);
+    let (time, kmh) = (vec![0.0, 50.0], vec![60.0; 2]);
+    let equal = Speed::ByTime { time, kmh };
+    let equal = Scenario::builder().speed(equal).build().unwrap();
+    assert_eq!(unsupported_reason(&equal), None);
+    let mut failure = Scenario::default().failure();
+    (failure.kind, failure.duration_s) = (FailureKind::Torque, Some(3.0));
+    let ends = Scenario::builder().failure(failure).build().unwrap();
+    assert_eq!(unsupported_reason(&ends), Some(Reason::FailureEnds));
     assert_eq!(compare(&[exact], Width::Widest), 1);
 }

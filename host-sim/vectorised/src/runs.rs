@@ -9,21 +9,20 @@ use haptic_log::trace::{Sample, Trace};
 
 use super::checks::Checks;
 use super::ecu::{Ecus, TIMEOUT_MS};
+use super::rejected::Reason;
 use super::sensing::Senses;
 use super::speeds::Speeds;
 use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, Worlds, YAW_RATE};
 use super::{ALIVE, Step};
-use crate::guidance::NoGuidance;
-use crate::models::driver::Remnant;
-use crate::models::plant::Transition;
-use crate::models::road::Centreline;
-use crate::models::sensors::camera_looks;
-use crate::models::{STEP_S, STEPS_PER_SECOND, step_of};
-use crate::parts::ByReliance;
-use crate::preview::wrapped;
-use crate::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
-use crate::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Simulation};
-use crate::unguided::Cause;
+use haptic_sim::models::driver::Remnant;
+use haptic_sim::models::plant::Transition;
+use haptic_sim::models::road::Centreline;
+use haptic_sim::models::sensors::camera_looks;
+use haptic_sim::models::{STEP_S, STEPS_PER_SECOND, step_of, wrapped};
+use haptic_sim::parts::{ByReliance, DriverVehicle, PaperPair};
+use haptic_sim::scenario::{FAILURE_REACTION_S, FailureKind, Scenario};
+use haptic_sim::simulation::{Ending, Plan, Run, SAMPLE_RATE_HZ, STEPS_PER_SAMPLE, Sensing};
+use haptic_sim::unguided::Cause;
 
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
 /// then has the others' rhythm.
@@ -62,7 +61,7 @@ struct Slot {
     timeout: u32,
 }
 
-pub(super) struct Lanes<const N: usize> {
+pub(super) struct Runs<const N: usize> {
     worlds: Worlds<N>,
     ecus: Ecus<N>,
     checks: Checks<N>,
@@ -81,7 +80,7 @@ pub(super) struct Lanes<const N: usize> {
     slots: [Slot; N],
 }
 
-impl<const N: usize> Lanes<N> {
+impl<const N: usize> Runs<N> {
     pub(super) fn new(whole: usize, any: &Scenario, every_step: bool) -> Self {
         let road = any.course().centreline();
         let mut room = ROOM.take();
@@ -118,19 +117,18 @@ impl<const N: usize> Lanes<N> {
     }
 
     pub(super) fn begin(&mut self, lane: usize, number: usize, scenario: &Scenario) {
-        let mut simulation = Simulation::with(scenario, NoGuidance);
-        self.worlds.begin(lane, &simulation);
+        let (road, mut pair) = (scenario.course().centreline(), PaperPair::new(scenario));
+        let plan = Plan::new(scenario, pair.look_ahead_s());
+        self.worlds.begin(lane, scenario, &road, &plan);
         let has_banks = !scenario.course().is_level();
-        self.worlds
-            .real
-            .begin(lane, simulation.driver_vehicle.nonlinear.take(), has_banks);
-        self.speeds.begin(lane, scenario, &simulation.plan);
-        self.senses.begin(lane, simulation.sensing.take());
+        self.worlds.real.begin(lane, pair.nonlinear.take(), has_banks);
+        self.speeds.begin(lane, scenario, &plan);
+        self.senses.begin(lane, Sensing::of(scenario));
         self.ecus.begin(lane, scenario);
         self.checks.begin(lane, scenario);
         self.own[lane] = 0;
         self.looks[lane] = if self.ecus.hears[lane] == 0 { 0 } else { ALIVE };
-        self.roads[lane] = Arc::clone(&simulation.road);
+        self.roads[lane] = road;
         let failure = scenario.failure();
         let slot = &mut self.slots[lane];
         // Room for the whole run, and for no other: growing would copy it again and again.
@@ -142,14 +140,11 @@ impl<const N: usize> Lanes<N> {
         slot.is_whole = false;
         slot.timeout = u32::MAX;
         if failure.kind == FailureKind::Input {
-            let last = (0..simulation.plan.failure_steps[0])
-                .rev()
-                .find(|step| camera_looks(*step));
+            let last = (0..plan.failure_steps[0]).rev().find(|step| camera_looks(*step));
             slot.timeout = last.map_or(0, |last| last + TIMEOUT_MS);
         }
-        let pair = simulation.driver_vehicle;
-        slot.remnant = (pair.remnant.scale_nm != 0.0).then_some(pair.remnant);
-        slot.plan = Some((simulation.plan, pair.arm));
+        slot.remnant = (scenario.driver().remnant_sd_nm != 0.0).then_some(pair.remnant);
+        slot.plan = Some((plan, pair.arm));
         self.has_remnants = self.slots.iter().any(|slot| slot.remnant.is_some());
         self.happen(lane);
     }
@@ -176,7 +171,7 @@ impl<const N: usize> Lanes<N> {
             self.ecus.hand_over(lane, step);
             slot.unguided_cause = Cause::LaneLost.code();
         }
-        let changed = arm.changed.as_ref().map_or(u32::MAX, |(at, _)| *at);
+        let changed = arm.changes_at().unwrap_or(u32::MAX);
         let events = [failed_at, noticed, changed, slot.timeout];
         let next = events.into_iter().filter(|event| *event > step).min();
         slot.event = next.unwrap_or(u32::MAX);
@@ -194,11 +189,18 @@ impl<const N: usize> Lanes<N> {
         self.worlds.alive[lane] == ALIVE
     }
 
-    /// The number of a lane's run that has ended, and the run unless it is suspect.
-    pub(super) fn take(&mut self, lane: usize) -> Option<(usize, Option<&Run>)> {
+    /// The number of a lane's run that has ended, and the run, or why it is rejected.
+    pub(super) fn take(&mut self, lane: usize) -> Option<(usize, Result<&Run, Reason>)> {
+        let off_road = if self.worlds.suspect[lane] == 0 {
+            0
+        } else {
+            Reason::OffRoad.bit()
+        };
+        let doubts = self.ecus.suspect[lane] | off_road;
         let slot = &mut self.slots[lane];
         let number = slot.scenario.take()?;
-        Some((number, slot.is_whole.then_some(&slot.run)))
+        let run = slot.is_whole.then_some(&slot.run);
+        Some((number, run.ok_or(Reason::first_of(doubts))))
     }
 
     /// Ends a run after so many seconds.
@@ -378,7 +380,7 @@ impl<const N: usize> Lanes<N> {
     }
 }
 
-impl<const N: usize> Drop for Lanes<N> {
+impl<const N: usize> Drop for Runs<N> {
     fn drop(&mut self) {
         ROOM.set(
             self.slots

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::divide::{FORTY, SIX, TWENTY_FOUR};
 use super::{ALIVE, Aligned};
-use crate::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Tracker};
+use haptic_sim::models::road::{CONVERGED_M, Centreline, MIN_DETERMINANT, OVERRUN_M, Tracker};
 
 /// Steps of a search, of which one or two are the rule.
 const MOST_STEPS: usize = 4;
@@ -32,7 +32,7 @@ pub(super) struct Tracked<const N: usize> {
     cube: [f64; N],
     /// Largest arc length that a search may end at.
     end: [f64; N],
-    /// What was found, as a [`crate::models::road::Projection`] has it.
+    /// What was found, as a [`haptic_sim::models::road::Projection`] has it.
     pub(super) offset: [f64; N],
     pub(super) found_heading: [f64; N],
     pub(super) found_curvature: [f64; N],

@@ -1,34 +1,34 @@
-//! A chunk in lanes ([`crate::lanes`]): many drives side by side, and the shipping ECU where they are not enough.
+//! A chunk of vectorised runs ([`crate::vectorised`]), and the shipping ECU for those that are rejected.
 
 use haptic_sim::input::InputError;
-use haptic_sim::lanes::{Asked, Event};
 use haptic_sim::scenario::{Failure, FailureKind, Scenario};
 use haptic_sim::simulation::{Run, simulate};
+use haptic_vectorised::{Event, Options};
 
 use super::{Chunk, Driven, Sweep};
-use crate::lanes::{Checked, Group};
 use crate::record::nominal_peak_m;
+use crate::vectorised::{Checked, Group};
 
 impl Sweep {
     /// Drives a chunk. What it gives follows from the sweep and the number alone.
     ///
     /// # Errors
-    /// As [`Sweep::scenario`]; a drive for which lanes and shipping ECU differ.
+    /// As [`Sweep::scenario`]; a drive that differs from the shipping ECU's.
     pub fn run_chunk(&self, number: u64) -> Result<Chunk, InputError> {
         let drives = self.drives_of(number);
         let scenarios = drives.clone().map(|drive| self.scenario(&self.point(drive)));
         let scenarios: Vec<Scenario> = scenarios.collect::<Result<_, _>>()?;
-        let rows = self.drive_in_lanes(drives.start, &scenarios)?;
+        let rows = self.run_batched(drives.start, &scenarios)?;
         let rows = rows.into_iter().zip(&scenarios);
-        let rows = rows.map(|(row, scenario)| row.map_or_else(|| self.drive_alone(scenario), Ok));
+        let rows = rows.map(|(row, scenario)| row.map_or_else(|| self.run_alone(scenario), Ok));
         Ok(Chunk {
             number,
             rows: rows.collect::<Result<_, _>>()?,
         })
     }
 
-    /// What the lanes give; `None` for a drive that they hand back.
-    fn drive_in_lanes(&self, first: u64, scenarios: &[Scenario]) -> Result<Vec<Option<Driven>>, InputError> {
+    /// What is driven side by side; `None` for a drive that is rejected.
+    fn run_batched(&self, first: u64, scenarios: &[Scenario]) -> Result<Vec<Option<Driven>>, InputError> {
         let mut peaks: Vec<Option<Option<f64>>> = vec![Some(None); scenarios.len()];
         // First the same drives without their failures, where a metric asks for them.
         let (mut places, mut nominals) = (Vec::new(), Vec::new());
@@ -44,20 +44,20 @@ impl Sweep {
                 peaks[place] = None;
             }
         }
-        self.in_lanes(first, &nominals, |number, run| {
+        self.run_batch(first, &nominals, |number, run| {
             let scenario = &scenarios[places[number]];
             let peak_m = nominal_peak_m(run, self.window_of(scenario), scenario.failure().time_s);
             peaks[places[number]] = Some(peak_m);
         })?;
         let mut rows: Vec<Option<Driven>> = vec![None; scenarios.len()];
-        self.in_lanes(first, scenarios, |number, run| {
+        self.run_batch(first, scenarios, |number, run| {
             rows[number] = peaks[number].map(|peak_m| self.measured(&scenarios[number], run, peak_m));
         })?;
         Ok(rows)
     }
 
-    /// Takes what the lanes drive, and leaves what they hand back.
-    fn in_lanes(
+    /// Takes what is driven side by side, and leaves what is rejected.
+    fn run_batch(
         &self,
         first: u64,
         scenarios: &[Scenario],
@@ -75,8 +75,8 @@ impl Sweep {
             Ok(())
         };
         let alone = |place: usize| simulate(&scenarios[place]);
-        let handed_back = group.in_lanes(Asked::default(), alone, on);
-        handed_back.map(drop).map_err(|e| InputError::new(&self.name, e))
+        let rejected = group.run_batch(Options::default(), alone, on);
+        rejected.map(drop).map_err(|e| InputError::new(&self.name, e))
     }
 }
 
@@ -85,27 +85,27 @@ mod tests {
     use crate::sweep::Sweep;
     use crate::sweep::tests::with_road;
 
-    /// Holds each chunk's bytes in lanes to those one by one; how many drives lanes can take, and how many not.
+    /// Holds each chunk's bytes side by side to those one by one; how many drives can be vectorised, and how many not.
     fn same_bytes(sweep: &Sweep) -> (usize, usize) {
-        let (mut in_lanes, mut out) = (0, 0);
+        let (mut batched, mut out) = (0, 0);
         for chunk in 0..sweep.chunks() {
             let side_by_side = sweep.run_chunk(chunk).unwrap();
             let alone = sweep.run_chunk_one_by_one(chunk).unwrap();
             assert_eq!(side_by_side.to_bytes(1), alone.to_bytes(1), "chunk {chunk}");
             for drive in sweep.drives_of(chunk) {
                 let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
-                match haptic_sim::lanes::why_not(&scenario) {
-                    None => in_lanes += 1,
+                match haptic_vectorised::unsupported_reason(&scenario) {
+                    None => batched += 1,
                     Some(_) => out += 1,
                 }
             }
         }
-        (in_lanes, out)
+        (batched, out)
     }
 
-    /// Lanes drive side by side what the shipping ECU drives alone, and hand back what they cannot: the bytes are the same.
+    /// What is driven side by side and what is rejected are the same bytes as the shipping ECU's.
     #[test]
-    fn the_table_does_not_depend_on_lanes() {
+    fn the_table_does_not_depend_on_vectorised_runs() {
         let sweep = with_road(
             "samples = 12\nmetrics = [\"time_to_recover_s\", \"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
             "[vary]\nfailure.kind = [\"none\", \"torque\", \"input\"]\nsensors = [\"paper\", \"exact\"]\n\
@@ -113,11 +113,11 @@ mod tests {
              \"driver.t_p\" = { uniform = [0.05, 0.5] }\n\"driver.K_hg\" = { uniform = [0, 1] }\n\
              \"driver.remnant_sd\" = [0, 0.1]\n",
         );
-        let (in_lanes, out) = same_bytes(&sweep);
-        assert!(in_lanes > 40 && out > 40, "{in_lanes} in lanes, {out} not");
+        let (batched, out) = same_bytes(&sweep);
+        assert!(batched > 40 && out > 40, "{batched} side by side, {out} not");
     }
 
-    /// A probe, sensors with errors, other cars, wind and friction in lanes.
+    /// A probe, sensors with errors, other cars, wind and friction side by side.
     #[test]
     fn nor_does_it_where_the_world_is_not_the_papers() {
         let sweep = with_road(
@@ -127,7 +127,7 @@ mod tests {
              \"tolerances.load\" = { uniform = [0, 300] }\n\"sensor_errors.lane_noise\" = [0, 0.01]\n\
              \"world.gust_sd\" = { uniform = [0, 150] }\n\"world.friction\" = { uniform = [0, 0.4] }\n",
         );
-        let (in_lanes, out) = same_bytes(&sweep);
-        assert!(in_lanes > 0 && out == 0, "{in_lanes} in lanes, {out} not");
+        let (batched, out) = same_bytes(&sweep);
+        assert!(batched > 0 && out == 0, "{batched} side by side, {out} not");
     }
 }

@@ -12,12 +12,13 @@ use haptic_core::quantity::Torque;
 
 use super::ALIVE;
 use super::counts::{ONE, bits, on_the_bus};
+use super::rejected::Reason;
 use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
-use crate::models::STEP_S;
-use crate::models::driver::ArmGains;
-use crate::models::plant;
-use crate::models::real::{GRAVITY_M_PER_S2, RealPlant, STATES, Tyres};
-use crate::models::road::{Centreline, Tracker};
+use haptic_sim::models::STEP_S;
+use haptic_sim::models::driver::ArmGains;
+use haptic_sim::models::plant;
+use haptic_sim::models::real::{GRAVITY_M_PER_S2, RealPlant, STATES, Tyres};
+use haptic_sim::models::road::{Centreline, Tracker};
 
 /// Counts of a motor torque on the bus, of 2^-24 N.m.
 const LARGEST_MOTOR: i32 = ((1 << 15) - 1) << 12;
@@ -202,7 +203,7 @@ impl<const N: usize> Reals<N> {
                 motor.deliver(torque(sent.min(LARGEST_MOTOR).max(-LARGEST_MOTOR)));
             }
             if motor.judge(torque(commanded[l])) != Motor::Obeys {
-                suspect[l] |= matters[l];
+                suspect[l] |= matters[l] & Reason::Motor.bit();
             }
         }
     }

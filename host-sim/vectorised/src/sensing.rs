@@ -1,8 +1,8 @@
 //! What the sensors of several runs add to the truth: constant errors for all at once, noise from each run's own gyro and
-//! camera ([`crate::models::disturbances`]), which draw as they do in a run alone.
+//! camera ([`haptic_sim::models::disturbances`]), which draw as they do in a run alone.
 
-use crate::models::disturbances::SensorErrors;
-use crate::simulation::Sensing;
+use haptic_sim::models::disturbances::SensorErrors;
+use haptic_sim::simulation::Sensing;
 
 /// The sensors.
 #[repr(C, align(64))]

@@ -8,25 +8,26 @@
 //! which in one of six core knows a message later: at 8 m/s2 that is 0.08 m/s, and less than 0.002 m in the sum.
 
 use haptic_core::params::Params;
+use haptic_core::plausibility::{self, ALIGNING_ERROR, BIAS_SHIFT, PUSHED, UNREAL};
 
 use super::counts::{ONE, flag, speed_heard};
-use crate::scenario::Scenario;
+use super::rejected::Reason;
+use haptic_sim::scenario::Scenario;
 
-/// Of core's 0.6 N.m.s.
-const COLUMN_MARGIN: f64 = 0.58;
-/// Of core's 0.4 m, of half of that, and of 0.8 m.
-const LANE_MARGIN: f64 = 0.38;
-const LANE_MOVED: f64 = 0.18;
-const LANE_UNREAL: f64 = 0.78;
-const COLUMN_BIAS: f64 = 0.5;
-const LANE_BIAS: f64 = 0.15;
-/// What is learnt slowly is learnt by a sixteenth.
-const LEARNS: f64 = 1.0 / 16.0;
-const FRICTION: f64 = 0.5;
-const TOLERANCE: f64 = 77.0 / 256.0;
-const ASSIST: f64 = 5.0;
-/// What yaw rate and wheel angle may say differently of the aligning torque, N.m.
-const PUSHED: f64 = 0.3;
+/// So much narrower than core's are the margins here, N.m.s and m.
+const NARROWER: f64 = 0.02;
+const COLUMN_MARGIN: f64 = plausibility::COLUMN_MARGIN.nm_s() - NARROWER;
+const LANE_MARGIN: f64 = plausibility::LANE_MARGIN.m() - NARROWER;
+/// Core asks for half of the margin.
+const LANE_MOVED: f64 = 0.5 * plausibility::LANE_MARGIN.m() - NARROWER;
+const LANE_UNREAL: f64 = UNREAL as f64 / ONE - NARROWER;
+const COLUMN_BIAS: f64 = plausibility::COLUMN_BIAS.nm();
+const LANE_BIAS: f64 = plausibility::LANE_BIAS.m_per_s();
+const LEARNS: f64 = 1.0 / (1 << BIAS_SHIFT) as f64;
+const FRICTION: f64 = plausibility::FRICTION.nm();
+const TOLERANCE: f64 = ALIGNING_ERROR as f64 / (1_u64 << 32) as f64;
+const ASSIST: f64 = plausibility::ASSIST as f64;
+const PUSHED_NM: f64 = PUSHED as f64 / ONE;
 /// Far inside what the frames carry, rad and rad/s.
 const LARGEST_WHEEL: f64 = 12.0;
 const LARGEST_YAW_RATE: f64 = 1.9;
@@ -140,7 +141,8 @@ impl<const N: usize> Checks<N> {
     #[inline(always)]
     pub(super) fn vehicle(&mut self, yaw_rate: &[f64; N], matters: &[i32; N], suspect: &mut [i32; N]) {
         for l in 0..N {
-            suspect[l] |= !flag(yaw_rate[l].abs() <= LARGEST_YAW_RATE) & matters[l];
+            suspect[l] |=
+                !flag(yaw_rate[l].abs() <= LARGEST_YAW_RATE) & matters[l] & Reason::SensorRange.bit();
             self.heading[l] += self.yaw_rate[l] * VEHICLE_S;
             self.yaw_rate[l] = (yaw_rate[l] * YAW_RATE_COUNTS).round() * (1.0 / YAW_RATE_COUNTS);
             self.aligning[l] = self.speed[l] * self.yaw_rate[l] * self.aligning_gain[l];
@@ -158,7 +160,7 @@ impl<const N: usize> Checks<N> {
         matters: &[i32; N],
         suspect: &mut [i32; N],
     ) {
-        const RESOLUTION: f64 = crate::models::sensors::ANGLE_RESOLUTION_DEG;
+        const RESOLUTION: f64 = haptic_sim::models::sensors::ANGLE_RESOLUTION_DEG;
         for l in 0..N {
             let dt = COLUMN_S * self.began[l];
             let sensed = (wheel[l].to_degrees() / RESOLUTION).round() * RESOLUTION.to_radians();
@@ -166,8 +168,8 @@ impl<const N: usize> Checks<N> {
             self.wheel[l] = sensed;
             let aligning = self.aligning[l];
             let by_wheel = (self.per_wheel[l] * sensed)
-                .max(aligning - PUSHED)
-                .min(aligning + PUSHED);
+                .max(aligning - PUSHED_NM)
+                .min(aligning + PUSHED_NM);
             let assisted = ASSIST * driver[l];
             let least = (applied[l] + driver[l].min(assisted) - aligning.max(by_wheel)) * dt - damped;
             let most = (applied[l] + driver[l].max(assisted) - aligning.min(by_wheel)) * dt - damped;
@@ -179,8 +181,8 @@ impl<const N: usize> Checks<N> {
             let kept = sum - sum * dt + lacking;
             let sum = nearest_to_zero(kept - tolerance, kept + tolerance);
             self.column_sum[l] = sum;
-            let is_sound = (sum.abs() <= COLUMN_MARGIN) & (wheel[l].abs() <= LARGEST_WHEEL);
-            suspect[l] |= !flag(is_sound) & matters[l];
+            suspect[l] |= !flag(sum.abs() <= COLUMN_MARGIN) & matters[l] & Reason::ColumnCheck.bit();
+            suspect[l] |= !flag(wheel[l].abs() <= LARGEST_WHEEL) & matters[l] & Reason::SensorRange.bit();
         }
     }
 
@@ -236,7 +238,8 @@ impl<const N: usize> Checks<N> {
             // The sign is beyond doubt where the first rule asks for it, and the second does not.
             let missing = if sum_predicted < 0.0 { -missing } else { missing };
             let is_missing = (missing > LANE_MARGIN) & (sum_predicted.abs() > LANE_MOVED);
-            suspect[l] |= flag(is_missing | (missing.abs() > LANE_UNREAL)) & matters[l];
+            suspect[l] |=
+                flag(is_missing | (missing.abs() > LANE_UNREAL)) & matters[l] & Reason::LaneCheck.bit();
             (self.e_y[l], self.heading_then[l], self.yaw_rate_then[l]) =
                 (e_y[l], heading[l], self.yaw_rate[l]);
         }

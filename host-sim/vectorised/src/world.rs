@@ -1,5 +1,5 @@
 //! The world of several runs: plant, driver and the points that they look at, to the same bits as
-//! [`crate::simulation::Simulation`] has them one by one.
+//! [`haptic_sim::Simulation`] has them one by one.
 
 use std::sync::Arc;
 
@@ -8,11 +8,12 @@ use super::points::Points;
 use super::real::{Acting, Reals};
 use super::tracked::{ALL, Tracked};
 use super::{ALIVE, Aligned};
-use crate::guidance::NoGuidance;
-use crate::models::STEP_S;
-use crate::models::plant::{COLUMNS, STATES, Transition};
-use crate::models::road::Centreline;
-use crate::simulation::Simulation;
+use haptic_sim::models::STEP_S;
+use haptic_sim::models::driver::delay_steps;
+use haptic_sim::models::plant::{COLUMNS, STATES, Transition};
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::Scenario;
+use haptic_sim::simulation::{DIVERGED_M, Plan};
 
 /// Places of the states, as the plant has them.
 pub(super) const BETA: usize = 0;
@@ -84,8 +85,7 @@ impl<const N: usize> Worlds<N> {
     }
 
     /// A new run begins in a lane, as a simulation of it begins.
-    pub(super) fn begin(&mut self, lane: usize, simulation: &Simulation<NoGuidance>) {
-        let road = &simulation.road;
+    pub(super) fn begin(&mut self, lane: usize, scenario: &Scenario, road: &Centreline, plan: &Plan) {
         for state in &mut self.state {
             state[lane] = 0.0;
         }
@@ -101,16 +101,17 @@ impl<const N: usize> Worlds<N> {
             state[lane] = 0.0;
         }
         (self.direction[0][lane], self.direction[1][lane]) = (1.0, 0.0);
-        let vision = &simulation.driver_vehicle.vision;
-        [self.a[0][lane], self.a[1][lane], self.a[2][lane]] = [vision.a_1, vision.a_2, vision.a_3];
-        (self.whole[lane], self.fraction[lane]) = (vision.delay.whole, vision.delay.fraction);
+        let (driver, guidance) = (scenario.driver(), scenario.guidance());
+        [self.a[0][lane], self.a[1][lane], self.a[2][lane]] = [driver.a_1, driver.a_2, driver.a_3];
+        (self.whole[lane], self.fraction[lane]) = delay_steps(driver.t_p);
         for row in &mut self.delayed {
             row[lane] = 0.0;
         }
-        self.driver.begin(lane, road, &simulation.driver_points);
-        self.camera.begin(lane, road, &simulation.camera);
-        self.body.begin(lane, road, &simulation.body);
-        self.end[lane] = simulation.end_m;
+        let v = scenario.speed_m_per_s();
+        self.driver.begin(lane, road, [driver.t_n, driver.t_f], v);
+        self.camera.begin(lane, road, [guidance.t_n, guidance.t_f], v);
+        self.body.begin(lane, road, &road.tracker(0.0));
+        self.end[lane] = plan.end_m(road, v);
         (self.alive[lane], self.suspect[lane]) = (ALIVE, 0);
     }
 
@@ -184,7 +185,7 @@ impl<const N: usize> Worlds<N> {
             .body
             .project::<FUSED, ALL>(roads, &self.x, &self.y, &self.alive);
         for l in 0..N {
-            let is_off = self.body.offset[l].abs() > crate::simulation::DIVERGED_M;
+            let is_off = self.body.offset[l].abs() > DIVERGED_M;
             self.suspect[l] |= lost[l] | if is_off { self.alive[l] } else { 0 };
         }
         self.real.locate(roads, |lane| self.body.place(lane));

@@ -1,7 +1,7 @@
 //! The equations of the plants, in the order of `models::real`.
 
 use super::{Acting, Reals, State};
-use crate::models::real::{FULL_ASSIST_AT_NM, RIPPLES, STATES, TRAIL_SHAPE};
+use haptic_sim::models::real::{FULL_ASSIST_AT_NM, RIPPLES, STATES, TRAIL_SHAPE};
 
 impl<const N: usize> Reals<N> {
     /// The rates of the states at a share of the step.

@@ -1,11 +1,10 @@
-//! The points that driver and camera look at in several runs, to the same bits as [`crate::preview::PreviewPoints`] has them.
+//! The points that driver and camera look at in several runs, as a run alone has them.
 
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use super::tracked::{HEADING, OFFSET, Tracked};
-use crate::models::road::Centreline;
-use crate::preview::PreviewPoints;
+use haptic_sim::models::road::Centreline;
 
 /// A near and a far point of each run.
 #[repr(C, align(64))]
@@ -34,11 +33,13 @@ impl<const N: usize> Points<N> {
         }
     }
 
-    pub(super) fn begin(&mut self, lane: usize, road: &Centreline, points: &PreviewPoints) {
-        (self.near_m[lane], self.far_m[lane]) = (points.near_m, points.far_m);
-        [self.times_s[0][lane], self.times_s[1][lane]] = points.times_s;
-        self.near.begin(lane, road, &points.near);
-        self.far.begin(lane, road, &points.far);
+    /// A new run begins in a lane: its points are so far ahead at this speed.
+    pub(super) fn begin(&mut self, lane: usize, road: &Centreline, times_s: [f64; 2], v_m_per_s: f64) {
+        [self.times_s[0][lane], self.times_s[1][lane]] = times_s;
+        let [near_m, far_m] = times_s.map(|time_s| v_m_per_s * time_s);
+        (self.near_m[lane], self.far_m[lane]) = (near_m, far_m);
+        self.near.begin(lane, road, &road.tracker(near_m));
+        self.far.begin(lane, road, &road.tracker(far_m));
         (self.e_y[lane], self.e_theta[lane]) = (0.0, 0.0);
     }
 

@@ -5,13 +5,17 @@
 //! and constants are taken; the property test of this module holds the two together. What could end guidance, and is not
 //! decided here, makes a run suspect ([`super::checks`]).
 
+use haptic_core::bus::messages::TIMEOUT;
 use haptic_core::params::Params;
+use haptic_core::quantity::Micros;
+use haptic_core::{envelope, hands, law, plausibility, ramp, schedule};
 
 use super::band::Band;
 use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, speed_heard, whole};
 use super::probe::Probes;
-use crate::models::sensors::TORQUE_RESOLUTION_NM;
-use crate::scenario::{Condition, Scenario};
+use super::rejected::Reason;
+use haptic_sim::models::sensors::TORQUE_RESOLUTION_NM;
+use haptic_sim::scenario::{Condition, Scenario};
 
 /// Who decides the torque.
 pub(super) const GUIDED: i32 = 0;
@@ -20,32 +24,34 @@ const OFF: i32 = 2;
 
 /// An LSB of a torque on the bus.
 pub(super) const TORQUE_LSB: i32 = 1 << 12;
-pub(super) const WINDOW_GROWTH: i32 = 20_132_659;
-const WINDOW_STEPS: i32 = 250;
-pub(super) const OVERRIDE_FROM: i32 = 13_421_773;
-const OVERRIDE_SLOPE: i32 = 3;
-const MAX_RATE: i32 = 1000 << 20;
-/// The largest honest step of a lane sample, 0.3 m and 0.1 rad.
-pub(super) const LANE_STEP: i32 = 5_033_165;
-pub(super) const YAW_STEP: i32 = 1_677_722;
+const WINDOW_GROWTH: i32 = bits(envelope::WINDOW_GROWTH.nm());
+const WINDOW_STEPS: i32 = ms(envelope::WINDOW);
+const OVERRIDE_FROM: i32 = bits(envelope::OVERRIDE_FROM.nm());
+const OVERRIDE_SLOPE: i32 = envelope::OVERRIDE_SLOPE.si() as i32;
+const MAX_RATE: i32 = law::MAX_RATE as i32;
+const LANE_STEP: i32 = bits(plausibility::LANE_STEP.m());
+const YAW_STEP: i32 = bits(plausibility::YAW_STEP.rad());
 /// Ends of a lane sample on the bus, 4 m and 0.5 rad, and a bit less.
 const LARGEST_E_Y: f64 = 3.99;
 const LARGEST_E_THETA: f64 = 0.499;
-/// Hands: a change that is felt, a torque that is held, a guidance that acts, and a bit less than the
-/// patience until guidance ends, ms.
-pub(super) const FELT: i32 = 1_342_177;
-pub(super) const HELD: i32 = 5_872_026;
-pub(super) const ACTS: i32 = 838_861;
-const HANDS_MS: i32 = 29_990;
+const FELT: i32 = bits(hands::FELT.nm());
+const HELD: i32 = bits(hands::HELD.nm());
+const ACTS: i32 = bits(hands::ACTS.nm());
+/// A bit less than core's patience.
+const HANDS_MS: i32 = ms(hands::END) - 10;
 /// Far inside what a column frame carries, N.m.
 const LARGEST_DRIVER_NM: f64 = 10.0;
 /// Between a loss of the lane preview and its time-out, ms; then the handover.
-pub(super) const TIMEOUT_MS: u32 = 31;
-const HANDOVER_MS: i32 = 2000;
-/// A driver torque that pushes against the handover, 0.1 N.m.
-const OPPOSES: i32 = 1_677_722;
+pub(super) const TIMEOUT_MS: u32 = ms(TIMEOUT) as u32 + 1;
+const HANDOVER_MS: i32 = ms(ramp::HANDOVER);
+const OPPOSES: i32 = bits(ramp::OPPOSES.nm());
 /// Torques kept for a handover, one every 5 ms.
 const PAST: usize = 16;
+/// Whole milliseconds.
+const fn ms(span: Micros) -> i32 {
+    (span.us() / 1000) as i32
+}
+
 /// The ECUs.
 #[repr(C, align(64))]
 pub(super) struct Ecus<const N: usize> {
@@ -233,7 +239,7 @@ impl<const N: usize> Ecus<N> {
             let driver = on_the_bus(small_bits(sensed), 12);
             // What is no number is too large too.
             let is_small = sensed.abs() <= LARGEST_DRIVER_NM;
-            self.suspect[l] |= !flag(is_small) & self.matters[l];
+            self.suspect[l] |= !flag(is_small) & self.matters[l] & Reason::SensorRange.bit();
             self.driver[l] = driver;
             let is_felt =
                 (driver.wrapping_abs() > HELD) | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT);
@@ -261,7 +267,8 @@ impl<const N: usize> Ecus<N> {
             let moved = e_y.wrapping_sub(self.e_y[l]).wrapping_abs();
             let turned = e_theta.wrapping_sub(self.e_theta[l]).wrapping_abs();
             let jumps = flag((moved > LANE_STEP) | (turned > YAW_STEP)) & !self.first[l];
-            self.suspect[l] |= (!flag(is_near) | jumps) & self.matters[l] & self.hears[l];
+            let doubts = (!flag(is_near) & Reason::SensorRange.bit()) | (jumps & Reason::LaneStep.bit());
+            self.suspect[l] |= doubts & self.matters[l] & self.hears[l];
             seen[0][l] = f64::from(e_y) * (1.0 / ONE);
             seen[1][l] = f64::from(e_theta) * (1.0 / ONE);
         }
@@ -300,7 +307,8 @@ impl<const N: usize> Ecus<N> {
             let guidance = self.applied[l].wrapping_sub(self.probes.applied[l]);
             let acts = (guidance.wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
             self.without_ms[l] = self.without_ms[l].wrapping_add(if acts { 1 } else { 0 });
-            self.suspect[l] |= flag(self.without_ms[l] >= HANDS_MS) & self.matters[l];
+            self.suspect[l] |=
+                flag(self.without_ms[l] >= HANDS_MS) & self.matters[l] & Reason::HandsOff.bit();
         }
         if is_window_due {
             for l in 0..N {
@@ -360,7 +368,7 @@ impl<const N: usize> Ecus<N> {
             let rounded = sum.wrapping_add(1 << 19);
             // More than 32 bits would saturate.
             let is_wide = (rounded.wrapping_add(1 << 51) as u64) >> 52 != 0;
-            self.suspect[l] |= flag(is_wide) & self.matters[l];
+            self.suspect[l] |= flag(is_wide) & self.matters[l] & Reason::Law.bit();
             let asked = ((rounded as u64) >> 20) as i32;
             let shared = term(self.scheduled[l], asked).wrapping_add(1 << 23);
             wanted[l] = ((shared as u64) >> 24) as i32;
@@ -383,7 +391,7 @@ impl<const N: usize> Ecus<N> {
             // Where the driver pushes against it, three times as fast.
             let (applied, driver) = (self.applied[l], self.driver[l]);
             let is_opposed = ((applied > 0) & (driver < -OPPOSES)) | ((applied < 0) & (driver > OPPOSES));
-            self.ramp_done[l] += if is_opposed { 3 } else { 1 };
+            self.ramp_done[l] += if is_opposed { ramp::OPPOSED as i32 } else { 1 };
             let left = i64::from(HANDOVER_MS - self.ramp_done[l]).max(0) * 1000;
             let torque = i64::from(self.ramp_from[l]) * left / i64::from(HANDOVER_MS * 1000);
             *wanted = smaller_of_same_sign(torque as i32, self.applied[l]);
@@ -423,7 +431,7 @@ impl<const N: usize> Ecus<N> {
             let (low, high) = (bound(driver.wrapping_neg()).wrapping_neg(), bound(driver));
             let held = command.max(low).min(high);
             // A driver who overrides: the monitor has its own bound for that.
-            self.suspect[l] |= flag(held != command) & self.matters[l];
+            self.suspect[l] |= flag(held != command) & self.matters[l] & Reason::Override.bit();
             torque[l] = held;
             limited[l] = is_limited;
         }
@@ -468,12 +476,12 @@ fn scheduled(p: &Params, speed: i32) -> i32 {
     let slower = speed < bits(middle);
     let (per, least) = if slower {
         (
-            (1.0 - p.low_speed_share) / (middle - 20.0 / 3.6),
+            (1.0 - p.low_speed_share) / (middle - schedule::SLOW_M_PER_S),
             p.low_speed_share,
         )
     } else {
         (
-            (1.0 - p.high_speed_share) / (130.0 / 3.6 - middle),
+            (1.0 - p.high_speed_share) / (schedule::FAST_M_PER_S - middle),
             p.high_speed_share,
         )
     };

@@ -1,25 +1,27 @@
-//! Many runs: side by side in lanes ([`haptic_sim::lanes`]) first, and with the shipping ECU where these are not enough.
+//! Many runs: side by side first ([`haptic_vectorised`]), and with the shipping ECU where that is not enough.
 //!
-//! What the lanes cannot drive, and every run in which something could have ended guidance, is handed back, to be driven alone
-//! with the shipping ECU. So that no result depends on who drove, one run in [`CHECKED_OF`], and one of each study at least,
-//! is driven by both: a bit that differs, in any field of any sample, is an error.
+//! What cannot be vectorised, and every run in which something could have ended guidance, is rejected, to be driven alone with
+//! the shipping ECU. [`crate::shares()`] says how many were, and why. So that no result depends on who drove, one run in a hundred, and one of each
+//! study at least, is driven by both: a bit that differs, in any field of any sample, is an error.
 //!
-//! - [`drive_all`]: the runs of a study, on all cores.
-//! - [`Group`]: some of them, in one thread.
+//! - `run_all`: the runs of a study, on all cores.
+//! - `Group`: some of them, in one thread.
 
 use haptic_log::trace::CHANNELS;
-use haptic_sim::lanes::{Asked, Event, LANES, drive_asked};
 use haptic_sim::scenario::Scenario;
 use haptic_sim::seeds::{self, Stream};
 use haptic_sim::simulation::{Run, simulate};
+use haptic_vectorised::{BATCH, Event, Options, Reason, run_batch};
 use rayon::prelude::*;
 
-/// One in so many runs of the lanes is driven by the shipping ECU too.
+use crate::shares::count;
+
+/// One in so many runs of a batch is driven by the shipping ECU too.
 const CHECKED_OF: u64 = 100;
-/// Fewer runs than this are as soon done one by one: a block of lanes takes its time however few are under way.
-const FEWEST: usize = LANES / 4;
-/// Most runs of a group: the more, the less often lanes wait for the last run, and the fewer threads share the work.
-const MOST_OF_A_GROUP: usize = 4 * LANES;
+/// Fewer runs than this are as soon done one by one: a block of steps takes its time however few are under way.
+const FEWEST: usize = BATCH / 4;
+/// Most runs of a group: the more, the less often a batch waits for its last run, and the fewer threads share the work.
+const MOST_OF_A_GROUP: usize = 4 * BATCH;
 
 /// Which runs are driven twice.
 #[derive(Debug, Clone, Copy)]
@@ -54,18 +56,29 @@ pub(crate) struct Group<'a> {
 }
 
 impl Group<'_> {
-    /// Drives in lanes what these can; gives the places of those that they hand back. `alone` is a run by the shipping ECU,
-    /// against which some are held.
+    /// Drives side by side; gives the places of those that are rejected. `alone` is a run by the shipping ECU, against which
+    /// some are held.
     ///
     /// # Errors
-    /// A run for which lanes and shipping ECU differ; what `on` says.
-    pub(crate) fn in_lanes(
+    /// A run that differs from the shipping ECU's; what `on` says.
+    pub(crate) fn run_batch(
         &self,
-        asked: Asked,
+        options: Options,
         alone: impl Fn(usize) -> Run,
         on: impl FnMut(usize, Event) -> Result<(), String>,
     ) -> Result<Vec<usize>, String> {
-        self.with(|on| drive_in_lanes(self.scenarios, asked, on), alone, on)
+        let too_few = self.scenarios.len() < FEWEST;
+        self.with(
+            |on| {
+                if too_few {
+                    (0..self.scenarios.len()).for_each(|place| on(place, Event::Rejected(Reason::TooFew)));
+                } else {
+                    run_batch(self.scenarios, options, on);
+                }
+            },
+            alone,
+            on,
+        )
     }
 
     /// The same by whatever drives side by side.
@@ -75,13 +88,14 @@ impl Group<'_> {
         alone: impl Fn(usize) -> Run,
         mut on: impl FnMut(usize, Event) -> Result<(), String>,
     ) -> Result<Vec<usize>, String> {
-        let (mut handed_back, mut result) = (Vec::new(), Ok(()));
+        let (mut rejected, mut result) = (Vec::new(), Ok(()));
         drive(&mut |place, event| {
-            let number = self.first + place as u64;
+            let (number, is_ended) = (self.first + place as u64, matches!(event, Event::Ended(_)));
             result = match (&result, event) {
                 (Err(_), _) => return,
-                (Ok(()), Event::HandedBack) => {
-                    handed_back.push(place);
+                (Ok(()), Event::Rejected(reason)) => {
+                    count(Some(reason));
+                    rejected.push(place);
                     return;
                 }
                 (Ok(()), Event::Ended(run)) if self.checked.has(number) => {
@@ -89,34 +103,29 @@ impl Group<'_> {
                 }
                 (Ok(()), event) => on(place, event),
             };
+            if is_ended {
+                count(None);
+            }
         });
-        result.map(|()| handed_back)
-    }
-}
-
-fn drive_in_lanes(scenarios: &[Scenario], asked: Asked, on: &mut dyn FnMut(usize, Event)) {
-    if scenarios.len() < FEWEST {
-        (0..scenarios.len()).for_each(|place| on(place, Event::HandedBack));
-    } else {
-        drive_asked(scenarios, asked, on);
+        result.map(|()| rejected)
     }
 }
 
 /// Whether two runs are the same to the last bit, signs of zeros included.
-fn agree(number: u64, lanes: &Run, alone: &Run) -> Result<(), String> {
+fn agree(number: u64, batched: &Run, alone: &Run) -> Result<(), String> {
     let differ = |what: String| {
         Err(format!(
-            "run {number}: {what} in lanes and with the shipping ECU. This is a fault of this program, not of what it was \
+            "run {number}: {what} side by side and with the shipping ECU. This is a fault of this program, not of what it was \
              given: please report it, with all that is needed to start it again"
         ))
     };
-    if (lanes.steps, lanes.ending) != (alone.steps, alone.ending) {
+    if (batched.steps, batched.ending) != (alone.steps, alone.ending) {
         return differ(format!(
             "{} steps and {}, {:?} and {:?}",
-            lanes.steps, alone.steps, lanes.ending, alone.ending
+            batched.steps, alone.steps, batched.ending, alone.ending
         ));
     }
-    for (mine, shipping) in lanes.trace.samples.iter().zip(&alone.trace.samples) {
+    for (mine, shipping) in batched.trace.samples.iter().zip(&alone.trace.samples) {
         for channel in &CHANNELS {
             let values = [mine, shipping].map(|sample| (channel.value)(sample));
             if values[0].to_bits() != values[1].to_bits() {
@@ -128,7 +137,7 @@ fn agree(number: u64, lanes: &Run, alone: &Run) -> Result<(), String> {
             }
         }
     }
-    match [lanes, alone].map(|run| run.trace.samples.len()) {
+    match [batched, alone].map(|run| run.trace.samples.len()) {
         [a, b] if a != b => differ(format!("there are {a} and {b} samples")),
         _ => Ok(()),
     }
@@ -138,13 +147,13 @@ fn agree(number: u64, lanes: &Run, alone: &Run) -> Result<(), String> {
 /// twice are drawn by the seed.
 ///
 /// # Errors
-/// As [`Group::in_lanes`]; what `measure` says.
-pub(crate) fn drive_all<T: Send>(
+/// As [`Group::run_batch`]; what `measure` says.
+pub(crate) fn run_all<T: Send>(
     scenarios: &[Scenario],
     seed: u64,
     measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
 ) -> Result<Vec<T>, String> {
-    let found = first_in_lanes(scenarios, seed, &measure)?
+    let found = run_batched(scenarios, seed, &measure)?
         .into_par_iter()
         .zip(scenarios);
     let found = found
@@ -153,11 +162,11 @@ pub(crate) fn drive_all<T: Send>(
     found.collect()
 }
 
-/// As [`drive_all`], but what the lanes hand back is nothing: whoever asks may have a better way to drive it.
+/// As [`run_all`], but what is rejected is nothing: whoever asks may have a better way to drive it.
 ///
 /// # Errors
-/// As [`drive_all`].
-pub(crate) fn first_in_lanes<T: Send>(
+/// As [`run_all`].
+pub(crate) fn run_batched<T: Send>(
     scenarios: &[Scenario],
     seed: u64,
     measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
@@ -171,7 +180,7 @@ pub(crate) fn first_in_lanes<T: Send>(
             checked,
         };
         let alone = |place: usize| simulate(&scenarios[place]);
-        group.in_lanes(Asked::default(), alone, |place, event| {
+        group.run_batch(Options::default(), alone, |place, event| {
             if let Event::Ended(run) = event {
                 found[place] = Some(measure(first + place, run)?);
             }
@@ -190,11 +199,11 @@ pub(crate) fn in_groups<J: Sync, T: Send>(
     of_group: impl Fn(usize, &[J]) -> Result<Vec<T>, String> + Sync,
 ) -> Result<Vec<T>, String> {
     let share = jobs.len().div_ceil(rayon::current_num_threads()).max(1);
-    let size = if share < 2 * LANES {
+    let size = if share < 2 * BATCH {
         share
     } else {
         // Several groups for each thread, so that none waits long for the last.
-        (share / 2).next_multiple_of(LANES).min(MOST_OF_A_GROUP)
+        (share / 2).next_multiple_of(BATCH).min(MOST_OF_A_GROUP)
     };
     let one = |(number, group): (usize, &[J])| {
         let found = of_group(number * size, group)?;
@@ -223,7 +232,7 @@ mod tests {
         scenario.build().unwrap()
     }
 
-    /// Lies of lanes that one run in a study of one must not get away with: each field of each sample, the sign of a zero
+    /// Differences that one run in a study of one must not get away with: each field of each sample, the sign of a zero
     /// too, the number of samples and steps, and the ending.
     #[test]
     fn a_bit_that_differs_is_an_error() {
@@ -235,10 +244,10 @@ mod tests {
             checked: Checked::new(1, 1),
         };
         let told = |run: &Run| {
-            let lanes = |on: &mut dyn FnMut(usize, Event)| on(0, Event::Ended(run));
+            let batch = |on: &mut dyn FnMut(usize, Event)| on(0, Event::Ended(run));
             let mut taken = 0;
             let result = group.with(
-                lanes,
+                batch,
                 |_| honest.clone(),
                 |_, _| {
                     taken += 1;
@@ -263,7 +272,7 @@ mod tests {
             .iter()
             .position(|s| s.guidance_torque_nm.to_bits() == 0);
         let error = lie(&|run| run.trace.samples[zero.unwrap()].guidance_torque_nm = -0.0);
-        assert!(error.contains("is -0.0 and 0.0 in lanes and"), "{error}");
+        assert!(error.contains("is -0.0 and 0.0 side by side and"), "{error}");
         let error = lie(&|run| run.trace.samples.truncate(5));
         assert!(error.starts_with("run 0: there are 5 and"), "{error}");
         lie(&|run| run.steps += 1);
@@ -283,7 +292,7 @@ mod tests {
         assert!((875..1126).contains(&count(100_000)), "{}", count(100_000));
     }
 
-    /// With lanes that hand back (exact sensors) and lanes that drive: each run once, in its place.
+    /// Runs that are rejected (exact sensors) and runs that are not: each once, in its place.
     #[test]
     fn every_run_is_driven_once_whoever_drives_it() {
         let scenarios: Vec<Scenario> = (0..21)
@@ -294,12 +303,12 @@ mod tests {
                 builder.sensors(sensors).build().unwrap()
             })
             .collect();
-        let runs = drive_all(&scenarios, 1, |number, run| Ok((number, run.clone()))).unwrap();
+        let runs = run_all(&scenarios, 1, |number, run| Ok((number, run.clone()))).unwrap();
         assert_eq!(runs.len(), 21);
         for (place, (number, run)) in runs.iter().enumerate() {
             assert_eq!((place, run), (*number, &simulate(&scenarios[place])));
         }
-        let refused = drive_all(
+        let refused = run_all(
             &scenarios,
             1,
             |number, _| if number == 5 { Err("5".into()) } else { Ok(()) },

@@ -4,19 +4,21 @@
 use std::sync::Arc;
 
 use haptic_core::params::Params;
+use haptic_core::plausibility;
 
 use super::checks::Checks;
-use super::counts::{ONE, flag, heard, speed_heard};
+use super::counts::{ONE, bits, flag, heard, speed_heard};
 use super::ecu::Ecus;
+use super::rejected::Reason;
 use super::world::Worlds;
-use crate::models::STEP_S;
-use crate::models::road::Centreline;
-use crate::scenario::Scenario;
-use crate::simulation::Plan;
+use haptic_sim::models::STEP_S;
+use haptic_sim::models::road::Centreline;
+use haptic_sim::scenario::Scenario;
+use haptic_sim::simulation::Plan;
 
 /// Slower is not guided, but for a count of the bus; and a bit less than the largest honest step between two messages.
 const SPEED_LSB: i32 = 1 << 16;
-const SPEED_STEP: i32 = (9 << 24) / 10;
+const SPEED_STEP: i32 = bits(0.9 * plausibility::SPEED_STEP.m_per_s());
 
 /// The speeds.
 #[repr(C, align(64))]
@@ -81,7 +83,7 @@ impl<const N: usize> Speeds<N> {
             let speed = heard(run.gain * self.now[l]);
             let is_fast = (speed >= run.least) & (self.now[l] >= run.least_m_per_s);
             let is_sound = is_fast & (speed.wrapping_sub(run.heard).wrapping_abs() < SPEED_STEP);
-            ecus.suspect[l] |= !flag(is_sound) & matters[l];
+            ecus.suspect[l] |= !flag(is_sound) & matters[l] & Reason::Speed.bit();
             if speed != run.heard {
                 run.heard = speed;
                 ecus.hear_speed(l, &run.params, speed);

@@ -1,13 +1,13 @@
 //! What reaches the ECUs in a step: frames of the vehicle, the column and the camera, and what the motors deliver.
 
-use super::{Lanes, WHEEL, YAW_RATE};
+use super::{Runs, WHEEL, YAW_RATE};
 
 /// Of a camera, in ms: its rhythm, and that of the frames.
 const CAMERA_MS: u32 = 25;
 const COLUMN_MS: u32 = 2;
 const VEHICLE_MS: u32 = 10;
 
-impl<const N: usize> Lanes<N> {
+impl<const N: usize> Runs<N> {
     /// The frames of a step reach the ECUs.
     #[inline(always)]
     pub(super) fn hear(&mut self, phase: u32, looks: bool, driver_nm: &[f64; N]) {
