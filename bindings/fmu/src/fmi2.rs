@@ -3,7 +3,8 @@
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::PathBuf;
 
-use crate::unit::{self, DISCARD, ERROR, OK, Pointer, Unit, functions, unit, values};
+use crate::declare::{constant, functions, values};
+use crate::unit::{self, DISCARD, ERROR, OK, Pointer, Unit, unit};
 use crate::variable::Kind;
 
 type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
@@ -122,9 +123,9 @@ pub extern "C" fn fmi2GetVersion() -> *const c_char {
     c"2.0".as_ptr()
 }
 
-unit::constant! { OK; fmi2SetDebugLogging fmi2SetupExperiment fmi2EnterInitializationMode fmi2Terminate }
+constant! { OK; fmi2SetDebugLogging fmi2SetupExperiment fmi2EnterInitializationMode fmi2Terminate }
 // There are no derivatives, and no step that could be waited for or cancelled.
-unit::constant! { ERROR;
+constant! { ERROR;
     fmi2GetDirectionalDerivative fmi2SetRealInputDerivatives fmi2GetRealOutputDerivatives fmi2CancelStep
 }
-unit::constant! { DISCARD; fmi2GetStatus fmi2GetIntegerStatus fmi2GetBooleanStatus fmi2GetStringStatus }
+constant! { DISCARD; fmi2GetStatus fmi2GetIntegerStatus fmi2GetBooleanStatus fmi2GetStringStatus }

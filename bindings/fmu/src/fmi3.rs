@@ -2,7 +2,8 @@
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 
-use crate::unit::{self, ERROR, OK, Pointer, Unit, functions, unit, values};
+use crate::declare::{constant, functions, values};
+use crate::unit::{self, ERROR, OK, Pointer, Unit, unit};
 use crate::variable::Kind;
 
 type Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
@@ -100,9 +101,9 @@ pub extern "C" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
 }
 
-unit::constant! { OK; fmi3SetDebugLogging fmi3EnterInitializationMode fmi3Terminate }
+constant! { OK; fmi3SetDebugLogging fmi3EnterInitializationMode fmi3Terminate }
 // There are no other types, no events, clocks, derivatives, and no structure that could change.
-unit::constant! { ERROR;
+constant! { ERROR;
     fmi3GetFloat32 fmi3GetInt8 fmi3GetUInt8 fmi3GetInt16 fmi3GetUInt16 fmi3GetUInt32 fmi3GetInt64 fmi3GetUInt64
     fmi3GetBinary fmi3GetClock fmi3SetFloat32 fmi3SetInt8 fmi3SetUInt8 fmi3SetInt16 fmi3SetUInt16
     fmi3SetUInt32 fmi3SetInt64 fmi3SetUInt64 fmi3SetBinary fmi3SetClock

@@ -5,6 +5,7 @@
 //! pointers come from the importing tool, as the standards say.
 
 pub mod controller;
+mod declare;
 pub mod driver;
 pub mod fmi2;
 pub mod fmi3;
