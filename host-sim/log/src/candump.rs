@@ -25,8 +25,8 @@ pub fn looks_like_one(text: &str) -> bool {
     let Some(line) = text.lines().map(str::trim).find(|line| !line.is_empty()) else {
         return false;
     };
-    let mut words = line.split_whitespace();
-    line.starts_with('(') || words.nth(2).is_some_and(|word| word.starts_with('['))
+    let count = |word: &str| word.strip_prefix('[')?.strip_suffix(']')?.parse::<u8>().ok();
+    line.starts_with('(') || line.split_whitespace().nth(2).and_then(count).is_some()
 }
 
 /// Every data frame of classic CAN, in the order of the text. Remote, error and FD frames are left out: none of
@@ -173,6 +173,12 @@ mod tests {
             let error = parse(text).unwrap_err();
             assert!(error.starts_with(says), "{error}");
         }
-        assert!(!looks_like_one("time_s,e_y_m\n0,0"));
+        for table in [
+            "time_s,e_y_m\n0,0",
+            "Time [s];Lane error [m];Angle [deg]\n0;0;0",
+            "Wheel angle [deg],T",
+        ] {
+            assert!(!looks_like_one(table));
+        }
     }
 }

@@ -143,7 +143,8 @@ fn the_result_in_the_readme_is_what_the_evaluation_prints() {
         format!("{:.2} m", peak.as_f64().unwrap())
     };
     let sentence = format!(
-        "of a slow driver from {} to {}; a sudden loss of its torque costs that driver {}, and {} if the ECU hands over",
+        "of a slow driver from {} to {}. If its torque is lost at once, the peak is {}; if an input is lost and the ECU hands \
+         over within two seconds, {}.",
         peak("manual", "none"),
         peak("high", "none"),
         peak("high", "torque"),

@@ -228,8 +228,8 @@ pub fn report(evaluation: &Evaluation) -> Report {
          no failure and is drawn for comparison."
     );
     let handed_over = format!(
-        "Above, the torque drops to zero at {failure_s} s. Below, the lane preview stops at {failure_s} s: the ECU holds its \
-         last trusted torque and fades it to zero over 2 s. One second after either the driver steers as manually."
+        "Torque lost: it drops to zero at {failure_s} s. Handed over: the lane preview stops at {failure_s} s, and the ECU takes \
+         its last trusted torque to zero over 2 s. One second after either the driver steers as manually."
     );
     let figure = |name, figure, caption| vec![Block::figure(name, figure, caption)];
     // So many at a time that paper can hold the table.

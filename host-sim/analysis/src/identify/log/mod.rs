@@ -379,7 +379,10 @@ fn find_columns(header: &[String], line: u64, manual: bool) -> Result<[Option<us
         }
     }
     if !missing.is_empty() {
-        return refuse(format!("line {line}: missing column(s): {}", missing.join(", ")));
+        return refuse(format!(
+            "line {line}: missing column(s): {}; --map NAME=COLUMN names a column that is called otherwise",
+            missing.join(", ")
+        ));
     }
     Ok(index)
 }

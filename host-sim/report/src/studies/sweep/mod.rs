@@ -40,7 +40,7 @@ pub fn report(sweep: &Sweep, summary: &Summary, file: &str) -> Report {
     }
     Report {
         title: "Sweep".into(),
-        summary: headline(summary),
+        summary: headline(sweep, summary),
         sections,
         provenance: Provenance::of(Some(sweep.text().into())),
         ..Report::default()
@@ -48,15 +48,17 @@ pub fn report(sweep: &Sweep, summary: &Summary, file: &str) -> Report {
 }
 
 /// How many drives, and how many of them are bad.
-fn headline(summary: &Summary) -> String {
+fn headline(sweep: &Sweep, summary: &Summary) -> String {
     let stopped = if summary.drives < summary.planned {
         format!(" of {} planned: stopped early, as [stop] asks", summary.planned)
     } else {
         String::new()
     };
     let mut text = format!(
-        "{} drives{stopped}, design {}, {} diverged.",
-        summary.drives, summary.design, summary.diverged
+        "{} drives{stopped}{}, {} diverged.",
+        summary.drives,
+        design(sweep),
+        summary.diverged
     );
     if let (Some(limit), Some(beyond)) = (summary.limit, summary.beyond) {
         let share = 100.0 * beyond as f64 / summary.drives.max(1) as f64;
@@ -79,6 +81,15 @@ fn headline(summary: &Summary) -> String {
     text
 }
 
+/// How samples are drawn; nothing where every value meets every other.
+fn design(sweep: &Sweep) -> String {
+    if sweep.samples() > 1 {
+        format!(", design {}", sweep.design())
+    } else {
+        String::new()
+    }
+}
+
 /// What a sweep plans.
 pub fn plan(sweep: &Sweep) -> Report {
     let columns = ["drive", "seed"]
@@ -93,10 +104,10 @@ pub fn plan(sweep: &Sweep) -> Report {
     let table = Table::new("", columns, rows);
     Report {
         summary: format!(
-            "{} drives in {} chunks, design {}",
+            "{} drives in {} chunks{}",
             sweep.drives(),
             sweep.chunks(),
-            sweep.design()
+            design(sweep)
         ),
         sections: vec![Section::new("", vec![Block::Table(table)])],
         ..Report::default()

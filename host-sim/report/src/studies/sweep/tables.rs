@@ -96,7 +96,7 @@ fn shares(summary: &Summary) -> Table {
             .collect()
     };
     Table::new(
-        "Share of each metric's variance that a field explains by itself",
+        "Share of each metric's variance that a field explains by itself; 0 also where the drives are too few to show one",
         columns,
         summary.effects.iter().map(row),
     )
