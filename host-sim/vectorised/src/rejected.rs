@@ -54,11 +54,13 @@ pub enum Reason {
     Motor,
     /// The vehicle leaves the road, or turns wildly.
     OffRoad,
+    /// The vehicle weaves so far that its way is 1 % longer than the course.
+    Detour,
 }
 
 impl Reason {
     /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 18] = [
+    pub const ALL: [(Self, &str); 19] = [
         (
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
@@ -83,6 +85,7 @@ impl Reason {
         (Self::LaneCheck, "near the margin of the lane check"),
         (Self::Motor, "a motor that does not obey"),
         (Self::OffRoad, "off the road"),
+        (Self::Detour, "a way longer than the course"),
     ];
 
     /// Its bit in a run's doubts.
@@ -90,10 +93,10 @@ impl Reason {
         1 << self as u32
     }
 
-    /// The first of a run's doubts; a run that left no whole record was off the road.
+    /// The first of a run's doubts; one without doubts has more samples than there was room for.
     pub(super) fn first_of(doubts: i32) -> Self {
         let first = Self::ALL.get(doubts.trailing_zeros() as usize);
-        first.map_or(Self::OffRoad, |(reason, _)| *reason)
+        first.map_or(Self::Detour, |(reason, _)| *reason)
     }
 }
 
@@ -301,6 +304,6 @@ mod tests {
             Reason::first_of(Reason::Law.bit() | Reason::OffRoad.bit()),
             Reason::Law
         );
-        assert_eq!(Reason::first_of(0), Reason::OffRoad);
+        assert_eq!(Reason::first_of(0), Reason::Detour);
     }
 }

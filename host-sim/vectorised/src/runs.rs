@@ -27,6 +27,8 @@ use haptic_sim::unguided::Cause;
 /// After so many steps everything that is periodic (camera, frames, samples) is where it was, so that a run that begins
 /// then has the others' rhythm.
 const BLOCK: u32 = 50;
+/// How much longer a run's way may be than the course: a vehicle that weaves by 8 degrees to both sides throughout.
+const DETOUR: f64 = 1.01;
 
 /// One step of every run, as [`Step`] has it of one.
 #[derive(Debug, Clone, Copy)]
@@ -133,7 +135,7 @@ impl<const N: usize> Runs<N> {
         let slot = &mut self.slots[lane];
         // Room for the whole run, and for no other: growing would copy it again and again.
         slot.run.trace.samples.clear();
-        let samples = scenario.duration_s() * f64::from(SAMPLE_RATE_HZ);
+        let samples = scenario.duration_s() * DETOUR * f64::from(SAMPLE_RATE_HZ);
         slot.run.trace.samples.reserve(samples as usize + 2);
         slot.scenario = Some(number);
         slot.unguided_cause = 0.0;

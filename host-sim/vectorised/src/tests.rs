@@ -11,6 +11,7 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::real::{Tyres, WorldParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::models::tolerances::Tolerances;
+use haptic_sim::participants::participants;
 use haptic_sim::scenario::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
 };
@@ -239,6 +240,18 @@ fn the_papers_drives_are_the_same_side_by_side() {
         ..DriverParameters::default()
     };
     scenarios.push(Scenario::builder().driver(driver).build().unwrap());
+    // One who weaves: the way is longer than the course.
+    let weaving = participants()[12].guided;
+    let driver = DriverParameters {
+        remnant_sd_nm: 0.072,
+        ..weaving.parameters()
+    };
+    let weaving = Scenario::builder().driver(driver).gains(weaving.gains());
+    let weaving = weaving.condition(Condition::Custom).build().unwrap();
+    let longest = 1000.0 * weaving.duration_s() + 10.0;
+    let steps = simulate(&weaving).steps;
+    assert!(f64::from(steps) > longest, "{steps} {longest} ms");
+    scenarios.push(weaving);
     assert_eq!(
         compare(&scenarios, Width::Widest),
         0,
