@@ -1,9 +1,19 @@
-//! The workbench behind the command line: what needs both the simulator and a target.
+//! A driver and an automation hold one steering wheel: this package drives them in closed loop, with the controller that
+//! runs on the steering ECU. `cargo doc --open` begins here.
 //!
-//! Everything else is in the crates that it is made of: `haptic-sim` (the world and the loop), `haptic-log`,
-//! `haptic-analysis`, `haptic-batch` (studies), `haptic-campaign` (faults), `haptic-pil` (QEMU, boards) and
-//! `haptic-report`. `docs/design.md` draws them. The program is `src/main.rs`, a file for each of its commands below
-//! `src/cli`.
+//! | You want to | begin with |
+//! |---|---|
+//! | step a drive, with a driver, a vehicle or a guidance law of your own | [`haptic_sim::Simulation`], [`haptic_sim::parts`] |
+//! | read or write a log | [`haptic_log::formats`] |
+//! | find a driver's parameters in a log | [`haptic_analysis::identify`] |
+//! | run many drives, or one of the studies | [`haptic_batch`] |
+//! | inject faults and judge what follows | [`haptic_campaign`] |
+//! | compare with QEMU or a board | [`haptic_pil`] |
+//! | draw a result | [`haptic_report`] |
+//! | read what decides the torque | [`haptic_core`] |
+//!
+//! `docs/design.md` draws how they depend on each other. The program is `src/main.rs`, with a file for each of its
+//! commands below `src/cli`; the library holds what needs both the simulator and a target:
 //!
 //! ```
 //! use std::ops::ControlFlow;
