@@ -14,7 +14,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
-use crate::image::{BOARD, M4F};
+use crate::boards::Board;
+use crate::image::{BOARD, Image, M4F, build_command, elf_of};
 use crate::tool::{self, Built, SHAPE, cargo, command, root, run};
 use crate::{
     bench, bindings_agree, boards, by_hand, c_library, evidence, fmu, gate, logs, profiles, python, trace,
@@ -82,13 +83,14 @@ const STAGES: &[Stage] = &[
         "every test of the workspace and its documents",
         tests,
     ),
-    stage("clippy", When::Beside, "lints of the workspace", clippy),
     stage(
         "boards",
         When::Beside,
         "QEMU's boards: lints, frames compared one by one, figures",
         || boards::check(boards::Scope::Qemu, Built::ForTests, false),
     ),
+    // Not beside the begin of the tests: cargo would let them wait for its lock.
+    stage("clippy", When::Beside, "lints of the workspace", clippy),
     stage("page", When::Beside, "the lab, in a headless Chromium", || {
         web::check(Built::ForTests)
     }),
@@ -103,6 +105,12 @@ const STAGES: &[Stage] = &[
         When::Meanwhile,
         "no panic, no wrap and no float in the torque path",
         gate::run,
+    ),
+    stage(
+        "images",
+        When::Meanwhile,
+        "the images that tests start in QEMU",
+        images,
     ),
     stage(
         "recordings",
@@ -414,6 +422,25 @@ fn format() -> Result<()> {
 
 fn build() -> Result<()> {
     run(cargo().arg("build").args(SHAPE).arg("--all-targets"))
+}
+
+/// What tests, boards and the comparison in lock step would each wait for.
+fn images() -> Result<()> {
+    for board in [BOARD, Board::Mps2An500.feature()] {
+        for (image, features) in [
+            (Image::SteeringEcu, ",bench"),
+            (Image::SteeringEcu, ""),
+            (Image::Lockstep, ",bench"),
+            (Image::Lockstep, ""),
+        ] {
+            elf_of(&mut build_command(
+                image.bin(),
+                M4F,
+                &format!("{board}{features}"),
+            ))?;
+        }
+    }
+    Ok(())
 }
 
 /// With the doctests of every library.
