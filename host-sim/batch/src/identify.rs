@@ -65,6 +65,18 @@ pub struct IdentificationResults {
     pub drives_again: Option<RunRecord>,
 }
 
+fn drive_of(name: &str, identification: Identification, tracking: Tracking) -> IdentifiedDrive {
+    IdentifiedDrive {
+        name: name.into(),
+        tracking,
+        results: IdentificationResults {
+            identification,
+            pieces: None,
+            drives_again: None,
+        },
+    }
+}
+
 /// Identifies the driver of `log`.
 ///
 /// # Errors
@@ -82,15 +94,7 @@ pub fn identify(
         }
         Method::Paper => (identify_as_published(log, options)?, track(log, options)),
     };
-    Ok(IdentifiedDrive {
-        name: name.into(),
-        tracking,
-        results: IdentificationResults {
-            identification,
-            pieces: None,
-            drives_again: None,
-        },
-    })
+    Ok(drive_of(name, identification, tracking))
 }
 
 /// Identifies the driver of `log` as of one driver, and of each piece between two changes.
@@ -110,15 +114,7 @@ pub fn identify_pieces(name: &str, log: &DriveLog, options: &Options) -> Result<
 pub fn identify_several(name: &str, logs: &[DriveLog], options: &Options) -> Result<IdentifiedDrive, String> {
     options.check().map_err(|e| e.to_string())?;
     let (identification, tracking) = identify_together_and_track(logs, options).map_err(|e| e.to_string())?;
-    Ok(IdentifiedDrive {
-        name: name.into(),
-        tracking,
-        results: IdentificationResults {
-            identification,
-            pieces: None,
-            drives_again: None,
-        },
-    })
+    Ok(drive_of(name, identification, tracking))
 }
 
 /// Several drivers beside each other.

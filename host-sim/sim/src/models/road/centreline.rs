@@ -390,9 +390,17 @@ impl Centreline {
     }
 }
 
-/// Displacement along a clothoid that starts with `heading` and `curvature`: Gauss-Legendre with five points,
-/// exact to rounding for the small turn of half a cell.
+/// Displacement along a clothoid that starts with `heading` and `curvature`: exact to rounding for the small turn of half a
+/// cell.
 fn arc(heading: f64, curvature: f64, slope: f64, length: f64) -> (f64, f64) {
+    quadrature(length, |s| {
+        let theta = heading + s * (curvature + 0.5 * slope * s);
+        (theta.cos(), theta.sin())
+    })
+}
+
+/// Integral over `[0, end]` by Gauss and Legendre with five points.
+pub(super) fn quadrature(end: f64, f: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
     const NODES: [(f64, f64); 5] = [
         (0.0, 0.568_888_888_888_888_9),
         (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
@@ -400,11 +408,10 @@ fn arc(heading: f64, curvature: f64, slope: f64, length: f64) -> (f64, f64) {
         (0.906_179_845_938_664, 0.236_926_885_056_189_08),
         (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
     ];
-    let half = 0.5 * length;
+    let half = 0.5 * end;
     NODES.iter().fold((0.0, 0.0), |(x, y), (node, weight)| {
-        let s = half * (1.0 + node);
-        let theta = heading + s * (curvature + 0.5 * slope * s);
-        (x + half * weight * theta.cos(), y + half * weight * theta.sin())
+        let (fx, fy) = f(half * (1.0 + node));
+        (x + half * weight * fx, y + half * weight * fy)
     })
 }
 

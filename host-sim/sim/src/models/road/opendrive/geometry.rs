@@ -7,6 +7,7 @@ use roxmltree::Node;
 
 use super::polynomial::Polynomial;
 use super::xml::{cubic, number, text};
+use crate::models::road::centreline::quadrature;
 use crate::models::road::course::MAX_COURSE_M;
 use crate::models::road::piece::Pose;
 
@@ -221,22 +222,6 @@ fn along(curvature: f64, slope: f64, length_m: f64) -> Pose {
         y_m,
         heading_rad,
     }
-}
-
-/// Integral over `[0, end]` by Gauss and Legendre with five points.
-pub(super) fn quadrature(end: f64, f: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
-    const NODES: [(f64, f64); 5] = [
-        (0.0, 0.568_888_888_888_888_9),
-        (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
-        (-0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
-        (0.906_179_845_938_664, 0.236_926_885_056_189_08),
-        (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
-    ];
-    let half = 0.5 * end;
-    NODES.iter().fold((0.0, 0.0), |(x, y), (node, weight)| {
-        let (fx, fy) = f(half * (1.0 + node));
-        (x + half * weight * fx, y + half * weight * fy)
-    })
 }
 
 impl Geometry {

@@ -5,10 +5,11 @@
 //! has another heading, curvature and length than the reference line; all three follow from t and its two
 //! derivatives.
 
-use super::geometry::{Geometry, quadrature};
+use super::geometry::Geometry;
 use super::profile::{Cubic, Profile};
 use super::road::{Road, Section};
 use crate::models::road::Segment;
+use crate::models::road::centreline::quadrature;
 use crate::models::road::piece::{Piece, Pose};
 
 /// Longest piece, m.

@@ -3,7 +3,8 @@
 //! A table of arc lengths finds the parameter. Where a polynomial's true length differs from the one that its element
 //! states, arc length is stretched by the small rest, so that both ends are met.
 
-use super::geometry::{Point, quadrature};
+use super::geometry::Point;
+use crate::models::road::centreline::quadrature;
 use crate::models::road::piece::Pose;
 
 /// Distance between two entries of a table, m.
