@@ -1,5 +1,6 @@
 //! The channels of a trace: in a file, and in the document that describes it.
 
+use haptic_log::recording::{Group, Recording, Series};
 use haptic_log::table::TableError;
 use haptic_log::trace::{CHANNELS, Sample, Trace, table_of_channels};
 
@@ -124,4 +125,28 @@ fn the_document_has_the_table_of_channels() {
         text.contains(&table),
         "docs/reference/formats.md lacks this table:\n{table}"
     );
+}
+
+/// The instants of two groups are one list, in which a negative zero is zero.
+#[test]
+fn groups_that_begin_at_zero_and_at_its_negative_share_the_instant() {
+    let group = |name: &str, time_s: Vec<f64>, values: Vec<f64>| Group {
+        name: name.into(),
+        time_s,
+        channels: vec![Series {
+            name: format!("{name}_nm"),
+            unit: "N.m".into(),
+            source: String::new(),
+            values,
+        }],
+    };
+    let groups = vec![
+        group("a", vec![-0.0, 0.1], vec![1.0, 2.0]),
+        group("b", vec![0.0, 0.1, 0.2], vec![3.0, 4.0, 5.0]),
+    ];
+    let one = Recording { groups }.into_one_group().unwrap();
+    assert_eq!(one.time_s, [0.0, 0.1, 0.2]);
+    assert_eq!(one.channels[0].values[..2], [1.0, 2.0]);
+    assert!(one.channels[0].values[2].is_nan());
+    assert_eq!(one.channels[1].values, [3.0, 4.0, 5.0]);
 }

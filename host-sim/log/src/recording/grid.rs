@@ -25,18 +25,15 @@ impl Recording {
                 .count()
                 > 1
         };
-        let mut time_s: Vec<f64> = self
-            .groups
-            .iter()
-            .flat_map(|g| g.time_s.iter().copied())
-            .collect();
+        // Zero is added so that a negative zero, which some loggers write first, is the same instant as zero.
+        let instants = |g: &Group| g.time_s.iter().map(|t| t + 0.0).collect::<Vec<f64>>();
+        let mut time_s: Vec<f64> = self.groups.iter().flat_map(instants).collect();
         time_s.sort_by(f64::total_cmp);
         time_s.dedup();
         let mut channels = Vec::new();
         for group in &self.groups {
             // Two frames of a message with one time stamp: the later one counts.
-            let places: Vec<usize> = group
-                .time_s
+            let places: Vec<usize> = instants(group)
                 .iter()
                 .map(|t| time_s.partition_point(|u| u.total_cmp(t).is_lt()))
                 .collect();
