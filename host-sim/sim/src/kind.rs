@@ -69,7 +69,6 @@ impl Parameter {
 }
 
 /// How a part is made of a scenario and of the values of its kind's parameters, in their order.
-#[derive(Debug)]
 pub enum Make<P: ?Sized> {
     /// By itself.
     Part(fn(&Scenario, &[f64]) -> Result<Box<P>, ScenarioError>),
@@ -78,7 +77,6 @@ pub enum Make<P: ?Sized> {
 }
 
 /// A kind of law or driver.
-#[derive(Debug)]
 pub struct Kind<P: ?Sized + 'static> {
     /// Its name in a file.
     pub name: &'static str,
