@@ -60,7 +60,9 @@ fn the_paper_s_law_as_a_law_of_one_s_own_is_the_shipping_ecu() {
 
 /// A law that asks for what no law should.
 #[derive(Clone)]
-struct Hostile(fn(u32) -> f64);
+struct Hostile(Ask);
+
+type Ask = fn(u32) -> f64;
 
 impl Law for Hostile {
     fn ask(&mut self, view: &LawView) -> f64 {
@@ -72,7 +74,8 @@ impl Law for Hostile {
 /// N.m/s down where the driver does not oppose.
 #[test]
 fn the_envelope_holds_whatever_a_law_asks_for() {
-    let laws: [(fn(u32) -> f64, bool); 7] = [
+    // Whether it is to be silent.
+    let laws: [(Ask, bool); 7] = [
         (|_| f64::NAN, true),
         (|_| f64::INFINITY, false),
         (|_| f64::NEG_INFINITY, false),

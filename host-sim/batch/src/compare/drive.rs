@@ -83,8 +83,7 @@ pub(super) fn drive(
     let (mut peaks, mut failed_off_road) = ([Vec::new(), Vec::new()], 0);
     let mut samples = Vec::new();
     loop {
-        while let Some((step, failure)) = next.next_if(|(step, _)| *step == trunk.steps()) {
-            debug_assert_eq!(*step, trunk.steps());
+        while let Some((_, failure)) = next.next_if(|(step, _)| *step == trunk.steps()) {
             if let Some(fork) = trunk.fork_at(*failure) {
                 let peak_m = peak_after(fork, faults.lasts_s);
                 failed_off_road += u32::from(peak_m >= DIVERGED_M);

@@ -188,107 +188,110 @@ fn a_law_of_one_s_own_joins() {
     }
 }
 
+/// What stands in the file, what stands there instead, and what is said of it.
+const WRONG: [(&str, &str, &str); 24] = [
+    (
+        "k_1 = 0.25",
+        "k_1 = 5",
+        "study.toml: law published.k_1 = 5 is outside 0 to 4",
+    ),
+    (
+        "k_1 = 0.25",
+        "k_1 = nan",
+        "law published.k_1 = NaN is outside 0 to 4",
+    ),
+    (
+        "k_1 = 0.25",
+        "k_1 = 'much'",
+        "law published: k_1 = \"much\": a number is wanted",
+    ),
+    (
+        "k_1 = 0.25",
+        "gain = 1",
+        "law published: there is no \"gain\", only k_1, a_1, a_2, a_3, a_4",
+    ),
+    (
+        "kind = 'paper'",
+        "kind = 'papper'",
+        "law.kind: there is no \"papper\", only none, paper, fdca",
+    ),
+    (
+        "kind = 'paper'",
+        "kind = 'driver_limit'",
+        "law.kind: there is no \"driver_limit\"",
+    ),
+    (
+        "max_nm = 2",
+        "max_nm = -1",
+        "law more: driver_limit.max_nm = -1 is outside 0 to 10",
+    ),
+    (
+        "kind = 'own_line'",
+        "kind = 'paper'",
+        "driver aside: around.kind: there is no \"paper\", only own_line, trust",
+    ),
+    (
+        "around = [{ kind = 'own_line', offset_m = 0.3 }]",
+        "around = 1",
+        "driver aside: around = 1: a list of tables is wanted",
+    ),
+    (
+        "name = 'aside'",
+        "name = 'paper'",
+        "driver \"paper\" is there twice",
+    ),
+    ("name = 'short'", "name = 'a/b'", "a name is 1 to 40 letters"),
+    ("seeds = 2", "seeds = 0", "seeds = 0 is outside 1 to 1000"),
+    ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
+    ("seeds = 2", "seedz = 2", "unknown field `seedz`"),
+    (
+        "speeds_kmh = [50, 60]",
+        "speeds_kmh = []",
+        "speeds_kmh = []: one at least is wanted",
+    ),
+    (
+        "speeds_kmh = [50, 60]",
+        "speeds_kmh = [300]",
+        "speed = 300 km/h is outside 20 to 250 km/h",
+    ),
+    ("['road.toml']", "['lost.toml']", "lost.toml"),
+    (
+        "lasts_s = 5",
+        "lasts_s = 0",
+        "faults.lasts_s = 0 s is outside 1 to 600 s",
+    ),
+    (
+        "[scenario]\n",
+        "[scenario]\nseed = 4\n",
+        "scenario.seed: the comparison has its own seeds",
+    ),
+    (
+        "[scenario]\n",
+        "[scenario]\ncondition = 'manual'\n",
+        "a law of kind \"none\" is no guidance",
+    ),
+    ("[scenario]\n", "[scenario]\nsped = 4\n", "sped"),
+    (
+        "[scenario]\n",
+        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\n[scenario]\n",
+        "tuning.budget = 0 is outside 1 to 10000",
+    ),
+    (
+        "[scenario]\n",
+        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { luck = 1 }\n[scenario]\n",
+        "tuning.weights: there is no \"luck\", only peak_lateral_error_m",
+    ),
+    (
+        "seeds = 2",
+        "seeds = 1000\nroads = ['road.toml']\nseed = 'x",
+        "study.toml: ",
+    ),
+];
+
 #[test]
 fn a_wrong_file_is_refused_by_field_value_and_range() {
     let kinds = Kinds::default();
-    for (from, to, says) in [
-        (
-            "k_1 = 0.25",
-            "k_1 = 5",
-            "study.toml: law published.k_1 = 5 is outside 0 to 4",
-        ),
-        (
-            "k_1 = 0.25",
-            "k_1 = nan",
-            "law published.k_1 = NaN is outside 0 to 4",
-        ),
-        (
-            "k_1 = 0.25",
-            "k_1 = 'much'",
-            "law published: k_1 = \"much\": a number is wanted",
-        ),
-        (
-            "k_1 = 0.25",
-            "gain = 1",
-            "law published: there is no \"gain\", only k_1, a_1, a_2, a_3, a_4",
-        ),
-        (
-            "kind = 'paper'",
-            "kind = 'papper'",
-            "law.kind: there is no \"papper\", only none, paper, fdca",
-        ),
-        (
-            "kind = 'paper'",
-            "kind = 'driver_limit'",
-            "law.kind: there is no \"driver_limit\"",
-        ),
-        (
-            "max_nm = 2",
-            "max_nm = -1",
-            "law more: driver_limit.max_nm = -1 is outside 0 to 10",
-        ),
-        (
-            "kind = 'own_line'",
-            "kind = 'paper'",
-            "driver aside: around.kind: there is no \"paper\", only own_line, trust",
-        ),
-        (
-            "around = [{ kind = 'own_line', offset_m = 0.3 }]",
-            "around = 1",
-            "driver aside: around = 1: a list of tables is wanted",
-        ),
-        (
-            "name = 'aside'",
-            "name = 'paper'",
-            "driver \"paper\" is there twice",
-        ),
-        ("name = 'short'", "name = 'a/b'", "a name is 1 to 40 letters"),
-        ("seeds = 2", "seeds = 0", "seeds = 0 is outside 1 to 1000"),
-        ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
-        ("seeds = 2", "seedz = 2", "unknown field `seedz`"),
-        (
-            "speeds_kmh = [50, 60]",
-            "speeds_kmh = []",
-            "speeds_kmh = []: one at least is wanted",
-        ),
-        (
-            "speeds_kmh = [50, 60]",
-            "speeds_kmh = [300]",
-            "speed = 300 km/h is outside 20 to 250 km/h",
-        ),
-        ("['road.toml']", "['lost.toml']", "lost.toml"),
-        (
-            "lasts_s = 5",
-            "lasts_s = 0",
-            "faults.lasts_s = 0 s is outside 1 to 600 s",
-        ),
-        (
-            "[scenario]\n",
-            "[scenario]\nseed = 4\n",
-            "scenario.seed: the comparison has its own seeds",
-        ),
-        (
-            "[scenario]\n",
-            "[scenario]\ncondition = 'manual'\n",
-            "a law of kind \"none\" is no guidance",
-        ),
-        ("[scenario]\n", "[scenario]\nsped = 4\n", "sped"),
-        (
-            "[scenario]\n",
-            "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\n[scenario]\n",
-            "tuning.budget = 0 is outside 1 to 10000",
-        ),
-        (
-            "[scenario]\n",
-            "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { luck = 1 }\n[scenario]\n",
-            "tuning.weights: there is no \"luck\", only peak_lateral_error_m",
-        ),
-        (
-            "seeds = 2",
-            "seeds = 1000\nroads = ['road.toml']\nseed = 'x",
-            "study.toml: ",
-        ),
-    ] {
+    for (from, to, says) in WRONG {
         let text = FILE.replacen(from, to, 1);
         assert_ne!(text, FILE, "{from}");
         let error = compare(&text, &kinds).err().unwrap().to_string();
