@@ -20,73 +20,47 @@ use super::{AnyDriver, Kind, Make};
 use crate::guidance::LaneErrors;
 use crate::kind::Parameter;
 use crate::laws::weight;
-use crate::models::road::Centreline;
 use crate::models::{STEP_S, step_of};
 use crate::parts::{Driver, DriverView};
+use crate::scenario::Scenario;
 use crate::seeds::{Stream, named};
-use std::sync::Arc;
 
 /// Torques of at most this size have no sign, N.m: as in the metric of conflict.
 const DEAD_BAND_NM: f64 = 0.005;
 /// Over which the shares of conflict and help are taken, s.
 const MEMORY_S: f64 = 5.0;
 
-/// A habit around a driver: what it makes of a view, and of the torque.
+/// A driver with a habit: a function that shows the driver a view of its own, and makes a torque of the answer.
 #[derive(Clone)]
 struct Around<H> {
     driver: Box<dyn AnyDriver>,
     habit: H,
 }
 
-trait Habit: Clone + Send + Sync + 'static {
-    /// What the driver perceives.
-    fn perceives(&mut self, view: &DriverView) -> DriverView {
-        *view
-    }
-
-    /// What becomes of the driver's torque, N.m.
-    fn acts(&mut self, _view: &DriverView, torque_nm: f64) -> f64 {
-        torque_nm
-    }
-}
-
-impl<H: Habit> Driver for Around<H> {
+impl<H: FnMut(&DriverView, &mut dyn AnyDriver) -> f64> Driver for Around<H> {
     fn look_ahead_s(&self) -> [f64; 2] {
         self.driver.look_ahead_s()
     }
 
     fn step(&mut self, view: &DriverView) -> f64 {
-        let perceived = self.habit.perceives(view);
-        let torque_nm = self.driver.step(&perceived);
-        self.habit.acts(view, torque_nm)
+        (self.habit)(view, self.driver.as_mut())
     }
 }
 
-fn around(driver: Box<dyn AnyDriver>, habit: impl Habit) -> Box<dyn AnyDriver> {
+fn around<H>(driver: Box<dyn AnyDriver>, habit: H) -> Box<dyn AnyDriver>
+where
+    H: FnMut(&DriverView, &mut dyn AnyDriver) -> f64 + Clone + Send + Sync + 'static,
+{
     Box::new(Around { driver, habit })
 }
 
-#[derive(Clone)]
-struct OwnLine {
-    road: Arc<Centreline>,
-    offset_m: f64,
-    cut_m2: f64,
-}
-
-impl Habit for OwnLine {
-    fn perceives(&mut self, view: &DriverView) -> DriverView {
-        let (_, curvature, _) = self.road.at(view.points_m[0]);
-        let line_m = self.offset_m + self.cut_m2 * curvature;
-        let lane = LaneErrors {
-            e_y_m: view.lane.e_y_m + line_m,
-            ..view.lane
-        };
-        DriverView { lane, ..*view }
-    }
+fn seeing(view: &DriverView, e_y_m: f64, e_theta_rad: f64) -> DriverView {
+    let lane = LaneErrors { e_y_m, e_theta_rad };
+    DriverView { lane, ..*view }
 }
 
 /// The shares of time in which driver and guidance turn against each other, and together.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 struct Shares([f64; 2]);
 
 impl Shares {
@@ -101,120 +75,89 @@ impl Shares {
     }
 }
 
-#[derive(Clone)]
-struct Trust {
-    k_hg: f64,
-    gains: [f64; 2],
-    weight: f64,
-    shock: f64,
-    muscle: f64,
-    shares: Shares,
-    felt_nm: f64,
-    was_lost: bool,
+fn own_line(scenario: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let (road, offset_m, cut_m2) = (scenario.course().centreline(), v[0], v[1]);
+    around(driver, move |view, driver| {
+        let (_, curvature, _) = road.at(view.points_m[0]);
+        let line_m = offset_m + cut_m2 * curvature;
+        driver.step(&seeing(view, view.lane.e_y_m + line_m, view.lane.e_theta_rad))
+    })
 }
 
-impl Habit for Trust {
-    fn perceives(&mut self, view: &DriverView) -> DriverView {
-        DriverView {
+fn trust(scenario: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let (mut k_hg, g_c, g_h, follows, shock) = (v[0], v[1], v[2], weight(v[3]), v[4]);
+    let muscle = weight(scenario.driver().t_nms);
+    let (mut shares, mut felt_nm, mut was_lost) = (Shares::default(), 0.0, false);
+    around(driver, move |view, driver| {
+        let deaf = DriverView {
             guidance_torque_nm: 0.0,
             ..*view
-        }
-    }
-
-    fn acts(&mut self, view: &DriverView, torque_nm: f64) -> f64 {
-        let answer_nm = torque_nm - self.felt_nm;
-        let [conflict, help] = self.shares.step(answer_nm, view.guidance_torque_nm);
-        let wanted = (0.5 + self.gains[0] * conflict - self.gains[1] * help).clamp(0.0, 1.0);
-        self.k_hg += self.weight * (wanted - self.k_hg);
-        if view.is_lost && !self.was_lost {
-            self.k_hg = (self.k_hg + self.shock).min(1.0);
-        }
-        self.was_lost = view.is_lost;
-        self.felt_nm += self.muscle * (self.k_hg * view.guidance_torque_nm - self.felt_nm);
-        answer_nm
-    }
-}
-
-#[derive(Clone)]
-struct Tiring {
-    delay_s: f64,
-    loss: f64,
-    duration_s: f64,
-    /// What was seen, the newest last.
-    seen: VecDeque<LaneErrors>,
-}
-
-impl Habit for Tiring {
-    fn perceives(&mut self, view: &DriverView) -> DriverView {
-        let tired = (view.time_s() / self.duration_s).min(1.0);
-        self.seen.push_back(view.lane);
-        if self.seen.len() > step_of(self.delay_s) as usize + 1 {
-            self.seen.pop_front();
-        }
-        let back = (step_of(self.delay_s * tired) as usize).min(self.seen.len() - 1);
-        let seen = self.seen[self.seen.len() - 1 - back];
-        let counts = 1.0 - self.loss * tired;
-        let lane = LaneErrors {
-            e_y_m: counts * seen.e_y_m,
-            e_theta_rad: counts * seen.e_theta_rad,
         };
-        DriverView { lane, ..*view }
-    }
-}
-
-#[derive(Clone)]
-struct Lapses {
-    per_step: f64,
-    lasts_steps: u32,
-    random: Xoshiro256PlusPlus,
-    /// What is seen, and until which step.
-    lapse: Option<(LaneErrors, u32)>,
-}
-
-impl Habit for Lapses {
-    fn perceives(&mut self, view: &DriverView) -> DriverView {
-        let draw: f64 = self.random.random();
-        if self
-            .lapse
-            .is_some_and(|(_, until)| view.warning || view.step >= until)
-        {
-            self.lapse = None;
+        let answer_nm = driver.step(&deaf) - felt_nm;
+        let [conflict, help] = shares.step(answer_nm, view.guidance_torque_nm);
+        k_hg += follows * ((0.5 + g_c * conflict - g_h * help).clamp(0.0, 1.0) - k_hg);
+        if view.is_lost && !was_lost {
+            k_hg = (k_hg + shock).min(1.0);
         }
-        if self.lapse.is_none() && !view.warning && draw < self.per_step {
-            self.lapse = Some((view.lane, view.step + self.lasts_steps));
+        was_lost = view.is_lost;
+        felt_nm += muscle * (k_hg * view.guidance_torque_nm - felt_nm);
+        answer_nm
+    })
+}
+
+fn tiring(_: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let (delay_s, loss, duration_s) = (v[0], v[1], v[2]);
+    // What was seen, the newest last.
+    let mut all = VecDeque::new();
+    around(driver, move |view, driver| {
+        let tired = (view.time_s() / duration_s).min(1.0);
+        all.push_back(view.lane);
+        if all.len() > step_of(delay_s) as usize + 1 {
+            all.pop_front();
         }
-        let lane = self.lapse.map_or(view.lane, |(lane, _)| lane);
-        DriverView { lane, ..*view }
-    }
+        let back = (step_of(delay_s * tired) as usize).min(all.len() - 1);
+        let seen: LaneErrors = all[all.len() - 1 - back];
+        let counts = 1.0 - loss * tired;
+        driver.step(&seeing(view, counts * seen.e_y_m, counts * seen.e_theta_rad))
+    })
 }
 
-#[derive(Clone)]
-struct Warning {
-    answers: bool,
+fn lapses(scenario: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let (per_step, lasts_steps) = (STEP_S / v[0], step_of(v[1]));
+    let seed = named(Stream::World.seed(scenario.seed()), "lapses");
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    // What is seen, and until which step.
+    let mut lapse: Option<(LaneErrors, u32)> = None;
+    around(driver, move |view, driver| {
+        let draw: f64 = random.random();
+        if lapse.is_some_and(|(_, until)| view.warning || view.step >= until) {
+            lapse = None;
+        }
+        if lapse.is_none() && !view.warning && draw < per_step {
+            lapse = Some((view.lane, view.step + lasts_steps));
+        }
+        let lane = lapse.map_or(view.lane, |(lane, _)| lane);
+        driver.step(&DriverView { lane, ..*view })
+    })
 }
 
-impl Habit for Warning {
-    fn perceives(&mut self, view: &DriverView) -> DriverView {
-        let is_lost = self.answers && view.warning;
-        DriverView { is_lost, ..*view }
-    }
+fn warning(_: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let answers = v[0] >= 0.5;
+    around(driver, move |view, driver| {
+        let is_lost = answers && view.warning;
+        driver.step(&DriverView { is_lost, ..*view })
+    })
 }
 
-#[derive(Clone)]
-struct Stiffening {
-    stiffness: f64,
-    damping: f64,
-    shares: Shares,
-    held_rad: f64,
-}
-
-impl Habit for Stiffening {
-    fn acts(&mut self, view: &DriverView, torque_nm: f64) -> f64 {
-        let [conflict, _] = self.shares.step(torque_nm, view.guidance_torque_nm);
-        self.held_rad += weight(0.5) * (view.wheel_angle_rad - self.held_rad);
-        let spring_nm = self.stiffness * (view.wheel_angle_rad - self.held_rad);
-        torque_nm - conflict * (spring_nm + self.damping * view.wheel_rate_rad_per_s)
-    }
+fn stiffening(_: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let (stiffness, damping, mut shares, mut held_rad) = (v[0], v[1], Shares::default(), 0.0);
+    around(driver, move |view, driver| {
+        let torque_nm = driver.step(view);
+        let [conflict, _] = shares.step(torque_nm, view.guidance_torque_nm);
+        held_rad += weight(0.5) * (view.wheel_angle_rad - held_rad);
+        let spring_nm = stiffness * (view.wheel_angle_rad - held_rad);
+        torque_nm - conflict * (spring_nm + damping * view.wheel_rate_rad_per_s)
+    })
 }
 
 pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
@@ -225,17 +168,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
             Parameter::ours("offset_m", 0.3, [-2.0, 2.0]),
             Parameter::ours("cut_m2", 0.0, [-500.0, 500.0]),
         ],
-        make: Make::Around(|scenario, v, driver| {
-            let road = scenario.course().centreline();
-            around(
-                driver,
-                OwnLine {
-                    road,
-                    offset_m: v[0],
-                    cut_m2: v[1],
-                },
-            )
-        }),
+        make: Make::Around(own_line),
     },
     Kind {
         name: "trust",
@@ -247,19 +180,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
             Parameter::ours("tau_s", 30.0, [0.1, 1000.0]),
             Parameter::ours("shock", 0.4, [0.0, 1.0]),
         ],
-        make: Make::Around(|scenario, v, driver| {
-            let habit = Trust {
-                k_hg: v[0],
-                gains: [v[1], v[2]],
-                weight: weight(v[3]),
-                shock: v[4],
-                muscle: weight(scenario.driver().t_nms),
-                shares: Shares::default(),
-                felt_nm: 0.0,
-                was_lost: false,
-            };
-            around(driver, habit)
-        }),
+        make: Make::Around(trust),
     },
     Kind {
         name: "tiring",
@@ -269,15 +190,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
             Parameter::ours("loss", 0.3, [0.0, 1.0]),
             Parameter::ours("duration_s", 600.0, [1.0, 100_000.0]),
         ],
-        make: Make::Around(|_, v, driver| {
-            let habit = Tiring {
-                delay_s: v[0],
-                loss: v[1],
-                duration_s: v[2],
-                seen: VecDeque::new(),
-            };
-            around(driver, habit)
-        }),
+        make: Make::Around(tiring),
     },
     Kind {
         name: "lapses",
@@ -286,24 +199,13 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
             Parameter::ours("every_s", 30.0, [0.1, 100_000.0]),
             Parameter::ours("lasts_s", 2.0, [0.0, 60.0]),
         ],
-        make: Make::Around(|scenario, v, driver| {
-            let habit = Lapses {
-                per_step: STEP_S / v[0],
-                lasts_steps: step_of(v[1]),
-                random: Xoshiro256PlusPlus::seed_from_u64(named(
-                    Stream::World.seed(scenario.seed()),
-                    "lapses",
-                )),
-                lapse: None,
-            };
-            around(driver, habit)
-        }),
+        make: Make::Around(lapses),
     },
     Kind {
         name: "warning",
         source: "ours",
         parameters: &[Parameter::ours("answers", 1.0, [0.0, 1.0])],
-        make: Make::Around(|_, v, driver| around(driver, Warning { answers: v[0] >= 0.5 })),
+        make: Make::Around(warning),
     },
     Kind {
         name: "stiffening",
@@ -312,14 +214,6 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
             Parameter::ours("stiffness_nm_per_rad", 10.0, [0.0, 100.0]),
             Parameter::ours("damping_nm_s_per_rad", 0.5, [0.0, 10.0]),
         ],
-        make: Make::Around(|_, v, driver| {
-            let habit = Stiffening {
-                stiffness: v[0],
-                damping: v[1],
-                shares: Shares::default(),
-                held_rad: 0.0,
-            };
-            around(driver, habit)
-        }),
+        make: Make::Around(stiffening),
     },
 ];
