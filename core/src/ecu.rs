@@ -1,6 +1,7 @@
 //! The ECU: frames in, frames out. Holds one controller, the receivers of its inputs, the monitor, and the
 //! counters of its own frames. Firmware and simulator carry bytes to it and from it, nothing more.
 
+mod another_law;
 #[cfg(feature = "fault-injection")]
 pub mod injection;
 mod receivers;

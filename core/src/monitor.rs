@@ -197,6 +197,16 @@ impl Monitor {
         state.now.withdrawn == 0
     }
 
+    /// The monitor of a simulator's ECU with another law than (9): the band around (9) is as wide as the absolute limit, and
+    /// so refuses nothing that the limit does not. The other rules are the product's.
+    #[must_use]
+    pub const fn of_another_law(self) -> Self {
+        Self {
+            band_mnm: self.limit_mnm,
+            ..self
+        }
+    }
+
     /// `abs(T) <= L + 3*(0.8 - opposing)`.
     fn leaves_the_driver_in_charge(&self, torque: i32, driver: i32) -> bool {
         let bound = self.bound(torque, driver);

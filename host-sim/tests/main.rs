@@ -1,6 +1,7 @@
 //! The command line's tests, one program: a module a subject. `cargo test -p host-sim documents::` runs one of them.
 
 mod cli;
+mod compare;
 mod course;
 mod documents;
 mod file_fields;

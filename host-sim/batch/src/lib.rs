@@ -11,6 +11,7 @@
 //! - [`run`]: one scenario.
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
+//! - [`compare`]: every law against every driver.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
@@ -36,6 +37,7 @@ pub mod availability;
 mod away;
 pub mod bus_load;
 pub mod claims;
+pub mod compare;
 pub mod course;
 pub mod design;
 pub mod evaluate;

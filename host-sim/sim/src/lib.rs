@@ -39,10 +39,13 @@
 //! the controller (`haptic-campaign`).
 
 pub mod action;
+pub mod drivers;
 pub mod ecu_events;
 pub mod fork;
 pub mod guidance;
 pub mod input;
+pub mod kind;
+pub mod laws;
 pub mod models;
 pub mod participants;
 pub mod parts;

@@ -8,6 +8,7 @@
 
 mod availability;
 mod checkpoint;
+mod compare;
 mod convert;
 mod course;
 mod design;
@@ -73,6 +74,8 @@ enum Command {
     ///
     /// Fields vary by lists, ranges and distributions; threads and shards share the drives.
     Sweep(sweep::Arguments),
+    /// Every law against every driver, each law tuned first: roads, speeds, seeds, failures
+    Compare(compare::Arguments),
     /// A road from a file: its lane, length and picture, its centre every metre
     Course(course::Arguments),
     /// A map over speed and delay: where a driver keeps the lane, alone and guided
@@ -170,6 +173,7 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Experiment(arguments) => experiment::run(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Sweep(arguments) => sweep::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
         Command::Course(arguments) => course::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),
         Command::Lab(arguments) => lab::run(arguments),

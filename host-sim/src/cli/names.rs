@@ -8,7 +8,10 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 /// The commands as `--help` lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("The paper", &["evaluate", "experiment"]),
-    ("Drive", &["run", "sweep", "course", "stability", "lab"]),
+    (
+        "Drive",
+        &["run", "sweep", "compare", "course", "stability", "lab"],
+    ),
     (
         "People",
         &["identify", "drivers", "design", "study", "validate", "convert"],

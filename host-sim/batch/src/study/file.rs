@@ -108,7 +108,7 @@ pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study
     })
 }
 
-fn check_names<'a>(what: &str, names: impl IntoIterator<Item = &'a String>) -> Result<(), String> {
+pub(crate) fn check_names<'a>(what: &str, names: impl IntoIterator<Item = &'a String>) -> Result<(), String> {
     let mut seen = BTreeSet::new();
     for name in names {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';

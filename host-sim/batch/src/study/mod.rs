@@ -23,7 +23,9 @@ use haptic_sim::scenario::{Condition, Scenario};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use file::check_names;
 pub use order::Order;
+pub(crate) use paired::interval_of_mean;
 pub use paired::{Difference, of_participants};
 
 use crate::left_by_themselves;

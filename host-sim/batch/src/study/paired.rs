@@ -79,6 +79,11 @@ fn mean_of(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
+/// Mean and its 95 % interval, Student's; none of a single value.
+pub(crate) fn interval_of_mean(values: &[f64]) -> Option<(f64, Option<[f64; 2]>)> {
+    paired(values).map(|(mean, interval, _)| (mean, interval))
+}
+
 /// Mean, its interval and d_z of differences.
 fn paired(differences: &[f64]) -> Option<(f64, Option<[f64; 2]>, Option<f64>)> {
     let mean = mean_of(differences)?;

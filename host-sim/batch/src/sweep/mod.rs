@@ -24,7 +24,7 @@ mod point;
 mod resolve;
 mod run;
 mod saltelli;
-mod sobol;
+pub(crate) mod sobol;
 mod store;
 mod summary;
 mod table;

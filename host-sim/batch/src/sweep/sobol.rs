@@ -4,7 +4,7 @@
 //! The crates that there are stop at 65,536 points or go only from one point to the next.
 
 /// Dimensions that there are numbers for.
-pub(super) const DIMENSIONS: usize = 40;
+pub(crate) const DIMENSIONS: usize = 40;
 
 /// For each dimension after the first: the inner coefficients of its primitive polynomial, and its first numbers.
 const DIRECTIONS: [(u32, &[u32]); DIMENSIONS - 1] = [
@@ -51,11 +51,11 @@ const DIRECTIONS: [(u32, &[u32]); DIMENSIONS - 1] = [
 
 /// One dimension of the sequence.
 #[derive(Debug, Clone)]
-pub(super) struct Dimension([u32; 32]);
+pub(crate) struct Dimension([u32; 32]);
 
 impl Dimension {
     /// From 0 to `DIMENSIONS - 1`; beyond it the last.
-    pub(super) fn new(number: usize) -> Self {
+    pub(crate) fn new(number: usize) -> Self {
         let mut v = [0_u32; 32];
         let Some(&(inner, first)) = number.min(DIMENSIONS - 1).checked_sub(1).map(|i| &DIRECTIONS[i]) else {
             for (bit, v) in v.iter_mut().enumerate() {
@@ -79,7 +79,7 @@ impl Dimension {
     }
 
     /// The `n`-th number, as 32 bits behind the point.
-    pub(super) fn at(&self, n: u32) -> u32 {
+    pub(crate) fn at(&self, n: u32) -> u32 {
         let gray = n ^ (n >> 1);
         let bits = (0..32).filter(|bit| (gray >> bit) & 1 == 1);
         bits.fold(0, |x, bit| x ^ self.0[bit])

@@ -3,6 +3,7 @@
 pub mod availability;
 pub mod bus;
 mod changes;
+pub mod compare;
 pub mod course;
 mod curves;
 pub mod design;

@@ -2,6 +2,7 @@
 //!
 //! - [`OverBus`]: the shipping ECU behind its bus frames, with the paper's sensors.
 //! - [`Direct`]: the shipping controller, fed past the bus with full resolution every step.
+//! - [`OwnLaw`]: another law behind the shipping ECU, for comparison.
 //! - [`FloatLaw`]: a float64 evaluation of equation (9), the reference that the others are held against.
 //! - [`NoGuidance`]: manual driving.
 //!
@@ -13,6 +14,7 @@ mod any;
 mod direct;
 mod float_law;
 mod over_bus;
+mod own_law;
 
 use haptic_core::bus::Frame;
 use haptic_core::envelope::LimitReason;
@@ -26,6 +28,7 @@ pub use any::AnyGuidance;
 pub use direct::Direct;
 pub use float_law::FloatLaw;
 pub use over_bus::OverBus;
+pub use own_law::OwnLaw;
 
 /// Lane errors at the guidance's own points, as they truly are.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -10,7 +10,7 @@ use haptic_core::bus::messages::{
     Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Telemetry, Vehicle,
 };
 use haptic_core::config::Setup;
-use haptic_core::ecu::Ecu;
+use haptic_core::ecu::{Ecu, Step};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use heapless::Vec;
 
@@ -94,22 +94,21 @@ impl OverBus {
             let _ = self.sent.push(demand.encode(counter));
         }
     }
-}
 
-impl Guidance for OverBus {
-    fn looks_at_road(&self, step: u32) -> bool {
-        sensors::camera_looks(step)
-    }
-
+    /// A step: the frames to the ECU, its step, its frames back.
     #[inline]
-    fn step(&mut self, observation: &Observation) -> Actuation {
+    pub(super) fn exchange(
+        &mut self,
+        observation: &Observation,
+        step: impl FnOnce(&mut Ecu, Instant) -> Step,
+    ) -> Actuation {
         let now = observation.now();
         self.send(observation);
         for frame in &self.sent {
             // The ECU judges by itself, keeps the last good frame and reports what it misses.
             let _ = self.ecu.receive(frame, now);
         }
-        let step = self.ecu.step(now);
+        let step = step(&mut self.ecu, now);
         self.answers.clear();
         // MAX_ANSWERS has a place for each.
         let _ = self.answers.push(step.guidance);
@@ -134,6 +133,17 @@ impl Guidance for OverBus {
                 .map(|reading| [reading.k_hg.si(), reading.deviation.si()]);
         }
         self.applied
+    }
+}
+
+impl Guidance for OverBus {
+    fn looks_at_road(&self, step: u32) -> bool {
+        sensors::camera_looks(step)
+    }
+
+    #[inline]
+    fn step(&mut self, observation: &Observation) -> Actuation {
+        self.exchange(observation, Ecu::step)
     }
 
     fn status(&self) -> Option<Status> {

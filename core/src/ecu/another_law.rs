@@ -1,0 +1,33 @@
+//! A step with another law in the place of (9), for simulators that compare laws. All behind the law is the product's: the
+//! probe, the envelope, the mode machine, the monitor ([`crate::monitor::Monitor::of_another_law`]).
+//!
+//! Not here: faults that are injected (`injection`), and any law.
+
+use super::{Ecu, Step};
+use crate::injection::Injection;
+use crate::quantity::{Instant, Torque};
+
+/// What another law asks for.
+struct Asked(Torque);
+
+impl Injection for Asked {
+    fn law(&self, _: Torque) -> Torque {
+        self.0
+    }
+
+    fn monitor_passes(&self, _: &[u8; 8]) -> bool {
+        false
+    }
+
+    fn lane_never_ages(&self) -> bool {
+        false
+    }
+}
+
+impl Ecu {
+    /// [`Ecu::step`], where `asked` is what the law asks for.
+    #[inline(never)]
+    pub fn step_with_law(&mut self, now: Instant, asked: Torque) -> Step {
+        self.step_with(now, &Asked(asked))
+    }
+}

@@ -1,0 +1,224 @@
+//! The file of a comparison, checked before anything is driven.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use haptic_sim::input::{InputError, parse_toml};
+use haptic_sim::models::road::Course;
+use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use super::drive::METRICS;
+use super::parts::{Source, parts, unknown};
+use super::{Compare, Drives, Faults, Kinds, Tuning};
+use crate::study::check_names;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    #[serde(default = "one")]
+    seed: u64,
+    seeds: u64,
+    roads: Vec<String>,
+    speeds_kmh: Vec<f64>,
+    #[serde(default)]
+    scenario: Table,
+    #[serde(default)]
+    faults: FaultsFile,
+    tuning: Option<TuningFile>,
+    law: Vec<Table>,
+    driver: Vec<Table>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct FaultsFile {
+    sudden_loss: u64,
+    silent_lane: u64,
+    lasts_s: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TuningFile {
+    budget: u64,
+    seeds: u64,
+    roads: Vec<String>,
+    speeds_kmh: Vec<f64>,
+    weights: Option<BTreeMap<String, f64>>,
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// What is weighed where a file says nothing: 1 m of peak, 1 N.m of effort and 1 N.m of conflict count alike (chosen here).
+const WEIGHTS: [&str; 3] = [
+    "peak_lateral_error_m",
+    "mean_abs_driver_torque_nm",
+    "conflict_torque_nm",
+];
+/// Most drives of a comparison.
+const MOST_DRIVES: f64 = 1e6;
+/// How long a failed drive goes on if a file says nothing, s.
+const LASTS_S: f64 = 15.0;
+
+pub(super) fn load<'k>(path: &Path, kinds: &'k Kinds) -> Result<Compare<'k>, InputError> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|e| InputError::new(&name, e))?;
+    from_text(&name, &text, path.parent().unwrap_or(Path::new("")), kinds)
+}
+
+pub(super) fn from_text<'k>(
+    name: &str,
+    text: &str,
+    folder: &Path,
+    kinds: &'k Kinds,
+) -> Result<Compare<'k>, InputError> {
+    let source = Source {
+        name: name.into(),
+        folder,
+    };
+    let file: File = parse_toml(name, text)?;
+    check_names("comparison", [&file.name]).map_err(|e| source.bad(e))?;
+    let laws = parts(&source, "law", &file.law, &kinds.laws)?;
+    let drivers = parts(&source, "driver", &file.driver, &kinds.drivers)?;
+    let judged = drives(
+        &source,
+        "",
+        &file.scenario,
+        &file.roads,
+        &file.speeds_kmh,
+        file.seeds,
+    )?;
+    let tuning = file
+        .tuning
+        .as_ref()
+        .map(|t| tuning(&source, &file.scenario, t))
+        .transpose()?;
+    let faults = Faults {
+        sudden_loss: source.count("faults.sudden_loss", file.faults.sudden_loss, 0.0, 1000.0)?,
+        silent_lane: source.count("faults.silent_lane", file.faults.silent_lane, 0.0, 1000.0)?,
+        lasts_s: file.faults.lasts_s.unwrap_or(LASTS_S),
+    };
+    source.within("faults.lasts_s", faults.lasts_s, 1.0, 600.0, "s")?;
+    let compare = Compare {
+        name: file.name,
+        seed: file.seed,
+        laws,
+        drivers,
+        judged,
+        tuning,
+        faults,
+    };
+    check_parts(&source, &compare)?;
+    Ok(compare)
+}
+
+/// Every law and driver can be made, and there are not too many drives.
+fn check_parts(source: &Source, compare: &Compare) -> Result<(), InputError> {
+    let count = |drives: &Drives, sets: usize| {
+        (sets * compare.drivers.len() * drives.places.len()) as f64 * f64::from(drives.seeds)
+    };
+    let tuned = compare
+        .tuning
+        .as_ref()
+        .map_or(0.0, |t| count(&t.drives, compare.laws.len() * t.budget as usize));
+    source.within(
+        "laws x drivers x roads x speeds x seeds, with tuning",
+        tuned + count(&compare.judged, compare.laws.len()),
+        1.0,
+        MOST_DRIVES,
+        "",
+    )?;
+    let (_, _, scenario) = &compare.judged.places[0];
+    for law in &compare.laws {
+        law.make(scenario, &law.untuned())
+            .map_err(|e| source.bad(format!("law {}: {e}", law.name)))?;
+    }
+    for driver in &compare.drivers {
+        driver
+            .make(scenario, &driver.untuned())
+            .map_err(|e| source.bad(format!("driver {}: {e}", driver.name)))?;
+    }
+    Ok(())
+}
+
+fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning, InputError> {
+    let mut weights = vec![0.0; METRICS.len()];
+    let given = file.weights.clone();
+    for (name, weight) in given.unwrap_or_else(|| WEIGHTS.map(|name| (name.into(), 1.0)).into()) {
+        // Training drives have no failures.
+        let place = METRICS[..7].iter().position(|metric| metric.name == name);
+        let place = place.ok_or_else(|| {
+            source.bad(unknown(
+                "tuning.weights",
+                &name,
+                METRICS[..7].iter().map(|m| m.name),
+            ))
+        })?;
+        source.within(&format!("tuning.weights.{name}"), weight, 0.0, 1e6, "")?;
+        weights[place] = weight;
+    }
+    Ok(Tuning {
+        budget: source.count("tuning.budget", file.budget, 1.0, 10_000.0)?,
+        drives: drives(
+            source,
+            "tuning.",
+            scenario,
+            &file.roads,
+            &file.speeds_kmh,
+            file.seeds,
+        )?,
+        weights,
+    })
+}
+
+/// The places of drives: a scenario for each road and speed.
+fn drives(
+    source: &Source,
+    table: &str,
+    fields: &Table,
+    roads: &[String],
+    speeds_kmh: &[f64],
+    seeds: u64,
+) -> Result<Drives, InputError> {
+    let seeds = source.count(&format!("{table}seeds"), seeds, 1.0, 1000.0)?;
+    for (field, is_empty) in [("roads", roads.is_empty()), ("speeds_kmh", speeds_kmh.is_empty())] {
+        if is_empty {
+            return Err(source.bad(format!("{table}{field} = []: one at least is wanted")));
+        }
+    }
+    for field in ["seed", "course", "speed", "failure", "driver_change"] {
+        if fields.contains_key(field) {
+            return Err(source.bad(format!(
+                "scenario.{field}: the comparison has its own seeds, roads, speeds, faults and drivers"
+            )));
+        }
+    }
+    let mut places = Vec::new();
+    for road in roads {
+        let here = format!("{}: {table}roads {road}", source.name);
+        let mut fields = fields.clone();
+        fields.insert("course".into(), Value::String(road.clone()));
+        let scenario = Scenario::from_toml(&here, &fields.to_string(), |course, lane| {
+            let path = source.folder.join(course);
+            let bytes = std::fs::read(&path).map_err(|e| InputError::new(path.display(), e))?;
+            Course::from_text(course, &String::from_utf8_lossy(&bytes), lane)
+        })?;
+        if scenario.condition() == Condition::Manual || scenario.failure().kind != FailureKind::None {
+            return Err(source.bad("scenario.condition = \"manual\": a law of kind \"none\" is no guidance"));
+        }
+        for speed_kmh in speeds_kmh {
+            let built = scenario.to_builder().speed_kmh(*speed_kmh).build();
+            places.push((
+                road.clone(),
+                *speed_kmh,
+                built.map_err(|e| InputError::new(&here, e))?,
+            ));
+        }
+    }
+    Ok(Drives { places, seeds })
+}

@@ -1,0 +1,235 @@
+//! What a comparison found: means over places with intervals over seeds, law by law and driver by driver.
+
+use serde::Serialize;
+
+use super::drive::{Driven, METRICS, Metric};
+use super::tune::Tuned;
+use super::{Compare, Faults, Job};
+use crate::study::interval_of_mean;
+
+/// A mean with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mean {
+    /// Over places and seeds.
+    pub mean: f64,
+    /// Its 95 % interval, Student's over the seeds; none of a single seed.
+    pub interval_95: Option<[f64; 2]>,
+}
+
+/// A law as it was judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LawResult {
+    /// Its name in the file.
+    pub name: String,
+    /// Its kind, and what is around it.
+    pub kind: String,
+    /// Where it is published.
+    pub source: &'static str,
+    /// Its parameters.
+    pub values: Vec<(&'static str, f64)>,
+    /// The objective before and after tuning.
+    pub objective: Option<[f64; 2]>,
+}
+
+/// A law with a driver.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cell {
+    /// Place of the law.
+    pub law: usize,
+    /// Place of the driver.
+    pub driver: usize,
+    /// In the order of the metrics.
+    pub values: Vec<Option<Mean>>,
+    /// Less what the first law has, drive by drive.
+    pub against_first: Vec<Option<Mean>>,
+    /// Drives that left the road.
+    pub off_road: usize,
+    /// Drives in which the ECU ended guidance by its own decision.
+    pub left_by_itself: usize,
+    /// Failed drives that left the road.
+    pub failed_off_road: u32,
+}
+
+/// A row of the table of drives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveRow {
+    /// Law, driver and road.
+    pub names: [String; 3],
+    /// Speed, km/h.
+    pub speed_kmh: f64,
+    /// Number of the seed.
+    pub seed: u32,
+    /// What came of it.
+    pub driven: Driven,
+}
+
+/// What a comparison found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CompareResults {
+    /// Its name.
+    pub name: String,
+    /// What it was judged by.
+    pub metrics: Vec<Metric>,
+    /// As listed.
+    pub laws: Vec<LawResult>,
+    /// Names and kinds, as listed.
+    pub drivers: Vec<[String; 2]>,
+    /// Road and speed of each place.
+    pub places: Vec<(String, f64)>,
+    /// Drives at each place.
+    pub seeds: u32,
+    /// Sets that were tried for each law with something to tune.
+    pub budget: u32,
+    /// Instants of a sudden loss and of a silent lane in each drive.
+    pub instants: [u32; 2],
+    /// By law, then driver.
+    pub cells: Vec<Cell>,
+    /// Every judged drive.
+    #[serde(skip)]
+    pub rows: Vec<DriveRow>,
+}
+
+impl CompareResults {
+    /// The table of drives, with a row each.
+    pub fn to_csv(&self) -> String {
+        let names = METRICS.map(|metric| metric.name).join(",");
+        let mut text = format!(
+            "law,driver,road,speed_kmh,seed,{names},off_road,guidance_left_by_itself,failed_off_road\n"
+        );
+        for row in &self.rows {
+            let Driven {
+                values,
+                off_road,
+                left_by_itself,
+                failed_off_road,
+            } = &row.driven;
+            let values = values
+                .map(|value| value.map_or(String::new(), |value| value.to_string()))
+                .join(",");
+            let (off_road, left) = (u8::from(*off_road), u8::from(*left_by_itself));
+            // A road's name may have a comma in it.
+            let names = row.names.each_ref().map(|name| name.replace(',', ";")).join(",");
+            text += &format!(
+                "{names},{},{},{values},{off_road},{left},{failed_off_road}\n",
+                row.speed_kmh, row.seed
+            );
+        }
+        text
+    }
+}
+
+pub(super) fn sum_up(
+    compare: &Compare,
+    tuned: Vec<Tuned>,
+    jobs: &[Job],
+    driven: &[Driven],
+) -> CompareResults {
+    let drivers = compare.drivers.len();
+    let each = driven.len() / (compare.laws.len() * drivers);
+    let of_cell = |law: usize, driver: usize| &driven[(law * drivers + driver) * each..][..each];
+    let seeds = compare.judged.seeds;
+    let cell = |number: usize| {
+        let (law, driver) = (number / drivers, number % drivers);
+        let (own, first) = (of_cell(law, driver), of_cell(0, driver));
+        let metric = |metric: usize| mean(seeds, own.iter().map(|d| d.values[metric]));
+        let difference = |metric: usize| {
+            let pairs = own.iter().zip(first);
+            mean(
+                seeds,
+                pairs.map(|(own, first)| Some(own.values[metric]? - first.values[metric]?)),
+            )
+        };
+        Cell {
+            law,
+            driver,
+            values: (0..METRICS.len()).map(metric).collect(),
+            against_first: (0..METRICS.len()).map(difference).collect(),
+            off_road: own.iter().filter(|d| d.off_road).count(),
+            left_by_itself: own.iter().filter(|d| d.left_by_itself).count(),
+            failed_off_road: own.iter().map(|d| d.failed_off_road).sum(),
+        }
+    };
+    let row = |(job, driven): (&Job, &Driven)| {
+        let (road, speed_kmh, _) = &compare.judged.places[job.place];
+        DriveRow {
+            names: [
+                compare.laws[job.law].name.clone(),
+                compare.drivers[job.driver].name.clone(),
+                road.clone(),
+            ],
+            speed_kmh: *speed_kmh,
+            seed: job.seed,
+            driven: driven.clone(),
+        }
+    };
+    let Faults {
+        sudden_loss,
+        silent_lane,
+        ..
+    } = compare.faults;
+    CompareResults {
+        name: compare.name.clone(),
+        metrics: METRICS.into(),
+        laws: compare.laws.iter().zip(tuned).map(law_result).collect(),
+        drivers: compare
+            .drivers
+            .iter()
+            .map(|d| {
+                [
+                    d.name.clone(),
+                    kinds(d.kind.name, d.around.iter().map(|(k, _)| k.name)),
+                ]
+            })
+            .collect(),
+        places: compare
+            .judged
+            .places
+            .iter()
+            .map(|(road, kmh, _)| (road.clone(), *kmh))
+            .collect(),
+        seeds,
+        budget: compare.tuning.as_ref().map_or(0, |t| t.budget),
+        instants: [sudden_loss, silent_lane],
+        cells: (0..compare.laws.len() * drivers).map(cell).collect(),
+        rows: jobs.iter().zip(driven).map(row).collect(),
+    }
+}
+
+fn law_result((law, tuned): (&super::Chosen<'_, dyn super::Law>, Tuned)) -> LawResult {
+    LawResult {
+        name: law.name.clone(),
+        kind: kinds(law.kind.name, law.around.iter().map(|(k, _)| k.name)),
+        source: law.kind.source,
+        values: law
+            .kind
+            .parameters
+            .iter()
+            .map(|p| p.name)
+            .zip(tuned.values)
+            .collect(),
+        objective: tuned.objective,
+    }
+}
+
+fn kinds(kind: &str, around: impl Iterator<Item = &'static str>) -> String {
+    around.fold(kind.to_owned(), |inner, outer| format!("{outer}({inner})"))
+}
+
+/// Of values by place, then seed: each seed's mean over the places that have a value, then over the seeds.
+fn mean(seeds: u32, values: impl Iterator<Item = Option<f64>>) -> Option<Mean> {
+    let mut sums = vec![(0.0, 0_u32); seeds as usize];
+    for (number, value) in values.enumerate() {
+        if let Some(value) = value {
+            let (sum, count) = &mut sums[number % seeds as usize];
+            *sum += value;
+            *count += 1;
+        }
+    }
+    let of_seeds: Vec<f64> = sums
+        .into_iter()
+        .filter(|(_, count)| *count > 0)
+        .map(|(sum, count)| sum / f64::from(count))
+        .collect();
+    let (mean, interval_95) = interval_of_mean(&of_seeds)?;
+    Some(Mean { mean, interval_95 })
+}

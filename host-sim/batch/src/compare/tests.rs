@@ -1,0 +1,300 @@
+//! A comparison on a short road: its figures against drives by themselves and sums by hand, its files against what they say.
+
+use haptic_sim::guidance::OwnLaw;
+use haptic_sim::laws::LawView;
+use haptic_sim::parts::{PaperDriver, PaperVehicle};
+use haptic_sim::scenario::{Failure, FailureKind};
+use haptic_sim::{Scenario, Simulation};
+
+use super::*;
+
+const ROAD: &str =
+    "lane_width = 3.6\n[[segment]]\nlength = 200\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+const FILE: &str = "
+name = 'short'
+seeds = 2
+roads = ['road.toml']
+speeds_kmh = [50, 60]
+[scenario]
+driver = { remnant_sd = 0.1 }
+[faults]
+sudden_loss = 2
+silent_lane = 1
+lasts_s = 5
+[[law]]
+name = 'published'
+kind = 'paper'
+k_1 = 0.25
+a_1 = 2
+[[law]]
+name = 'more'
+kind = 'paper'
+k_1 = 0.4
+around = [{ kind = 'driver_limit', max_nm = 2 }]
+[[driver]]
+kind = 'paper'
+[[driver]]
+name = 'aside'
+kind = 'paper'
+k_hg = 0
+around = [{ kind = 'own_line', offset_m = 0.3 }]
+";
+const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { peak_lateral_error_m = 1 }\n";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("road.toml"), ROAD).unwrap();
+    folder
+}
+
+fn compare<'k>(text: &str, kinds: &'k Kinds) -> Result<Compare<'k>, InputError> {
+    file::from_text("study.toml", text, folder().path(), kinds)
+}
+
+fn results(text: &str) -> CompareResults {
+    let kinds = Kinds::default();
+    compare(text, &kinds).unwrap().run(|| ()).unwrap()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_results() {
+    let text = FILE.replacen("[faults]", &format!("{TUNING}[faults]"), 1);
+    let on = |threads| on_threads(Some(threads), || results(&text)).unwrap();
+    let (one, three) = (on(1), on(3));
+    assert_eq!(one, three);
+    assert_eq!(one.to_csv(), three.to_csv());
+    // Two laws, two drivers, two speeds, two seeds, and a heading.
+    assert_eq!(one.to_csv().lines().count(), 17);
+}
+
+/// The first drive, driven by itself by other means: its peaks without failure, and after each failure.
+#[test]
+fn a_drive_and_its_failures_are_those_of_the_simulator() {
+    let kinds = Kinds::default();
+    let compare = compare(FILE, &kinds).unwrap();
+    let found = compare.run(|| ()).unwrap();
+    let (road, speed_kmh, scenario) = &compare.judged.places[0];
+    let seed = named(named(1, "judged"), &format!("{road} {speed_kmh} 0")) >> 11;
+    let scenario = scenario.to_builder().seed(seed).build().unwrap();
+    let peak_m = |failure: Option<(FailureKind, f64)>| {
+        let from_s = failure.map_or(0.0, |(_, time_s)| time_s);
+        let until_s = failure.map_or(f64::INFINITY, |(_, time_s)| time_s + 5.0);
+        let (kind, time_s) = failure.unwrap_or((FailureKind::None, 0.0));
+        let scenario: Scenario = scenario
+            .to_builder()
+            .failure(Failure {
+                kind,
+                time_s,
+                duration_s: None,
+            })
+            .build()
+            .unwrap();
+        let driver = PaperDriver::new(&scenario);
+        let guidance = OwnLaw::new(&scenario, haptic_sim::laws::Gains::PAPER);
+        let run = Simulation::of_parts(&scenario, driver, PaperVehicle::new(&scenario), guidance).run();
+        let samples = run
+            .trace
+            .samples
+            .iter()
+            .filter(|s| s.time_s >= from_s && s.time_s < until_s);
+        samples.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max)
+    };
+    let values = found.rows[0].driven.values;
+    assert_eq!(values[0], Some(peak_m(None)));
+    // A quarter and three quarters of what is left of the drive before the last 5 s; half of it.
+    let span_s = scenario.duration_s() - 5.0;
+    let at = |share: f64| (share * span_s * 1000.0).floor() / 1000.0;
+    let losses = [0.25, 0.75].map(|share| peak_m(Some((FailureKind::Torque, at(share)))));
+    assert_eq!(values[7], Some(losses[0].max(losses[1])));
+    assert_eq!(values[8], Some(0.5 * (losses[0] + losses[1])));
+    assert_eq!(values[9], Some(peak_m(Some((FailureKind::Input, at(0.5))))));
+}
+
+/// Means, and the interval of two values a and b by Student's t with one degree of freedom: 12.7062*abs(a - b)/2.
+#[test]
+fn means_and_intervals_are_those_of_the_rows() {
+    let found = results(FILE);
+    let peak = |law: usize, driver: usize, place: usize, seed: usize| {
+        found.rows[((law * 2 + driver) * 2 + place) * 2 + seed]
+            .driven
+            .values[0]
+            .unwrap()
+    };
+    for law in 0..2 {
+        for driver in 0..2 {
+            let cell = &found.cells[law * 2 + driver];
+            assert_eq!((cell.law, cell.driver), (law, driver));
+            let seeds = [0, 1].map(|seed| 0.5 * (peak(law, driver, 0, seed) + peak(law, driver, 1, seed)));
+            let apart =
+                [0, 1].map(|seed| seeds[seed] - 0.5 * (peak(0, driver, 0, seed) + peak(0, driver, 1, seed)));
+            for (value, [a, b]) in [(cell.values[0], seeds), (cell.against_first[0], apart)] {
+                let Mean { mean, interval_95 } = value.unwrap();
+                let half = 0.5 * 12.706_204_7 * (a - b).abs();
+                assert!((mean - 0.5 * (a + b)).abs() < 1e-12);
+                assert!((interval_95.unwrap()[1] - mean - half).abs() < 1e-6);
+            }
+        }
+    }
+}
+
+/// What a file sets stays; what it leaves open is tuned, and the best of the budget is no worse than what it began with.
+#[test]
+fn tuning_varies_what_a_file_leaves_open() {
+    let text = FILE.replacen("[faults]", &format!("{TUNING}[faults]"), 1);
+    let kinds = Kinds::default();
+    let compare = compare(&text, &kinds).unwrap();
+    // 2 x 2 x 2 x 2 judged, 4 sets of the second law with 2 drivers.
+    assert_eq!(compare.drives(), 24);
+    let found = compare.run(|| ()).unwrap();
+    assert_eq!(found.laws[0].objective, None);
+    let [before, after] = found.laws[1].objective.unwrap();
+    assert!(after < before, "{before} {after}");
+    assert_eq!(found.laws[1].values[0], ("k_1", 0.4));
+    assert!((2.0..=6.0).contains(&found.laws[1].values[1].1) && found.laws[1].values[1].1 != 2.0);
+    assert_eq!(found.laws[1].kind, "driver_limit(paper)");
+}
+
+/// A law that no list has, and one that asks for no number.
+#[test]
+fn a_law_of_one_s_own_joins() {
+    #[derive(Clone)]
+    struct Silent;
+    impl Law for Silent {
+        fn ask(&mut self, _: &LawView) -> f64 {
+            f64::NAN
+        }
+    }
+    let mut kinds = Kinds::default();
+    kinds.laws.push(Kind {
+        name: "silent",
+        source: "this test",
+        parameters: &[],
+        make: Make::Part(|_, _| Ok(Box::new(Silent))),
+    });
+    let text = FILE.replacen(
+        "name = 'more'\nkind = 'paper'\nk_1 = 0.4\naround = [{ kind = 'driver_limit', max_nm = 2 }]",
+        "kind = 'silent'",
+        1,
+    );
+    let text = text.replacen("k_1 = 0.25\na_1 = 2\n", "", 1).replacen(
+        "name = 'published'\nkind = 'paper'",
+        "kind = 'none'",
+        1,
+    );
+    let found = compare(&text, &kinds).unwrap().run(|| ()).unwrap();
+    // Two drivers, two speeds, two seeds for each law.
+    for (none, silent) in found.rows[..8].iter().zip(&found.rows[8..]) {
+        assert_eq!(none.driven, silent.driven);
+    }
+}
+
+/// What stands in the file, what stands there instead, and what is said of it.
+const WRONG: [(&str, &str, &str); 24] = [
+    (
+        "k_1 = 0.25",
+        "k_1 = 5",
+        "study.toml: law published.k_1 = 5 is outside 0 to 4",
+    ),
+    (
+        "k_1 = 0.25",
+        "k_1 = nan",
+        "law published.k_1 = NaN is outside 0 to 4",
+    ),
+    (
+        "k_1 = 0.25",
+        "k_1 = 'much'",
+        "law published: k_1 = \"much\": a number is wanted",
+    ),
+    (
+        "k_1 = 0.25",
+        "gain = 1",
+        "law published: there is no \"gain\", only k_1, a_1, a_2, a_3, a_4",
+    ),
+    (
+        "kind = 'paper'",
+        "kind = 'papper'",
+        "law.kind: there is no \"papper\", only none, paper, fdca",
+    ),
+    (
+        "kind = 'paper'",
+        "kind = 'driver_limit'",
+        "law.kind: there is no \"driver_limit\"",
+    ),
+    (
+        "max_nm = 2",
+        "max_nm = -1",
+        "law more: driver_limit.max_nm = -1 is outside 0 to 10",
+    ),
+    (
+        "kind = 'own_line'",
+        "kind = 'paper'",
+        "driver aside: around.kind: there is no \"paper\", only own_line, trust",
+    ),
+    (
+        "around = [{ kind = 'own_line', offset_m = 0.3 }]",
+        "around = 1",
+        "driver aside: around = 1: a list of tables is wanted",
+    ),
+    (
+        "name = 'aside'",
+        "name = 'paper'",
+        "driver \"paper\" is there twice",
+    ),
+    ("name = 'short'", "name = 'a/b'", "a name is 1 to 40 letters"),
+    ("seeds = 2", "seeds = 0", "seeds = 0 is outside 1 to 1000"),
+    ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
+    ("seeds = 2", "seedz = 2", "unknown field `seedz`"),
+    (
+        "speeds_kmh = [50, 60]",
+        "speeds_kmh = []",
+        "speeds_kmh = []: one at least is wanted",
+    ),
+    (
+        "speeds_kmh = [50, 60]",
+        "speeds_kmh = [300]",
+        "speed = 300 km/h is outside 20 to 250 km/h",
+    ),
+    ("['road.toml']", "['lost.toml']", "lost.toml"),
+    (
+        "lasts_s = 5",
+        "lasts_s = 0",
+        "faults.lasts_s = 0 s is outside 1 to 600 s",
+    ),
+    (
+        "[scenario]\n",
+        "[scenario]\nseed = 4\n",
+        "scenario.seed: the comparison has its own seeds",
+    ),
+    (
+        "[scenario]\n",
+        "[scenario]\ncondition = 'manual'\n",
+        "a law of kind \"none\" is no guidance",
+    ),
+    ("[scenario]\n", "[scenario]\nsped = 4\n", "sped"),
+    (
+        "[scenario]\n",
+        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\n[scenario]\n",
+        "tuning.budget = 0 is outside 1 to 10000",
+    ),
+    (
+        "[scenario]\n",
+        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { luck = 1 }\n[scenario]\n",
+        "tuning.weights: there is no \"luck\", only peak_lateral_error_m",
+    ),
+    (
+        "seeds = 2",
+        "seeds = 1000\nroads = ['road.toml']\nseed = 'x",
+        "study.toml: ",
+    ),
+];
+
+#[test]
+fn a_wrong_file_is_refused_by_field_value_and_range() {
+    let kinds = Kinds::default();
+    for (from, to, says) in WRONG {
+        let text = FILE.replacen(from, to, 1);
+        assert_ne!(text, FILE, "{from}");
+        let error = compare(&text, &kinds).err().unwrap().to_string();
+        assert!(error.contains(says), "{to}: {error}");
+    }
+}

@@ -1,0 +1,249 @@
+//! What a comparison of laws and drivers shows: a matrix for each metric, what each driver pays, and where a law does not help.
+
+use crate::document::{Block, Cell, Report, Section, Table};
+use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use haptic_batch::compare::{Cell as Pair, CompareResults, Mean, Metric};
+
+/// Metrics of the terminal's matrices, and of the list of what a law makes worse.
+const FIRST: [&str; 4] = [
+    "peak_lateral_error_m",
+    "mean_abs_driver_torque_nm",
+    "conflict_torque_nm",
+    "worst_peak_after_loss_m",
+];
+
+/// The document of a comparison.
+pub fn report(results: &CompareResults) -> Report {
+    let matrices = results
+        .metrics
+        .iter()
+        .enumerate()
+        .filter(|(place, _)| has_values(results, *place));
+    let blocks = matrices.flat_map(|(place, metric)| {
+        let name = format!("matrix-{}", metric.name);
+        let figure = Block::figure(name, figure(results, place, metric), caption(metric));
+        let table = Block::Table(matrix(results, place, metric));
+        let table = if FIRST.contains(&metric.name) {
+            table
+        } else {
+            table.on_page()
+        };
+        [figure, table]
+    });
+    let first = &results.laws[0].name;
+    let verdicts = vec![Block::Text(judgement(results)), Block::Table(worse(results))];
+    Report {
+        title: format!("Laws and drivers: {}", results.name),
+        summary: summary(results),
+        notes: notes(results),
+        sections: vec![
+            Section::new("The laws", vec![Block::Table(laws(results))]),
+            Section::new("Laws by drivers", blocks.collect()),
+            Section::new(format!("Against {first}"), verdicts),
+        ],
+        ..Report::default()
+    }
+}
+
+fn summary(results: &CompareResults) -> String {
+    let [losses, silences] = results.instants;
+    let places: Vec<String> = results
+        .places
+        .iter()
+        .map(|(road, kmh)| format!("{road} at {kmh} km/h"))
+        .collect();
+    format!(
+        "{} laws behind the shipping ECU, {} drivers, {}, {} seeds each. In each drive {losses} instants of a sudden loss and {silences} of \
+         a silent lane. Intervals are of 95 %, over the seeds.",
+        results.laws.len(),
+        results.drivers.len(),
+        places.join(", "),
+        results.seeds
+    )
+}
+
+/// Drives of which the means know little.
+fn notes(results: &CompareResults) -> Vec<String> {
+    let name = |pair: &Pair| {
+        format!(
+            "{} with {}",
+            results.laws[pair.law].name, results.drivers[pair.driver][0]
+        )
+    };
+    let counted = |what: &str, count: fn(&Pair) -> usize| {
+        let found: Vec<String> = results
+            .cells
+            .iter()
+            .filter(|pair| count(pair) > 0)
+            .map(|pair| format!("{} ({})", name(pair), count(pair)))
+            .collect();
+        (!found.is_empty()).then(|| format!("{what}: {}", found.join(", ")))
+    };
+    let all = [
+        counted(
+            "drives that left the road, which count as a peak of 10 m",
+            |pair| pair.off_road,
+        ),
+        counted("failed drives that left the road, likewise", |pair| {
+            pair.failed_off_road as usize
+        }),
+        counted("drives in which the ECU ended guidance by itself", |pair| {
+            pair.left_by_itself
+        }),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+fn laws(results: &CompareResults) -> Table {
+    let row = |law: &haptic_batch::compare::LawResult| {
+        let values: Vec<String> = law
+            .values
+            .iter()
+            .map(|(name, value)| format!("{name} {}", rounded(*value)))
+            .collect();
+        let [before, after] = law.objective.map_or([None; 2], |objective| objective.map(Some));
+        vec![
+            Cell::text(&law.name),
+            Cell::text(&law.kind),
+            Cell::text(law.source),
+            Cell::number(before, 4),
+            Cell::number(after, 4),
+            Cell::Text(values.join(", ")),
+        ]
+    };
+    let caption = match results.budget {
+        0 => "Laws as they were judged".into(),
+        budget => format!(
+            "Laws as they were judged: the best of {budget} sets each, by the objective on the training drives"
+        ),
+    };
+    let columns = [
+        "Law",
+        "Kind",
+        "Source",
+        "Objective untuned",
+        "Tuned",
+        "Parameters",
+    ];
+    Table::new(caption, columns, results.laws.iter().map(row))
+}
+
+/// Four digits, which tell a set again.
+fn rounded(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}
+
+fn caption(metric: &Metric) -> String {
+    let better = if metric.more_is_better { "More" } else { "Less" };
+    format!(
+        "{} ({}) by law, a panel for each driver, with 95 % intervals. {better} is better.",
+        metric.label, metric.unit
+    )
+}
+
+fn has_values(results: &CompareResults, metric: usize) -> bool {
+    results.cells.iter().any(|pair| pair.values[metric].is_some())
+}
+
+/// A mean and half of its interval.
+fn with_interval(value: Option<&Mean>) -> Cell {
+    let text = |value: &Mean| match value.interval_95 {
+        Some([low, high]) => format!("{:.3} \u{b1} {:.3}", value.mean, 0.5 * (high - low)),
+        None => format!("{:.3}", value.mean),
+    };
+    Cell::Text(value.map_or("\u{2013}".into(), text))
+}
+
+fn matrix(results: &CompareResults, place: usize, metric: &Metric) -> Table {
+    let of_law = |(number, law): (usize, &haptic_batch::compare::LawResult)| {
+        let cells = results.cells.iter().filter(|pair| pair.law == number);
+        let values = cells.map(|pair| with_interval(pair.values[place].as_ref()));
+        [Cell::text(&law.name)].into_iter().chain(values).collect()
+    };
+    let columns = ["Law".to_owned()]
+        .into_iter()
+        .chain(results.drivers.iter().map(|[name, _]| name.clone()));
+    let caption = format!("{} ({})", metric.label, metric.unit);
+    Table::new(caption, columns, results.laws.iter().enumerate().map(of_law))
+}
+
+fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
+    let panel = |(number, [name, _]): (usize, &[String; 2])| {
+        let cells = results.cells.iter().filter(|pair| pair.driver == number);
+        let found: Vec<(f64, Mean)> = cells
+            .filter_map(|pair| Some((pair.law as f64 + 1.0, pair.values[place]?)))
+            .collect();
+        let points = found.iter().map(|(x, value)| (*x, value.mean)).collect();
+        let ends = found
+            .iter()
+            .map(|(_, value)| value.interval_95.unwrap_or([value.mean; 2]))
+            .collect();
+        Panel {
+            title: name.clone(),
+            y: Axis::of(metric.label, metric.unit),
+            series: vec![Series::with_mark("", 0, Mark::Whiskers(ends), points)],
+        }
+    };
+    Figure {
+        rows: results.laws.iter().map(|law| law.name.clone()).collect(),
+        same_y: true,
+        panels: results.drivers.iter().enumerate().map(panel).collect(),
+        ..Figure::default()
+    }
+}
+
+/// Differences to the first law whose interval does not hold zero: with + if the law is better there.
+fn clear(results: &CompareResults) -> impl Iterator<Item = (&Pair, &Metric, Mean, bool)> {
+    let pairs = results.cells.iter().filter(|pair| pair.law > 0);
+    pairs.flat_map(|pair| {
+        let metrics = results
+            .metrics
+            .iter()
+            .zip(&pair.against_first)
+            .filter(|(metric, _)| FIRST.contains(&metric.name));
+        metrics.filter_map(move |(metric, difference)| {
+            let difference = (*difference)?;
+            let [low, high] = difference.interval_95?;
+            let is_less = high < 0.0;
+            (is_less || low > 0.0).then_some((pair, metric, difference, is_less != metric.more_is_better))
+        })
+    })
+}
+
+/// How often each law is clearly better and worse than the first, over drivers and the first metrics.
+fn judgement(results: &CompareResults) -> String {
+    let told = results.laws.iter().enumerate().skip(1).map(|(number, law)| {
+        let count = |better: bool| {
+            clear(results)
+                .filter(|(pair, _, _, is)| pair.law == number && *is == better)
+                .count()
+        };
+        format!("{}: better {}, worse {}", law.name, count(true), count(false))
+    });
+    let told: Vec<String> = told.collect();
+    if told.is_empty() {
+        return "There is no other law.".into();
+    }
+    format!(
+        "Clear differences (the interval over the seeds, drive by drive, does not hold zero) in peak error, effort, torque in conflict and the \
+         worst peak after a loss, over the drivers. {}.",
+        told.join("; ")
+    )
+}
+
+/// Where a law does not help.
+fn worse(results: &CompareResults) -> Table {
+    let rows = clear(results)
+        .filter(|(.., better)| !better)
+        .map(|(pair, metric, difference, _)| {
+            vec![
+                Cell::text(&results.laws[pair.law].name),
+                Cell::text(&results.drivers[pair.driver][0]),
+                Cell::text(metric.label),
+                with_interval(Some(&difference)),
+            ]
+        });
+    let caption = format!("Where a law is clearly worse than {}", results.laws[0].name);
+    Table::new(caption, ["Law", "Driver", "Metric", "Difference"], rows)
+}

@@ -1,0 +1,82 @@
+//! Drivers of others and of ours, for comparison, and habits that any of them may have. The paper's driver in a car is
+//! [`PaperDriver`](crate::parts::PaperDriver). `docs/reference/laws-and-drivers.md` has every equation with its source.
+//!
+//! A scenario's look-ahead, muscle (t_nms, K_nms) and remnant are those of every driver here, unless its own equation has others.
+
+mod cybernetic;
+mod habits;
+mod paper;
+mod relay;
+#[cfg(test)]
+mod tests;
+mod two_point;
+
+use crate::kind::{Kind, Make};
+use crate::models::driver::Remnant;
+use crate::parts::{Driver, DriverView};
+use crate::scenario::{Scenario, ScenarioError};
+use crate::seeds::Stream;
+
+/// A driver behind a pointer that can be copied; every driver that is `Clone` is one.
+pub trait AnyDriver: Driver + Send + Sync {
+    /// The copy.
+    fn boxed(&self) -> Box<dyn AnyDriver>;
+}
+
+impl<T: Driver + Clone + Send + Sync + 'static> AnyDriver for T {
+    fn boxed(&self) -> Box<dyn AnyDriver> {
+        Box::new(self.clone())
+    }
+}
+
+impl Clone for Box<dyn AnyDriver> {
+    fn clone(&self) -> Self {
+        self.as_ref().boxed()
+    }
+}
+
+impl Driver for Box<dyn AnyDriver> {
+    fn look_ahead_s(&self) -> [f64; 2] {
+        self.as_ref().look_ahead_s()
+    }
+
+    fn step(&mut self, view: &DriverView) -> f64 {
+        self.as_mut().step(view)
+    }
+}
+
+/// Every driver here.
+pub const DRIVERS: [Kind<dyn AnyDriver>; 5] = [
+    paper::KIND,
+    paper::PARTICIPANT,
+    cybernetic::KIND,
+    two_point::KIND,
+    relay::KIND,
+];
+
+/// Every habit: what may be put around any driver.
+pub const HABITS: [Kind<dyn AnyDriver>; 6] = habits::KINDS;
+
+/// A driver with the remnant of its scenario added.
+#[derive(Debug, Clone)]
+struct WithRemnant<D>(D, Remnant);
+
+impl<D: Driver> Driver for WithRemnant<D> {
+    fn look_ahead_s(&self) -> [f64; 2] {
+        self.0.look_ahead_s()
+    }
+
+    fn step(&mut self, view: &DriverView) -> f64 {
+        self.0.step(view) + self.1.step()
+    }
+}
+
+/// A driver of a scenario whose remnant it has.
+#[allow(clippy::unnecessary_wraps, reason = "the type of Make::Part")]
+fn of_scenario(
+    scenario: &Scenario,
+    driver: impl Driver + Clone + Send + Sync + 'static,
+) -> Result<Box<dyn AnyDriver>, ScenarioError> {
+    let remnant = Remnant::new(scenario.driver(), Stream::Remnant.seed(scenario.seed()));
+    Ok(Box::new(WithRemnant(driver, remnant)))
+}

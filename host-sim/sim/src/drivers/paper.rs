@@ -1,0 +1,68 @@
+//! The paper's driver, (7) and (8), with parameters of a file's own, or those of a participant of table 6. Source: Wang, Zheng,
+//! Nacpil and Nakano 2022.
+
+use super::{AnyDriver, Kind, Make};
+use crate::kind::Parameter;
+use crate::models::driver::{ArmGains, DriverParameters};
+use crate::participants::participants;
+use crate::parts::PaperDriver;
+use crate::scenario::{Scenario, ScenarioError};
+
+fn boxed(
+    scenario: &Scenario,
+    seen: DriverParameters,
+    gains: ArmGains,
+) -> Result<Box<dyn AnyDriver>, ScenarioError> {
+    let given = *scenario.driver();
+    let driver = DriverParameters {
+        a_1: seen.a_1,
+        a_2: seen.a_2,
+        a_3: seen.a_3,
+        t_p: seen.t_p,
+        ..given
+    };
+    let own = scenario.to_builder().driver(driver).gains(gains).build()?;
+    Ok(Box::new(PaperDriver::new(&own)))
+}
+
+pub(super) const KIND: Kind<dyn AnyDriver> = Kind {
+    name: "paper",
+    source: "Wang et al. 2022, (7) (8), table 7",
+    parameters: &[
+        Parameter::published("a_1", 0.1, [0.0, 10.0]),
+        Parameter::published("a_2", 0.05, [0.0, 10.0]),
+        Parameter::published("a_3", 3.7, [0.0, 100.0]),
+        Parameter::published("t_p_s", 0.1, [0.001, 2.0]),
+        Parameter::published("k_d_nm_per_rad", 3.0, [0.0, 50.0]),
+        Parameter::published("k_hg", 0.5, [0.0, 10.0]),
+    ],
+    make: Make::Part(|scenario, v| {
+        let seen = DriverParameters {
+            a_1: v[0],
+            a_2: v[1],
+            a_3: v[2],
+            t_p: v[3],
+            ..DriverParameters::default()
+        };
+        boxed(
+            scenario,
+            seen,
+            ArmGains {
+                k_d: v[4],
+                k_hg: v[5],
+            },
+        )
+    }),
+};
+
+pub(super) const PARTICIPANT: Kind<dyn AnyDriver> = Kind {
+    name: "participant",
+    source: "Wang et al. 2022, table 6",
+    parameters: &[Parameter::published("number", 1.0, [1.0, 14.0])],
+    make: Make::Part(|scenario, v| {
+        let all = participants();
+        let number = v[0].round() as usize;
+        let guided = all[number.clamp(1, all.len()) - 1].guided;
+        boxed(scenario, guided.parameters(), guided.gains())
+    }),
+};

@@ -1,0 +1,300 @@
+//! Each driver and habit against figures that were worked out apart: a program in Python, float64, from the equations of the
+//! documents (the continuous ones by Runge and Kutta's method), or by hand; and each in the paper's car.
+
+use super::*;
+use crate::Simulation;
+use crate::guidance::{LaneErrors, OwnLaw};
+use crate::laws::{Gains, LAWS, Law};
+use crate::parts::PaperVehicle;
+
+/// What the program in Python shows its drivers.
+fn view(step: u32) -> DriverView {
+    let t = f64::from(step) / 1000.0;
+    DriverView {
+        step,
+        lane: LaneErrors {
+            e_y_m: 0.3 * (0.9 * t).sin(),
+            e_theta_rad: 0.04 * (0.6 * t + 1.0).sin(),
+        },
+        points_m: [0.0; 2],
+        wheel_angle_rad: 0.12 * (0.8 * t).sin(),
+        wheel_rate_rad_per_s: 0.096 * (0.8 * t).cos(),
+        speed_m_per_s: 50.0 / 3.0,
+        yaw_rate_rad_per_s: 0.0,
+        guidance_torque_nm: 0.5 * (0.7 * t + 0.3).sin(),
+        warning: false,
+        is_lost: (4000..6000).contains(&step),
+    }
+}
+
+fn values(kind: &Kind<dyn AnyDriver>, changed: &[(&str, f64)]) -> Vec<f64> {
+    let value = |p: &crate::kind::Parameter| {
+        let found = changed.iter().find(|(name, _)| *name == p.name);
+        found.map_or(p.default, |(_, value)| *value)
+    };
+    kind.parameters.iter().map(value).collect()
+}
+
+fn driver(scenario: &Scenario, name: &str, changed: &[(&str, f64)]) -> Box<dyn AnyDriver> {
+    let kind = DRIVERS.iter().find(|kind| kind.name == name).unwrap();
+    let Make::Part(make) = kind.make else {
+        panic!("{name}")
+    };
+    make(scenario, &values(kind, changed)).unwrap()
+}
+
+fn with_habit(name: &str, changed: &[(&str, f64)], inner: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    let kind = HABITS.iter().find(|kind| kind.name == name).unwrap();
+    let Make::Around(make) = kind.make else {
+        panic!("{name}")
+    };
+    make(&Scenario::default(), &values(kind, changed), inner)
+}
+
+/// A driver whose torque is given by time, or who answers with what he sees.
+#[derive(Clone)]
+struct Given(fn(&DriverView) -> f64);
+
+impl Driver for Given {
+    fn look_ahead_s(&self) -> [f64; 2] {
+        [0.3, 1.0]
+    }
+
+    fn step(&mut self, view: &DriverView) -> f64 {
+        self.0(view)
+    }
+}
+
+fn swings() -> Box<dyn AnyDriver> {
+    Box::new(Given(|view| 0.3 * (1.1 * view.time_s()).sin()))
+}
+
+#[test]
+fn drivers_answer_as_a_program_from_their_equations_does() {
+    let scenario = Scenario::default();
+    let cases: [(&str, Box<dyn AnyDriver>, f64, [f64; 10]); 5] = [
+        (
+            "cybernetic",
+            driver(&scenario, "cybernetic", &[("k_hg", 0.25)]),
+            5e-3,
+            [
+                1.32120382,
+                0.67209636,
+                -0.61153937,
+                -1.52844393,
+                -1.40301634,
+                -0.3529943,
+                0.79375955,
+                1.12985315,
+                0.39017091,
+                -0.79983342,
+            ],
+        ),
+        (
+            "two_point",
+            driver(&scenario, "two_point", &[("bias_rad", 0.02)]),
+            1e-3,
+            [
+                0.47894309,
+                0.36677707,
+                0.19197761,
+                0.00242918,
+                -0.14335572,
+                -0.19941911,
+                -0.15375515,
+                -0.03164481,
+                0.12206777,
+                0.26777988,
+            ],
+        ),
+        (
+            "relay",
+            driver(&scenario, "relay", &[]),
+            1e-7,
+            [0.0, 0.0, 0.0, -0.03171068, 0.0, 0.0, 0.0, 0.0, -0.62883041, 0.0],
+        ),
+        (
+            "trust",
+            with_habit("trust", &[], swings()),
+            1e-7,
+            [
+                0.06739483,
+                -0.00540234,
+                -0.22680763,
+                -0.31315352,
+                0.03386317,
+                0.51310081,
+                0.69220709,
+                0.36388125,
+                -0.24176144,
+                -0.64645253,
+            ],
+        ),
+        (
+            "stiffening",
+            with_habit("stiffening", &[], swings()),
+            1e-7,
+            [
+                0.26736221,
+                0.24254892,
+                -0.04147697,
+                -0.19040559,
+                -0.13788573,
+                0.11767122,
+                0.21011009,
+                -0.04426378,
+                -0.36335223,
+                -0.36083079,
+            ],
+        ),
+    ];
+    for (name, mut driver, near, expected) in cases {
+        for step in 0..=10_000 {
+            let torque_nm = driver.step(&view(step));
+            if step > 0 && step % 1000 == 0 {
+                let wanted = expected[step as usize / 1000 - 1];
+                assert!(
+                    (torque_nm - wanted).abs() < near,
+                    "{name} at {step}: {torque_nm} {wanted}"
+                );
+            }
+        }
+    }
+}
+
+/// The arc of the first curve has a radius of 300 m, to the left or right: 0.3 m beside the middle, and 60/300 m inside.
+#[test]
+fn an_own_line_lies_beside_the_middle_and_inside_of_curves() {
+    let sees = Box::new(Given(|view| view.lane.e_y_m));
+    let mut driver = with_habit("own_line", &[("cut_m2", 60.0)], sees);
+    let arc = Scenario::default().course().centreline().at(1300.0).1;
+    assert!((arc.abs() - 1.0 / 300.0).abs() < 1e-12);
+    for (near_m, line_m) in [(500.0, 0.3), (1300.0, 0.3 + 0.2 * arc.signum())] {
+        let seen = DriverView {
+            points_m: [near_m, near_m + 12.0],
+            ..view(0)
+        };
+        assert!((driver.step(&seen) - line_m).abs() < 1e-9, "{near_m}");
+    }
+}
+
+/// Half-way through 10 s the delay is 150 of 300 ms, and what is seen counts 0.85: of e_y = t.
+#[test]
+fn who_tires_sees_less_and_later() {
+    let sees = Box::new(Given(|view| view.lane.e_y_m));
+    let mut driver = with_habit("tiring", &[("duration_s", 10.0)], sees);
+    let mut seen = Vec::new();
+    for step in 0..20_000 {
+        let mut now = view(step);
+        now.lane.e_y_m = now.time_s();
+        seen.push(driver.step(&now));
+    }
+    for (step, expected) in [
+        (0, 0.0),
+        (5000, 0.85 * 4.85),
+        (10_000, 0.7 * 9.7),
+        (19_999, 0.7 * 19.699),
+    ] {
+        assert!((seen[step] - expected).abs() < 2e-3, "{step}: {}", seen[step]);
+    }
+}
+
+/// Lapses of 2 s that begin every 30 s of attention: 2/32 of the time, known to a tenth of it after 20 hours; none under a warning.
+#[test]
+fn attention_lapses_as_often_as_asked_and_not_under_a_warning() {
+    let sees = || Box::new(Given(|view| view.lane.e_y_m));
+    let mut driver = with_habit("lapses", &[], sees());
+    let away = |driver: &mut Box<dyn AnyDriver>, warning: bool| {
+        let count = (0..7_200_000).filter(|step| {
+            let mut now = view(*step);
+            (now.lane.e_y_m, now.warning) = (f64::from(*step), warning);
+            driver.step(&now) != f64::from(*step)
+        });
+        count.count() as f64 / 7_200_000.0
+    };
+    let share = away(&mut driver, false);
+    assert!((share / 0.0625 - 1.0).abs() < 0.2, "{share}");
+    assert_eq!(away(&mut with_habit("lapses", &[], sees()), true), 0.0);
+}
+
+#[test]
+fn a_warning_is_the_only_word_of_a_loss_or_none() {
+    for (answers, warning, is_lost, knows) in [
+        (1.0, false, true, 0.0),
+        (1.0, true, true, 1.0),
+        (0.0, true, true, 0.0),
+    ] {
+        let tells = Box::new(Given(|view| f64::from(view.is_lost)));
+        let mut driver = with_habit("warning", &[("answers", answers)], tells);
+        let seen = DriverView {
+            warning,
+            is_lost,
+            ..view(0)
+        };
+        assert_eq!(driver.step(&seen), knows);
+    }
+}
+
+/// The paper's driver by name is the paper's driver; participant 13 is that of table 6.
+#[test]
+fn published_drivers_are_those_of_the_simulator() {
+    let scenario = Scenario::default();
+    let mut published = crate::parts::PaperDriver::new(&scenario);
+    let mut named = driver(&scenario, "paper", &[]);
+    for step in 0..3000 {
+        let seen = DriverView {
+            is_lost: false,
+            ..view(step)
+        };
+        assert_eq!(named.step(&seen), published.step(&seen), "{step}");
+    }
+    let mut thirteen = driver(&scenario, "participant", &[("number", 13.0)]);
+    let found = crate::participants::participants()[12].guided;
+    let own = scenario
+        .to_builder()
+        .driver(found.parameters())
+        .gains(found.gains())
+        .build()
+        .unwrap();
+    let mut expected = crate::parts::PaperDriver::new(&own);
+    for step in 0..3000 {
+        assert_eq!(thirteen.step(&view(step)), expected.step(&view(step)));
+    }
+}
+
+/// With their defaults all keep the lane of the paper's course, each habit around the paper's driver too. The law is the paper's, but
+/// for the relay: a driver who yields wholly to a guidance on the side of the target leaves the lane under one that cannot steer alone.
+#[test]
+fn every_driver_keeps_the_lane() {
+    let scenario = Scenario::default();
+    let mut all: Vec<(&str, Box<dyn AnyDriver>)> = DRIVERS
+        .iter()
+        .map(|kind| (kind.name, driver(&scenario, kind.name, &[])))
+        .collect();
+    all.extend(HABITS.iter().map(|kind| {
+        (
+            kind.name,
+            with_habit(kind.name, &[], driver(&scenario, "paper", &[])),
+        )
+    }));
+    let peak_m = |driver, law: Box<dyn Law>| {
+        let guidance = OwnLaw::new(&scenario, law);
+        let run = Simulation::of_parts(&scenario, driver, PaperVehicle::new(&scenario), guidance).run();
+        run.trace
+            .samples
+            .iter()
+            .map(|s| s.lateral_error_m.abs())
+            .fold(0.0, f64::max)
+    };
+    for (name, driver) in all {
+        let fdca = LAWS.iter().find(|kind| kind.name == "fdca").unwrap();
+        let Make::Part(make) = fdca.make else { panic!() };
+        let law: Box<dyn Law> = match name {
+            "relay" => make(&scenario, &fdca.defaults()).unwrap(),
+            _ => Box::new(Gains::PAPER),
+        };
+        let largest_m = peak_m(driver, law);
+        assert!(largest_m < 1.0, "{name}: {largest_m} m");
+    }
+    assert!(peak_m(driver(&scenario, "relay", &[]), Box::new(Gains::PAPER)) > 5.0);
+}

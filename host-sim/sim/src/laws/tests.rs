@@ -1,0 +1,273 @@
+//! Each law against figures that were worked out apart: a program in Python, float64, from the equations of the documents. Behind
+//! the ECU they are in `tests/own_law.rs`.
+
+use super::*;
+use crate::scenario::Scenario;
+
+/// What the program in Python shows its laws.
+fn view(step: u32) -> LawView {
+    let t = f64::from(step) / 1000.0;
+    LawView {
+        step,
+        e_y_m: 0.4 * (0.7 * t).sin(),
+        e_y_rate_m_per_s: 0.28 * (0.7 * t).cos(),
+        e_theta_rad: 0.03 * (0.5 * t + 1.0).sin(),
+        e_theta_rate_rad_per_s: 0.015 * (0.5 * t + 1.0).cos(),
+        driver_torque_nm: 0.5 * (1.3 * t).sin(),
+        wheel_angle_rad: 0.1 * (0.9 * t).sin(),
+        wheel_rate_rad_per_s: 0.09 * (0.9 * t).cos(),
+        guidance_torque_nm: 0.6 * (0.8 * t + 0.3).sin(),
+        speed_m_per_s: 50.0 / 3.0,
+        yaw_rate_rad_per_s: 0.05 * (0.6 * t).cos(),
+        k_hg: None,
+    }
+}
+
+fn law(name: &str, changed: &[(&str, f64)]) -> Box<dyn Law> {
+    let kind = LAWS.iter().find(|kind| kind.name == name).unwrap();
+    let mut values = kind.defaults();
+    for (name, value) in changed {
+        let place = kind.parameters.iter().position(|p| p.name == *name).unwrap();
+        values[place] = *value;
+    }
+    match kind.make {
+        Make::Part(make) => make(&Scenario::default(), &values).unwrap(),
+        Make::Around(make) => make(&Scenario::default(), &values, Box::new(Gains::PAPER)),
+    }
+}
+
+#[test]
+fn laws_ask_as_a_program_from_their_equations_does() {
+    let b = [
+        ("k_y_rad_per_m", 0.2),
+        ("k_psi", 2.0),
+        ("lohs", 0.5),
+        ("sohf", 0.8),
+        ("loha_nm_per_rad", 1.0),
+    ];
+    let cases: [(&str, &[(&str, f64)], [f64; 10]); 7] = [
+        (
+            "paper",
+            &[],
+            [
+                0.431034246,
+                0.468913508,
+                0.347412267,
+                0.102323382,
+                -0.182180925,
+                -0.40552298,
+                -0.489887249,
+                -0.410152396,
+                -0.202142301,
+                0.053811967,
+            ],
+        ),
+        (
+            "fdca",
+            &[],
+            [
+                1.163804918,
+                0.719733349,
+                0.013391222,
+                -0.724783358,
+                -1.240765795,
+                -1.34830296,
+                -1.000069321,
+                -0.310098826,
+                0.483438918,
+                1.103105695,
+            ],
+        ),
+        (
+            "fdca",
+            &b,
+            [
+                0.895163622,
+                0.593941876,
+                0.101234499,
+                -0.443619131,
+                -0.880156328,
+                -1.062106393,
+                -0.901930967,
+                -0.416199085,
+                0.253097327,
+                0.868299647,
+            ],
+        ),
+        (
+            "authority_by_tlc",
+            &[],
+            [
+                1.365421826,
+                0.719733349,
+                0.013391222,
+                -0.724783358,
+                -1.453451685,
+                -1.480301518,
+                -1.000069321,
+                -0.310098826,
+                0.502469007,
+                1.324750086,
+            ],
+        ),
+        (
+            "driver_activity",
+            &[],
+            [
+                0.431034246,
+                0.468913508,
+                0.167420396,
+                0.102323382,
+                -0.182180925,
+                -0.158069811,
+                -0.149880864,
+                -0.130002901,
+                -0.061760722,
+                0.053811967,
+            ],
+        ),
+        (
+            "running_wide",
+            &[],
+            [
+                0.435657115,
+                0.486641996,
+                0.371156234,
+                0.10986011,
+                -0.19558926,
+                -0.443477309,
+                -0.550587631,
+                -0.461236725,
+                -0.2251365,
+                0.060507222,
+            ],
+        ),
+        (
+            "band",
+            &[("outer_m", 0.3)],
+            [
+                0.0,
+                0.468913508,
+                0.347412267,
+                0.0,
+                0.0,
+                -0.40552298,
+                -0.489887249,
+                -0.410152396,
+                0.0,
+                0.0,
+            ],
+        ),
+    ];
+    for (name, changed, expected) in cases {
+        let mut law = law(name, changed);
+        for step in 0..=10_000 {
+            let asked = law.ask(&view(step));
+            if step > 0 && step % 1000 == 0 {
+                let wanted = expected[step as usize / 1000 - 1];
+                assert!(
+                    (asked - wanted).abs() < 1e-8,
+                    "{name} at {step}: {asked} {wanted}"
+                );
+            }
+        }
+    }
+}
+
+/// By hand: 0.335 N.m at K_hg 0.25, reached from 0.25 with 0.05 N.m/s in 1.7 s; the published gain 60 s and 1.7 s after the last change.
+#[test]
+fn a_gain_by_reliance_goes_to_its_table_and_back() {
+    let mut law = law("by_reliance", &[]);
+    let mut gain = |steps: u32, k_hg: Option<f64>| {
+        let seen = LawView {
+            e_theta_rad: 0.025,
+            k_hg,
+            ..LawView::default()
+        };
+        (0..steps).map(|_| law.ask(&seen)).last().unwrap()
+    };
+    for (steps, k_hg, expected) in [
+        (1000, None, 0.25),
+        (1000, Some(0.25), 0.3),
+        (1000, Some(0.25), 0.335),
+        (57_000, Some(0.25), 0.335),
+        (3000, Some(0.25), 0.25),
+        (10_000, Some(0.9), 0.45),
+        (10_000, Some(-0.2), 0.31),
+    ] {
+        assert!((gain(steps, k_hg) - expected).abs() < 1e-4, "{k_hg:?}");
+    }
+}
+
+/// What opendbc's C says of the same ten million cases: compiled with gcc 12, how many it allows, and all answers in one number.
+#[test]
+fn the_driver_limit_is_opendbc_s_rule() {
+    let mut state = 1_u64;
+    let mut draw = |low: i64, high: i64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + ((state >> 33) % (high - low + 1) as u64) as i64
+    };
+    let (mut allowed, mut hash) = (0_u32, 0xCBF2_9CE4_8422_2325_u64);
+    for _ in 0..10_000_000 {
+        let [max, up, down, allowance, factor] =
+            [(1, 400), (0, 20), (0, 40), (0, 120), (0, 5)].map(|(a, b)| draw(a, b));
+        let (last, one, other) = (draw(-max, max), draw(-500, 500), draw(-500, 500));
+        let value = last + draw(-45, 45);
+        let [max, up, down, allowance, factor] = [max, up, down, allowance, factor].map(|v| v as f64);
+        let limits = Limits {
+            max,
+            up,
+            down,
+            allowance,
+            factor,
+        };
+        let [low, high] = limits.allowed(last as f64, [one.min(other), one.max(other)].map(|v| v as f64));
+        let is_allowed = (low..=high).contains(&(value as f64));
+        allowed += u32::from(is_allowed);
+        hash = (hash ^ u64::from(is_allowed)).wrapping_mul(1_099_511_628_211);
+    }
+    assert_eq!((allowed, hash), (4_957_746, 1_224_648_373_446_199_849));
+}
+
+/// By hand, with the defaults: 0.04 N.m more each 20 ms from the first step on, until 0.5 N.m; with 1.5 N.m against it the bound is
+/// 3 - (1.5 - 0.8)*3 = 0.9, with 1.8 it is 0, to which it falls by 0.1 N.m each 20 ms once all six samples say so.
+#[test]
+fn a_limited_law_grows_and_falls_as_the_rule_has_it() {
+    let mut law = DriverLimit::new(
+        Box::new(Gains {
+            k_1: 0.25,
+            a: [2.0, 0.0, 0.0, 0.0],
+        }),
+        Limits {
+            max: 3.0,
+            up: 0.04,
+            down: 0.1,
+            allowance: 0.8,
+            factor: 3.0,
+        },
+    );
+    let mut at = |from: u32, to: u32, driver_torque_nm| {
+        let asks = (from..to).map(|step| {
+            law.ask(&LawView {
+                step,
+                e_y_m: 1.0,
+                driver_torque_nm,
+                ..LawView::default()
+            })
+        });
+        asks.last().unwrap()
+    };
+    for (from, to, driver, expected) in [
+        (0, 20, 0.0, 0.04),
+        (20, 40, 0.0, 0.08),
+        (40, 1000, 0.0, 0.5),
+        (1000, 2000, -1.5, 0.5),
+        (2000, 2100, -1.8, 0.5),
+        (2100, 2120, -1.8, 0.4),
+        (2120, 2200, -1.8, 0.0),
+    ] {
+        assert!((at(from, to, driver) - expected).abs() < 1e-9, "{to}");
+    }
+}

@@ -1,0 +1,38 @@
+//! `host-sim compare FILE.toml`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use haptic_batch::compare::{Compare, Kinds, on_threads};
+use haptic_report::document::write_file;
+use haptic_report::studies::compare::report;
+
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)
+    #[arg(value_name = "FILE.toml")]
+    file: PathBuf,
+    /// Threads; default: one a core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    #[command(flatten)]
+    results: ResultArguments,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let kinds = Kinds::default();
+    let compare = Compare::load(&arguments.file, &kinds)?;
+    let output = arguments.results.begin("compare")?;
+    let results = progress::over(compare.drives(), "drives", |done| {
+        on_threads(arguments.threads, || compare.run(done))
+    })??;
+    if let Some(place) = output.place() {
+        let table = results.to_csv();
+        write_file(&place.join("drives.csv"), |file| file.write_all(table.as_bytes()))?;
+    }
+    let report = report(&results);
+    output.show(&report, &report.stamp(&results), true)
+}

@@ -1,0 +1,75 @@
+//! `host-sim compare`: the same bytes for any number of threads, and nothing left of a file that is refused.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const FILE: &str = "
+name = 'short'
+seeds = 2
+roads = ['road.toml']
+speeds_kmh = [60]
+[faults]
+sudden_loss = 1
+[tuning]
+budget = 2
+seeds = 1
+roads = ['road.toml']
+speeds_kmh = [60]
+[[law]]
+kind = 'none'
+[[law]]
+kind = 'paper'
+[[driver]]
+kind = 'paper'
+";
+
+fn compare(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    command.arg("compare").args(arguments).current_dir(folder);
+    command.output().unwrap()
+}
+
+#[test]
+fn a_comparison_leaves_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("road.toml"), "[[segment]]\nlength = 400\n").unwrap();
+    fs::write(folder.join("study.toml"), FILE).unwrap();
+    fs::write(folder.join("wrong.toml"), FILE.replace("seeds = 2", "seeds = 0")).unwrap();
+    for threads in ["1", "3"] {
+        let output = compare(
+            folder,
+            &["study.toml", "--threads", threads, "--out", threads, "--json"],
+        );
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let files = [
+            folder.join(threads).join("results.json"),
+            folder.join("1/results.json"),
+        ];
+        let [own, first] = files.map(|file| fs::read_to_string(file).unwrap());
+        assert_eq!(own, first);
+        assert_eq!(
+            String::from_utf8(output.stdout).unwrap().trim_end(),
+            own.trim_end()
+        );
+    }
+    for file in ["drives.csv", "report.html", "matrix-worst_peak_after_loss_m.svg"] {
+        let [one, three] = ["1", "3"].map(|threads| fs::read(folder.join(threads).join(file)).unwrap());
+        assert_eq!(one, three, "{file}");
+    }
+    let drives = fs::read_to_string(folder.join("1/drives.csv")).unwrap();
+    assert_eq!(drives.lines().count(), 5);
+    let output = compare(folder, &["wrong.toml", "--out", "wrong"]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(
+        error.trim_end(),
+        "error: wrong.toml: seeds = 0 is outside 1 to 1000"
+    );
+    assert!(!folder.join("wrong").exists());
+}
