@@ -242,9 +242,10 @@ fn the_papers_drives_are_the_same_side_by_side() {
     scenarios.push(Scenario::builder().driver(driver).build().unwrap());
     // Who weaves is on the road for longer than the course takes.
     let weaving = participants()[12].guided;
-    let driver = weaving.parameters();
-    let builder = Scenario::builder().driver(driver).gains(weaving.gains());
-    scenarios.push(builder.condition(Condition::Custom).build().unwrap());
+    let builder = Scenario::builder()
+        .condition(Condition::Custom)
+        .gains(weaving.gains());
+    scenarios.push(builder.driver(weaving.parameters()).build().unwrap());
     assert_eq!(compare(&scenarios, Width::Widest), 0, "they are nominal");
 }
 
