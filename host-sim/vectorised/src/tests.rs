@@ -11,7 +11,6 @@ use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::real::{Tyres, WorldParameters};
 use haptic_sim::models::road::Course;
 use haptic_sim::models::tolerances::Tolerances;
-use haptic_sim::participants::participants;
 use haptic_sim::scenario::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, ScenarioBuilder, Sensors, Speed,
 };
@@ -241,11 +240,10 @@ fn the_papers_drives_are_the_same_side_by_side() {
     };
     scenarios.push(Scenario::builder().driver(driver).build().unwrap());
     // Who weaves is on the road for longer than the course takes.
-    let weaving = participants()[12].guided;
-    let builder = Scenario::builder()
-        .condition(Condition::Custom)
-        .gains(weaving.gains());
-    scenarios.push(builder.driver(weaving.parameters()).build().unwrap());
+    let weaving = haptic_sim::participants::participants()[12].guided;
+    let custom = Scenario::builder().condition(Condition::Custom);
+    let weaving = custom.driver(weaving.parameters()).gains(weaving.gains());
+    scenarios.push(weaving.build().unwrap());
     assert_eq!(compare(&scenarios, Width::Widest), 0, "they are nominal");
 }
 

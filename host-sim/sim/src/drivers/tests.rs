@@ -69,86 +69,46 @@ fn swings() -> Box<dyn AnyDriver> {
     Box::new(Given(|view| 0.3 * (1.1 * view.time_s()).sin()))
 }
 
+/// A driver, how near the torque has to be, N.m, and the torque after every second, N.m.
+const TORQUES: [(&str, f64, &str); 5] = [
+    (
+        "cybernetic",
+        5e-3,
+        "1.32120382 0.67209636 -0.61153937 -1.52844393 -1.40301634 -0.3529943 0.79375955 1.12985315 0.39017091 -0.79983342",
+    ),
+    (
+        "two_point",
+        1e-3,
+        "0.47894309 0.36677707 0.19197761 0.00242918 -0.14335572 -0.19941911 -0.15375515 -0.03164481 0.12206777 0.26777988",
+    ),
+    (
+        "relay",
+        1e-7,
+        "0.0 0.0 0.0 -0.03171068 0.0 0.0 0.0 0.0 -0.62883041 0.0",
+    ),
+    (
+        "trust",
+        1e-7,
+        "0.06739483 -0.00540234 -0.22680763 -0.31315352 0.03386317 0.51310081 0.69220709 0.36388125 -0.24176144 -0.64645253",
+    ),
+    (
+        "stiffening",
+        1e-7,
+        "0.26736221 0.24254892 -0.04147697 -0.19040559 -0.13788573 0.11767122 0.21011009 -0.04426378 -0.36335223 -0.36083079",
+    ),
+];
+
 #[test]
 fn drivers_answer_as_a_program_from_their_equations_does() {
     let scenario = Scenario::default();
-    let cases: [(&str, Box<dyn AnyDriver>, f64, [f64; 10]); 5] = [
-        (
-            "cybernetic",
-            driver(&scenario, "cybernetic", &[("k_hg", 0.25)]),
-            5e-3,
-            [
-                1.32120382,
-                0.67209636,
-                -0.61153937,
-                -1.52844393,
-                -1.40301634,
-                -0.3529943,
-                0.79375955,
-                1.12985315,
-                0.39017091,
-                -0.79983342,
-            ],
-        ),
-        (
-            "two_point",
-            driver(&scenario, "two_point", &[("bias_rad", 0.02)]),
-            1e-3,
-            [
-                0.47894309,
-                0.36677707,
-                0.19197761,
-                0.00242918,
-                -0.14335572,
-                -0.19941911,
-                -0.15375515,
-                -0.03164481,
-                0.12206777,
-                0.26777988,
-            ],
-        ),
-        (
-            "relay",
-            driver(&scenario, "relay", &[]),
-            1e-7,
-            [0.0, 0.0, 0.0, -0.03171068, 0.0, 0.0, 0.0, 0.0, -0.62883041, 0.0],
-        ),
-        (
-            "trust",
-            with_habit("trust", &[], swings()),
-            1e-7,
-            [
-                0.06739483,
-                -0.00540234,
-                -0.22680763,
-                -0.31315352,
-                0.03386317,
-                0.51310081,
-                0.69220709,
-                0.36388125,
-                -0.24176144,
-                -0.64645253,
-            ],
-        ),
-        (
-            "stiffening",
-            with_habit("stiffening", &[], swings()),
-            1e-7,
-            [
-                0.26736221,
-                0.24254892,
-                -0.04147697,
-                -0.19040559,
-                -0.13788573,
-                0.11767122,
-                0.21011009,
-                -0.04426378,
-                -0.36335223,
-                -0.36083079,
-            ],
-        ),
-    ];
-    for (name, mut driver, near, expected) in cases {
+    for (name, near, expected) in TORQUES {
+        let mut driver = match name {
+            "cybernetic" => driver(&scenario, name, &[("k_hg", 0.25)]),
+            "two_point" => driver(&scenario, name, &[("bias_rad", 0.02)]),
+            "relay" => driver(&scenario, name, &[]),
+            _ => with_habit(name, &[], swings()),
+        };
+        let expected: Vec<f64> = expected.split(' ').map(|text| text.parse().unwrap()).collect();
         for step in 0..=10_000 {
             let torque_nm = driver.step(&view(step));
             if step > 0 && step % 1000 == 0 {
