@@ -111,8 +111,11 @@ const PROBE_END_US: i32 = 1_030_000;
 pub const ASTRAY_MS: i32 = 20;
 /// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
 const OLDEST_LANE_US: i32 = 360_000;
-/// A sample older than this is continued at its rates.
+/// For so long more the lane may go on without a picture. The band is wider by 1 mN.m for each millisecond since the last.
+const COAST_US: i32 = 1_000_000;
+/// A sample older than this is continued at its rates, for so long at most.
 const PROMPT_LANE_US: i32 = 40_000;
+const LONGEST_LATE_US: i32 = OLDEST_LANE_US - PROMPT_LANE_US;
 /// Override bound: from 0.8 N.m of opposing torque, 3 N.m per N.m, and what two frames' time can change.
 const OVERRIDE_FROM_MNM: i32 = 800;
 const OVERRIDE_SLOPE: i32 = 3;
@@ -250,15 +253,17 @@ impl Monitor {
 
     #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
-        if state.now.age_us > OLDEST_LANE_US && torque != 0 {
+        if state.now.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
         }
-        // What an old sample has become since, at most: the errors went on at their rates.
+        // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
         let late_us = state.now.age_us.saturating_sub(PROMPT_LANE_US);
-        let position = if late_us < 1000 {
-            state.picture.position_mnm
-        } else {
-            let late_ms = late_us / 1000;
+        let (position, rate) = (state.picture.position_mnm, state.picture.rate_mnm);
+        let both = position.saturating_add(rate);
+        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
+        let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
+        if late_us >= 1000 {
+            let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
             let [per_m, per_rad, ..] = self.gains_mnm;
             let (e_y_mmps, e_theta_urps) = state.rates();
             let carried = per_m
@@ -267,18 +272,20 @@ impl Monitor {
                 .saturating_add(
                     per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
                 );
-            state.picture.position_mnm.saturating_add(carried)
-        };
-        let both = position.saturating_add(state.picture.rate_mnm);
+            let position = position.saturating_add(carried);
+            let both = position.saturating_add(rate);
+            (low, high) = (low.min(position).min(both), high.max(position).max(both));
+        }
         let probe = if state.now.probe_left_us > 0 {
             self.probe_mnm
         } else {
             0
         };
-        let band = self.band_mnm.saturating_add(probe);
-        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
-        let high = position.max(both).max(0).saturating_add(band);
-        let low = position.min(both).min(0).saturating_sub(band);
+        let band = self
+            .band_mnm
+            .saturating_add(probe)
+            .saturating_add(late_us.max(0) / 1000);
+        let (low, high) = (low.saturating_sub(band), high.saturating_add(band));
         let falling = torque.saturating_abs() < state.now.torque_mnm.saturating_abs();
         if (low..=high).contains(&torque) {
             state.now.astray_ms = 0;
@@ -300,7 +307,7 @@ impl Monitor {
             1 => grown = torque,
             2 => mode = STANDBY,
             3 => state.now.driver_mnm = -20_000,
-            4 => state.now.age_us = 1_000_000,
+            4 => state.now.age_us = 2_000_000,
             5 => (torque, grown) = (0, -400),
             _ => (torque, state.now.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
         }

@@ -10,6 +10,8 @@ use crate::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
+/// What is left of it after a lane that was gone on with for a second.
+pub const GONE_ON: Micros = Micros::from_ms(1000);
 /// Without a driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
 const WITHOUT_COLUMN: u32 = 2;
 /// A column that contradicts itself may hide a hand that pushes, and has misled the override already: 0.5 s. From 5 N.m the

@@ -202,7 +202,8 @@ fn against_the_driver() {
 
 #[test]
 fn old_lane_data_in_active() {
-    for (age, last_good_ms) in [(0, 360), (100, 350), (400, 320)] {
+    // 360 ms, and a second in which the lane goes on without a picture.
+    for (age, last_good_ms) in [(0, 1360), (100, 1350), (400, 1320)] {
         let mut bench = Bench::at(5.0, 40);
         assert!(bench.show(Some(lane(0, 0, age)), None, guidance(40, ACTIVE), 1000));
         for _ in 0..last_good_ms {
@@ -321,7 +322,8 @@ fn rates_are_forgotten_in_a_gap() {
 }
 
 /// Errors that passed zero at a constant rate with the last picture, and no picture since. From 40 ms of age on the
-/// position goes on at its rate, so a torque beyond the band of the last picture comes to be within it.
+/// position goes on at its rate and the band grows by 1 mN.m/ms, so a torque beyond the band of the last picture comes to be
+/// within it.
 #[test]
 fn an_old_sample_is_carried_at_its_rates() {
     for sign in [1, -1] {
@@ -332,7 +334,7 @@ fn an_old_sample_is_carried_at_its_rates() {
             (0, 524, 250, 10),
         ] {
             // Within the band 65 ms after the last picture; judged from an age of so many ms on.
-            let torque = sign * counts(300 + at_once_mnm + 25 * per_ms).0;
+            let torque = sign * counts(300 + at_once_mnm + 25 * (per_ms + 1)).0;
             let permitted = |from_ms: i64| {
                 let mut bench = Bench::at(5.0, torque);
                 for k in -30..=0 {

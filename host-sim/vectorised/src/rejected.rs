@@ -26,6 +26,8 @@ pub enum Reason {
     TooSlow,
     /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
     EarlyFailure,
+    /// The lane preview fails while a probe is on, which winds down meanwhile.
+    FailureWithProbe,
     /// A failure that ends: the ECU comes back.
     FailureEnds,
     /// Longer than the clock of vectorised runs counts.
@@ -60,7 +62,7 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 19] = [
+    pub const ALL: [(Self, &str); 20] = [
         (
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
@@ -71,6 +73,7 @@ impl Reason {
             Self::EarlyFailure,
             "a lane preview that fails within the first 2 s",
         ),
+        (Self::FailureWithProbe, "a lane preview that fails beside a probe"),
         (Self::FailureEnds, "a failure that ends"),
         (Self::TooLong, "longer than 2000 s"),
         (Self::TooFew, "too few for a batch"),
@@ -159,6 +162,10 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
             Reason::EarlyFailure,
         ),
         (
+            kind == FailureKind::Input && guidance.probe,
+            Reason::FailureWithProbe,
+        ),
+        (
             kind != FailureKind::None && duration_s.is_some(),
             Reason::FailureEnds,
         ),
@@ -234,6 +241,7 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
         controller,
         t_n: _,
         t_f: _,
+        // Beside a lane preview that fails it is not.
         probe: _,
     } = guidance;
     let Params {

@@ -1,0 +1,259 @@
+//! Guidance while the camera sees nothing for a while, or another line.
+
+use crate::rig::{Rig, SPEED};
+use haptic_core::faults::{Fault, FaultSet};
+use haptic_core::modes::Mode;
+use haptic_core::quantity::{Metres, Radians};
+
+const LANE: usize = 0;
+const VEHICLE: usize = 2;
+/// K_1*a1' and K_1*a3' of the paper's law, N.m/m and N.m/rad.
+const PER_M: f64 = 0.5;
+
+/// On a straight, guided, beside the line.
+fn beside(e_y_m: f64) -> Rig {
+    let mut rig = Rig::paper();
+    rig.yaw_rate = Some(0.0);
+    rig.lane.e_y = Metres::from_m(e_y_m);
+    rig.run(600);
+    rig.engage = true;
+    rig.run(1500);
+    assert!((rig.applied - PER_M * e_y_m).abs() < 0.01, "{}", rig.applied);
+    rig
+}
+
+/// A blink of the camera, silent or invalid: for its time past the 30 ms and the three frames that a sender shows, trust
+/// falls by a half in a second, and it is back at one in a second.
+#[test]
+fn a_blink_takes_some_trust_and_brings_it_back() {
+    for (ms, is_silent) in [(40, true), (40, false), (200, true), (500, false), (1000, true)] {
+        let mut rig = beside(0.4);
+        (rig.silent[LANE], rig.lane.valid) = (is_silent, is_silent);
+        for _ in 0..ms {
+            assert_eq!(rig.tick().command.mode, Mode::Active, "{ms} ms");
+        }
+        (rig.silent[LANE], rig.lane.valid) = (false, true);
+        let least = (0..40).map(|_| {
+            assert_eq!(rig.tick().command.mode, Mode::Active, "{ms} ms");
+            rig.applied
+        });
+        let least = least.fold(f64::INFINITY, f64::min);
+        // From 22 to 30 ms after it began until two frames later than it ended.
+        let blind_s = f64::from(ms) * 1e-3 - 0.01;
+        let expected = 0.4 * PER_M * (1.0 - 0.5 * blind_s);
+        assert!(
+            (least - expected).abs() < 0.005,
+            "{ms} ms: {least}, not {expected}"
+        );
+        rig.run(500);
+        assert!(
+            (rig.applied - 0.4 * PER_M).abs() < 0.005,
+            "{ms} ms: {}",
+            rig.applied
+        );
+        assert_eq!(rig.tick().command.faults, FaultSet::NONE);
+    }
+}
+
+/// A loss is declared after a second, and pictures make up for it half as fast: every second 0.4 s of none never end
+/// guidance, 0.6 s do within 4.
+#[test]
+fn blinks_that_come_back_are_forgiven_half_as_fast() {
+    for (blind_ms, stays) in [(300, true), (600, false)] {
+        let mut rig = beside(0.2);
+        let mut left = None;
+        for ms in 0..60_000_u32 {
+            // A hand that is felt.
+            rig.driver = Some(if ms % 10_000 < 5000 { 0.0 } else { 0.1 });
+            rig.silent[LANE] = ms % 1000 < blind_ms;
+            if left.is_none() && rig.tick().command.mode != Mode::Active {
+                left = Some(ms);
+            }
+        }
+        assert_eq!(left.is_none(), stays, "{blind_ms} ms: {left:?}");
+        assert!(left.is_none_or(|ms| ms < 4000), "{left:?}");
+    }
+}
+
+/// In a bend of 0.05 rad/s that the vehicle follows, the camera goes blind; the line goes on, and so does the torque's share:
+/// what the law asks of a near point 0.3 m aside and a far point 0.7 s ahead.
+#[test]
+fn the_line_goes_on_through_a_bend() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::paper();
+        let rate = 0.05 * sign;
+        rig.yaw_rate = Some(rate);
+        (rig.lane.e_y, rig.lane.e_theta) = (Metres::from_m(0.1), Radians::from_rad(0.7 * rate));
+        rig.run(600);
+        rig.engage = true;
+        rig.run(1500);
+        let before = rig.applied;
+        rig.silent[LANE] = true;
+        rig.run(30 + 500);
+        let expected = before * 0.75;
+        assert!(
+            (rig.applied - expected).abs() < 0.01,
+            "{}, not {expected}",
+            rig.applied
+        );
+    }
+}
+
+/// The vehicle turns away by 0.1 rad/s from a straight line for half a second without a picture: 0.025 rad at the middle of
+/// it. The near point, 5 m ahead, is then 0.25 m aside and the vehicle itself 0.2 m; K_1*a3' is 10 N.m/rad. A picture that
+/// says so is believed at once, one that says that nothing happened is not.
+#[test]
+fn where_the_vehicle_went_meanwhile_is_known() {
+    for (is_true, faults) in [
+        (true, FaultSet::NONE),
+        (false, FaultSet::NONE.with(Fault::LaneStep)),
+    ] {
+        let mut rig = beside(0.0);
+        rig.silent[LANE] = true;
+        rig.run(20);
+        rig.yaw_rate = Some(-0.1);
+        rig.run(500);
+        rig.yaw_rate = Some(0.0);
+        rig.silent[LANE] = false;
+        if is_true {
+            rig.lane.e_theta = Radians::from_rad(0.05);
+            rig.lane.e_y = Metres::from_m(0.05 * 0.3 * SPEED + 0.5 * 0.1 * 0.25 * SPEED);
+        } else {
+            rig.lane.e_y = Metres::from_m(0.0);
+        }
+        let step = rig.run(30);
+        assert_eq!(step.command.faults, faults, "{is_true}");
+        assert_eq!(step.command.mode, Mode::Active);
+    }
+}
+
+/// Works: the line jumps aside by up to 0.8 m. Guidance lets go of the old one within half a second, with a warning, and takes
+/// the new one within another.
+#[test]
+fn a_line_that_moves_is_let_go_of_and_taken() {
+    for (from, to) in [(0.1, 0.5), (0.1, -0.5), (0.0, 0.79), (-0.3, 0.75), (2.0, -0.7)] {
+        let mut rig = beside(from);
+        let before = rig.applied;
+        rig.lane.e_y = Metres::from_m(to);
+        let (mut last, mut least, mut warned) = (before, before.abs(), 0);
+        for _ in 0..40 + 500 + 20 {
+            let step = rig.tick();
+            assert_eq!(step.command.mode, Mode::Active, "{from} to {to}");
+            assert!(
+                (rig.applied - last).abs() <= 0.0085,
+                "{from} to {to}: {last} to {}",
+                rig.applied
+            );
+            warned += u32::from(step.command.warning);
+            (last, least) = (rig.applied, least.min(rig.applied.abs()));
+        }
+        assert!(least < 0.01, "{from} to {to}: {least}");
+        assert!((490..=520).contains(&warned), "{warned}");
+        rig.run(1000);
+        assert!(
+            (rig.applied - PER_M * to).abs() < 0.01,
+            "{from} to {to}: {}",
+            rig.applied
+        );
+    }
+}
+
+/// A lane change by hand of which nobody was told: the camera takes the new line half way, 1.9 m from the vehicle, which
+/// comes to it at 1 m/s. Guidance is there again where the line is near, and not before.
+#[test]
+fn a_lane_change_by_hand_is_no_fault() {
+    let mut rig = beside(0.0);
+    rig.lane.e_theta = Radians::from_rad(0.0);
+    let mut e_y = 0.0;
+    let (mut taken_at, mut was_apart) = (None, false);
+    for ms in 0..6000_i32 {
+        // 1 m/s to the left, of which the yaw rate tells: half a second of turning to it, and from it.
+        rig.yaw_rate = Some(match ms {
+            0..500 => 2.0 / SPEED,
+            3500..4000 => -2.0 / SPEED,
+            _ => 0.0,
+        });
+        let turned_ms = ms.min(500) - (ms - 3500).clamp(0, 500);
+        let v = f64::from(turned_ms) * 2e-3;
+        let heading = v / SPEED;
+        e_y -= v * 1e-3;
+        let line = if e_y < -1.6 { 3.5 } else { 0.0 };
+        rig.lane.e_theta = Radians::from_rad(-heading);
+        rig.lane.e_y = Metres::from_m(e_y + line - 0.3 * SPEED * heading);
+        let step = rig.tick();
+        assert_eq!(
+            step.command.mode,
+            Mode::Active,
+            "{ms} ms, {:?}",
+            step.command.faults
+        );
+        let is_apart = step.command.faults.contains(Fault::LaneStep);
+        if was_apart && !is_apart {
+            taken_at = Some(rig.lane.e_y.m());
+        }
+        was_apart = is_apart;
+    }
+    let at = taken_at.unwrap();
+    assert!((0.7..=0.8).contains(&at), "{at} m");
+}
+
+/// Another line that comes no nearer is a fault after four seconds; a camera that then goes blind, after one.
+#[test]
+fn a_line_that_stays_elsewhere_is_a_fault() {
+    let mut rig = beside(0.0);
+    rig.lane.e_y = Metres::from_m(1.5);
+    let (ms, step) = rig.run_until(4100, |step| step.command.mode == Mode::Handover);
+    assert!(ms > 4000 && step.command.faults.contains(Fault::LaneStep));
+    assert_eq!(rig.applied, 0.0);
+    let mut rig = beside(0.0);
+    rig.lane.e_y = Metres::from_m(1.5);
+    rig.run(1000);
+    rig.silent[LANE] = true;
+    let (ms, _) = rig.run_until(1100, |step| step.command.mode == Mode::Handover);
+    assert!((1000..=1040).contains(&ms), "{ms}");
+}
+
+/// Only guidance goes on: Standby needs pictures, and a handover does not go back.
+#[test]
+fn only_active_goes_on_and_nothing_comes_back_after_a_handover() {
+    let mut rig = beside(0.2);
+    rig.silent[LANE] = true;
+    rig.run(1500);
+    rig.silent[LANE] = false;
+    for _ in 0..4000 {
+        assert_ne!(rig.tick().command.mode, Mode::Active);
+    }
+    let mut rig = Rig::paper();
+    rig.run(600);
+    rig.silent[LANE] = true;
+    rig.run(40);
+    rig.engage = true;
+    assert_eq!(rig.run(1000).command.mode, Mode::Standby);
+}
+
+/// What else ends guidance ends it while the lane goes on too.
+#[test]
+fn other_losses_are_none_of_the_lanes() {
+    for sender in [1, VEHICLE, 3] {
+        let mut rig = beside(0.2);
+        rig.silent[LANE] = true;
+        rig.run(300);
+        rig.silent[sender] = true;
+        rig.run_until(41, |step| step.command.mode == Mode::Handover);
+    }
+}
+
+/// A probe ends with the line that it rides on: what is left of it when no picture is in use must not meet the monitor.
+#[test]
+fn a_probe_ends_where_trust_does() {
+    let mut rig = beside(0.2);
+    rig.probe = true;
+    rig.run(1000);
+    rig.lane.e_y = Metres::from_m(1.5);
+    rig.run(1100);
+    for _ in 0..2000 {
+        let step = rig.tick();
+        assert!(step.permitted && step.command.mode == Mode::Active);
+        assert_eq!(rig.applied, 0.0);
+    }
+}
