@@ -26,8 +26,8 @@ const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 const STATUSES: usize = 5;
 /// The parameters in use come one every 100 ms, and a frame may be lost.
 const VALUES_WITHIN: Duration = Duration::from_secs(10);
-/// Speeds before a set: three that a new sender has to show, and more. At their period.
-const SPEEDS: u8 = 6;
+/// So many speeds of zero come first: the three of a new sender, and the hundred in a row of a vehicle that stands.
+const SPEEDS: u8 = 110;
 /// Before each frame of a set: those that a sender has to show anew, and one more.
 const SPEEDS_BETWEEN: u8 = 4;
 /// So often is a set sent whose speeds were too old when it came.
