@@ -95,6 +95,11 @@ impl Coast {
         }
     }
 
+    /// Whether it went on for as long as it may, and is lost.
+    pub(crate) const fn is_over(&self) -> bool {
+        self.sight != SEES && !self.goes_on()
+    }
+
     /// Whether pictures show a line elsewhere.
     pub(crate) const fn is_apart(&self) -> bool {
         self.sight == APART

@@ -3,7 +3,7 @@
 use crate::rig::{Rig, SPEED};
 use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
-use haptic_core::quantity::{Metres, Radians};
+use haptic_core::quantity::{Metres, Radians, Torque};
 
 const LANE: usize = 0;
 const VEHICLE: usize = 2;
@@ -231,15 +231,17 @@ fn only_active_goes_on_and_nothing_comes_back_after_a_handover() {
     assert_eq!(rig.run(1000).command.mode, Mode::Standby);
 }
 
-/// What else ends guidance ends it while the lane goes on too.
+/// What else ends guidance ends it while the lane goes on too, with a handover of its own length: 2 s, or 1 s without a column.
 #[test]
 fn other_losses_are_none_of_the_lanes() {
-    for sender in [1, VEHICLE, 3] {
+    for (sender, length_ms) in [(1, 1000), (VEHICLE, 2000), (3, 2000)] {
         let mut rig = beside(0.2);
         rig.silent[LANE] = true;
         rig.run(300);
         rig.silent[sender] = true;
         rig.run_until(41, |step| step.command.mode == Mode::Handover);
+        let (ms, _) = rig.run_until(2001, |step| step.command.torque == Torque::ZERO);
+        assert!((length_ms - 20..=length_ms).contains(&ms), "{sender}: {ms} ms");
     }
 }
 

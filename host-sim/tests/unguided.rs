@@ -10,7 +10,7 @@ use serde_json::Value;
 /// A left curve of a radius of 800 m, held for a minute at 60 km/h.
 const HELD: &str = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
                     [[segment]]\nlength = 1000\ncurvature = 0.00125\n";
-/// A camera that is blind for half a second every few seconds: the ECU hands over after 30 ms of that.
+/// A camera that is blind for 1.5 s every few seconds: the ECU hands over after a second of that.
 const BLIND: &str = "[sensor_errors]\ndropouts = 720\ndropout = 1.5\n";
 const RELIANCES: [&str; 3] = ["high", "mid", "low"];
 

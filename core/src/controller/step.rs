@@ -386,6 +386,7 @@ impl<I: Injection> Step<'_, I> {
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
         v.hot.small.mode = mode as u8;
+        let is_lane_over = v.coast.is_over();
         v.coast = Coast::NEW;
         v.hot.probe = ProbeState::SILENT;
         match mode {
@@ -401,12 +402,8 @@ impl<I: Injection> Step<'_, I> {
                 // took away does not come back.
                 let applied =
                     smaller_of_same_sign(self.applied, without(self.applied, Some(v.hot.probe_applied)));
-                // A lane that was gone on with has fallen on this line for a second already.
-                let length = if faults.intersects(RIDDEN_OUT) {
-                    GONE_ON
-                } else {
-                    HANDOVER
-                };
+                // Where the lane went on until it was lost, trust has fallen on this line for a second already.
+                let length = if is_lane_over { GONE_ON } else { HANDOVER };
                 v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), length);
             }
             _ => {}
