@@ -128,6 +128,9 @@ mod tests {
              \"world.gust_sd\" = { uniform = [0, 150] }\n\"world.friction\" = { uniform = [0, 0.4] }\n",
         );
         let (batched, out) = same_bytes(&sweep);
-        assert!(batched > 0 && 3 * out == batched, "{batched} side by side, {out} not");
+        assert!(
+            batched > 0 && 3 * out == batched,
+            "{batched} side by side, {out} not"
+        );
     }
 }
