@@ -266,6 +266,8 @@ impl<const N: usize> Ecus<N> {
         let coast = self.coasts[lane].as_mut()?;
         if lost_ms == 1 {
             coast.asked = asked;
+            let has_probe = flag(self.probes.is_on(lane));
+            self.suspect[lane] |= has_probe & self.matters[lane] & Reason::FailureWithProbe.bit();
         }
         self.band.grow(lane, lost_ms);
         if let Some(([e_y, e_theta], passed_ms)) = coast.go_on(step) {

@@ -26,14 +26,14 @@ pub enum Reason {
     TooSlow,
     /// The lane preview fails within the first two seconds, while the ECU does not know its sender's period yet.
     EarlyFailure,
-    /// The lane preview fails while a probe is on, which winds down meanwhile.
-    FailureWithProbe,
     /// A failure that ends: the ECU comes back.
     FailureEnds,
     /// Longer than the clock of vectorised runs counts.
     TooLong,
     /// Too few runs are left for a batch.
     TooFew,
+    /// The lane preview fails beside a probe, which winds down meanwhile.
+    FailureWithProbe,
     /// Near the end of what a frame carries.
     SensorRange,
     /// A picture that is far from the one before.
@@ -73,10 +73,10 @@ impl Reason {
             Self::EarlyFailure,
             "a lane preview that fails within the first 2 s",
         ),
-        (Self::FailureWithProbe, "a lane preview that fails beside a probe"),
         (Self::FailureEnds, "a failure that ends"),
         (Self::TooLong, "longer than 2000 s"),
         (Self::TooFew, "too few for a batch"),
+        (Self::FailureWithProbe, "a lane preview that fails beside a probe"),
         (Self::SensorRange, "a sensor near the end of its range"),
         (Self::LaneStep, "lane errors that jump"),
         (Self::Speed, "a speed that jumps, or is too slow"),
@@ -162,10 +162,6 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
             Reason::EarlyFailure,
         ),
         (
-            kind == FailureKind::Input && guidance.probe,
-            Reason::FailureWithProbe,
-        ),
-        (
             kind != FailureKind::None && duration_s.is_some(),
             Reason::FailureEnds,
         ),
@@ -241,7 +237,6 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
         controller,
         t_n: _,
         t_f: _,
-        // Beside a lane preview that fails it is not.
         probe: _,
     } = guidance;
     let Params {

@@ -117,7 +117,7 @@ mod tests {
         assert!(batched > 40 && out > 40, "{batched} side by side, {out} not");
     }
 
-    /// A probe, sensors with errors, other cars, wind and friction side by side; but not a probe beside a lane preview that fails.
+    /// A probe, sensors with errors, other cars, wind and friction side by side.
     #[test]
     fn nor_does_it_where_the_world_is_not_the_papers() {
         let sweep = with_road(
@@ -128,9 +128,6 @@ mod tests {
              \"world.gust_sd\" = { uniform = [0, 150] }\n\"world.friction\" = { uniform = [0, 0.4] }\n",
         );
         let (batched, out) = same_bytes(&sweep);
-        assert!(
-            batched > 0 && 3 * out == batched,
-            "{batched} side by side, {out} not"
-        );
+        assert!(batched > 0 && out == 0, "{batched} side by side, {out} not");
     }
 }
