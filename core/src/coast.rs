@@ -88,16 +88,8 @@ impl Coast {
 
     /// Whether the lane seen last goes on in place of pictures.
     pub(crate) const fn goes_on(&self) -> bool {
-        match self.sight {
-            SEES => false,
-            APART => self.lost.us() <= MOST_APART.us(),
-            _ => self.blind.us() <= MOST_BLIND.us(),
-        }
-    }
-
-    /// Whether it went on for as long as it may, and is lost.
-    pub(crate) const fn is_over(&self) -> bool {
-        self.sight != SEES && !self.goes_on()
+        let is_short = self.lost.us() <= MOST_APART.us();
+        is_short && (self.is_apart() || (self.sight == BLIND && self.blind.us() <= MOST_BLIND.us()))
     }
 
     /// Whether pictures show a line elsewhere.
@@ -123,9 +115,10 @@ impl Coast {
         self.sight = BLIND;
     }
 
-    /// Takes a new picture, which agrees with the line as it went on or not.
+    /// Takes a new picture, which agrees with the line as it went on or not. How that went on for longer than [`MOST_BLIND`] says
+    /// nothing: 3 mrad/s of yaw rate are half a metre within 3 s.
     pub(crate) fn see(&mut self, sample: &LaneSample, agrees: bool, asked: Torque) -> Shows {
-        if agrees {
+        if agrees && self.lost <= MOST_BLIND {
             self.sight = SEES;
             return Shows::TheLine;
         }

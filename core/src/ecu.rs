@@ -225,11 +225,7 @@ impl Ecu {
 
         let accepted = &self.receivers.accepted;
         let evidence = Evidence {
-            // A picture of a line elsewhere moves nothing.
-            lane: accepted
-                .lane
-                .as_ref()
-                .filter(|_| !command.faults.contains(Fault::LaneStep)),
+            lane: accepted.lane.as_ref(),
             column: accepted.column.as_ref(),
             demand: accepted.demand.as_ref(),
             guidance: guidance.bytes(),

@@ -63,6 +63,8 @@ words! {
     /// What a new lane sample changes.
     pub(crate) struct Picture {
         lane: Lane,
+        /// How old it was when it came.
+        came_us: i32,
         /// An older lane sample, for rates, and how much older it is.
         before: Lane,
         older_us: i32,
@@ -111,8 +113,12 @@ const PROBE_END_US: i32 = 1_030_000;
 pub const ASTRAY_MS: i32 = 20;
 /// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
 const OLDEST_LANE_US: i32 = 360_000;
-/// For so long more the lane may go on without a picture. The band is wider by 1 mN.m for each millisecond since the last.
-const COAST_US: i32 = 1_000_000;
+/// For so long more the lane may go on: a second without a picture, and 0.3 s to let go of it where pictures then show another
+/// line. The band is wider by 1 mN.m for each millisecond since the last.
+const COAST_US: i32 = 1_400_000;
+/// A picture is left aside, as of another line, only after so long without one: less than any time-out. Whoever calls the pictures
+/// of a camera of 40 Hz and more another line's is not believed.
+const UNSEEN_US: i32 = 25_000;
 /// A sample older than this is continued at its rates, for so long at most.
 const PROMPT_LANE_US: i32 = 40_000;
 const LONGEST_LATE_US: i32 = OLDEST_LANE_US - PROMPT_LANE_US;
@@ -141,6 +147,7 @@ impl MonitorState {
                 e_y_mm: 0,
                 e_theta_urad: 0,
             },
+            came_us: 0,
             before: Lane {
                 e_y_mm: 0,
                 e_theta_urad: 0,
@@ -328,7 +335,11 @@ impl MonitorState {
     #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
         self.now.age_us = self.now.age_us.saturating_add(elapsed_us);
-        if let Some(bytes) = evidence.lane {
+        let unseen_us = self.now.age_us.saturating_sub(self.picture.came_us);
+        let lane = evidence
+            .lane
+            .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
+        if let Some(bytes) = lane {
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
@@ -345,7 +356,7 @@ impl MonitorState {
             } else {
                 self.picture.older_us = self.picture.older_us.saturating_add(apart_us);
             }
-            (self.picture.lane, self.now.age_us) = (new, age_us);
+            (self.picture.lane, self.picture.came_us, self.now.age_us) = (new, age_us, age_us);
         }
         if let Some(bytes) = evidence.column {
             self.now.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
@@ -354,7 +365,7 @@ impl MonitorState {
         if evidence.demand.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
             self.now.probe_left_us = PROBE_END_US;
         }
-        evidence.lane.is_some()
+        lane.is_some()
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -377,6 +388,12 @@ impl MonitorState {
             .saturating_mul(1000);
         (e_y_mmps, e_theta_urps)
     }
+}
+
+/// Whether a guidance frame says LaneTimeout or LaneStep.
+#[cold]
+fn says_aside(guidance: &[u8; 8]) -> bool {
+    field(guidance, 37, 1) | field(guidance, 52, 1) != 0
 }
 
 /// A signed little-endian bit field.

@@ -822,8 +822,8 @@ fn a_lane_preview_that_never_ages_is_stale_to_the_monitor() {
     rig.tick();
     rig.ecu.keep_lane_fresh();
     rig.silent[LANE] = true;
-    let (ms, step) = rig.run_until(1400, |step| step.command.mode != Mode::Active);
-    assert_eq!((ms, step.command.mode), (1361, Mode::Fault));
+    let (ms, step) = rig.run_until(1800, |step| step.command.mode != Mode::Active);
+    assert_eq!((ms, step.command.mode), (1761, Mode::Fault));
     assert!(step.command.faults.contains(Fault::Monitor) && !step.permitted);
 }
 

@@ -202,8 +202,8 @@ fn against_the_driver() {
 
 #[test]
 fn old_lane_data_in_active() {
-    // 360 ms, and a second in which the lane goes on without a picture.
-    for (age, last_good_ms) in [(0, 1360), (100, 1350), (400, 1320)] {
+    // 360 ms, and 1.4 s in which the lane goes on.
+    for (age, last_good_ms) in [(0, 1760), (100, 1750), (400, 1720)] {
         let mut bench = Bench::at(5.0, 40);
         assert!(bench.show(Some(lane(0, 0, age)), None, guidance(40, ACTIVE), 1000));
         for _ in 0..last_good_ms {
@@ -319,6 +319,31 @@ fn rates_are_forgotten_in_a_gap() {
     // 8 m in 360 ms are worth 0.28 N.m; a millisecond later nothing is known of the rate.
     assert_eq!(steps(-65_535, 500, 360), 30);
     assert_eq!(steps(-65_535, 500, 361), 20);
+}
+
+/// A torque of 0.5 N.m that the last picture asked for, and from then on, after a gap, pictures every 8 ms that ask for nothing:
+/// 20 steps, or as long as they are left aside because the frame says LaneTimeout (bit 37) or LaneStep (52) after 25 ms without.
+#[test]
+fn pictures_that_come_in_time_count_whatever_is_said_of_them() {
+    let torque = counts(500).0;
+    let steps = |said: u64, gap_ms: u32| {
+        let mut bench = Bench::at(5.0, torque);
+        assert!(bench.show(Some(lane(8192, 0, 0)), None, guidance(torque, FADE), 1000));
+        (1..100)
+            .take_while(|ms| {
+                let comes = *ms >= gap_ms && (ms - gap_ms).is_multiple_of(8);
+                let frame = u64::from_le_bytes(guidance(torque, ACTIVE)) | said;
+                bench.show(comes.then(|| lane(0, 0, 0)), None, frame.to_le_bytes(), 1000)
+            })
+            .count() as u32
+    };
+    for said in [1 << 37, 1 << 52] {
+        assert_eq!(steps(said, 8), 7 + 20);
+        assert_eq!(steps(said, 25), 24 + 20);
+        assert_eq!(steps(said, 26), 99);
+    }
+    // LaneInvalid says nothing of a picture that is used.
+    assert_eq!(steps(1 << 38, 26), 25 + 20);
 }
 
 /// Errors that passed zero at a constant rate with the last picture, and no picture since. From 40 ms of age on the

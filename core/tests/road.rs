@@ -12,7 +12,7 @@ use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate
 const LANE: usize = 0;
 
 /// Runs with the lane's sender at its own period and age; the bench's own is silent.
-fn run_with_camera(rig: &mut Rig, counter: &mut u8, ms: u64, period_us: u64, age_us: u32) {
+pub(crate) fn run_with_camera(rig: &mut Rig, counter: &mut u8, ms: u64, period_us: u64, age_us: u32) {
     rig.silent[LANE] = true;
     rig.lane.age = Micros::from_us(age_us);
     let start = rig.t_us;

@@ -16,7 +16,7 @@ use crate::probe::ProbeState;
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
-use crate::ramp::{GONE_ON, HANDOVER, History, Ramp, pace, smaller_of_same_sign};
+use crate::ramp::{History, Ramp, handover_of, pace, smaller_of_same_sign};
 
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
@@ -64,19 +64,18 @@ impl<I: Injection> Step<'_, I> {
         due: &mut Due,
     ) -> Command {
         let before = Mode::from_code(v.hot.small.mode.into()).unwrap_or(Mode::Fault);
-        let mut ridden_out = FaultSet::NONE;
+        let [mut ridden_out, mut said] = [FaultSet::NONE; 2];
         if before == Mode::Active && !(v.coast.is_idle() && self.inputs.lane.value().is_some()) {
             changed.add(Changed::COAST);
-            ridden_out = self.coast(v, changed, past);
+            [ridden_out, said] = self.coast(v, changed, past);
         }
         let fast_enough = self.is_fast_enough();
         let lost = self.look(v, changed, fast_enough, past, due);
         let (late, early) = self.keep_time(v);
-        let mut faults = lost.union(v.faults()).union(self.inputs.faults);
+        let mut faults = lost.union(v.faults()).union(self.inputs.faults).union(said);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
         v.hot.kept |= faults.common(FaultSet::CRITICAL).bits();
 
-        faults.insert_if(v.coast.is_apart(), Fault::LaneStep);
         if before == Mode::Active {
             v.hot
                 .hands
@@ -109,23 +108,24 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// The lane where its picture did not come, or did not agree. Returns the faults that do not end guidance because of it.
+    /// The lane where its picture did not come, or did not agree. Returns the faults that do not end guidance because of it,
+    /// and what there is to say of the pictures.
     #[cold]
     #[inline(never)]
-    fn coast(&mut self, v: &mut Memory, changed: &mut Changed, past: &mut Past) -> FaultSet {
+    fn coast(&mut self, v: &mut Memory, changed: &mut Changed, past: &mut Past) -> [FaultSet; 2] {
         let Some(last) = v.law.last() else {
-            return FaultSet::NONE;
+            return [FaultSet::NONE; 2];
         };
         let gone_on = |v: &Memory, past: &Past, at| {
             let checks = &self.config.plausibility;
             checks.gone_on(&v.plausibility, past, self.now, &last, at)
         };
+        let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
         let since = self.since(v, last);
         let asked = self.config.law.asked(&v.law, self.now, since.as_ref());
         match self.inputs.lane {
             Input::Lost => v.coast.lose(asked),
-            // A camera that is late jitters: a picture from before where the lane went on to has to wait.
-            Input::New(sample) if sample.at.since(last.at) <= HALF_WRAP => {
+            Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&gone_on(v, past, sample.at), &sample);
                 match v.coast.see(&sample, agrees, asked) {
                     Shows::TheLine => v.law.relocate(sample),
@@ -142,17 +142,23 @@ impl<I: Injection> Step<'_, I> {
             _ => {}
         }
         v.coast.pass(self.elapsed);
+        let mut said = FaultSet::NONE;
+        said.insert_if(v.coast.is_apart(), Fault::LaneStep);
         if !v.coast.goes_on() {
-            return FaultSet::NONE;
+            return [FaultSet::NONE, said];
         }
         let passed = self.now.since(v.heard.lane);
-        self.lane = if passed < GOES_ON {
+        // A camera may be later than before, or jitter: where the lane went on to waits for a picture to compare.
+        let waits = self.inputs.lane.value().is_some_and(is_older);
+        // It is of no use yet.
+        said.insert_if(waits && !v.coast.is_apart(), Fault::LaneTimeout);
+        self.lane = if passed < GOES_ON || waits {
             Input::Held(last)
         } else {
             // As old as the pictures were.
             Input::New(gone_on(v, past, last.at.after(passed)))
         };
-        RIDDEN_OUT
+        [RIDDEN_OUT, said]
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
@@ -386,7 +392,7 @@ impl<I: Injection> Step<'_, I> {
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
         v.hot.small.mode = mode as u8;
-        let is_lane_over = v.coast.is_over();
+        let trust = v.coast.trust;
         v.coast = Coast::NEW;
         v.hot.probe = ProbeState::SILENT;
         match mode {
@@ -402,9 +408,8 @@ impl<I: Injection> Step<'_, I> {
                 // took away does not come back.
                 let applied =
                     smaller_of_same_sign(self.applied, without(self.applied, Some(v.hot.probe_applied)));
-                // Where the lane went on until it was lost, trust has fallen on this line for a second already.
-                let length = if is_lane_over { GONE_ON } else { HANDOVER };
-                v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), length);
+                let start = history.handover_start(self.now, suspect, applied);
+                v.ramp = Ramp::over(start, handover_of(trust));
             }
             _ => {}
         }

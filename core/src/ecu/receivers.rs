@@ -24,7 +24,7 @@ const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 /// Slower is standing.
 const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
 /// Messages of the vehicle that have to be used in a row where it is to stand.
-const UNDISTURBED: u8 = 100;
+const UNDISTURBED: u32 = 100;
 
 /// The latest value of one input, with what judges the next. What is small shares a word: a step checks every one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -315,7 +315,7 @@ struct Standing {
     /// The larger speed, which falls no faster than a vehicle brakes.
     at_most: Speed,
     /// Messages in a row that were used.
-    in_a_row: u8,
+    in_a_row: u32,
 }
 
 impl Standing {
