@@ -36,13 +36,11 @@ const MOTOR_LAG: f64 = 64.0 / 3.0;
 /// Slowest speed that is guided, m/s.
 const LEAST_SPEED_M_PER_S: f64 = 5.0;
 const MEMORY_S: f64 = 1.0;
-const TIMEOUT_S: f64 = 0.030;
 /// How long a line may be elsewhere; until the old one is let go of, three frames of its sender included; and where it is taken.
 const ELSEWHERE_S: f64 = 4.0;
 const LET_GO_S: f64 = 0.55;
 const NEAR_M: f64 = 0.8;
 const NEAR_RAD: f64 = 0.2;
-const HALF_STEP_S: f64 = 0.0005;
 /// t'_n, and how long before the far point is where the near point is now, s.
 const NEAR_TIME_S: f64 = 0.3;
 const BETWEEN_S: f64 = 0.4;
@@ -306,7 +304,7 @@ impl Residual {
     pub(super) fn lane_used(&self) -> f64 {
         // No possible sample for as long as guidance goes on without.
         let silence_s = self.lane.map_or(0.0, |(at_s, ..)| self.now_s - at_s);
-        if silence_s > TIMEOUT_S + ELSEWHERE_S + HALF_STEP_S {
+        if silence_s > ELSEWHERE_S {
             return f64::INFINITY;
         }
         let missing = (self.predicted_m - self.moved_m) * self.predicted_m.signum();

@@ -41,7 +41,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row("wrong-length", "frames of seven bytes", &[wire(Wire::Short)]).hands_over(STALE_MS).q(),
     row("wrong-identifier", "frames under an unknown identifier", &[wire(Wire::Renamed)]).hands_over(STALE_MS).q(),
     row("ten-times-the-rate", "ten frames where one is due, counters running", &[wire(Wire::Burst(10))]).q(),
-    row("jitter", "frames up to 25 ms late, in order: a gap may pass the time-out", &[wire(Wire::Jittered(25))]).gaps_may_hand_over().q(),
+    row("jitter", "frames up to 25 ms late, in order: a gap may pass the time-out", &[wire(Wire::Jittered(25))]).bridged().may_hand_over_at_once().q(),
     row("request-toggles", "request toggles at 50 Hz", &[Injection::Request(RequestFault::Toggles)]).fades(22).q(),
     row("bus-off", "bus off for 100 ms, then back", &[SILENCE]).hands_over(STALE_MS).lasts(100).q(),
 ];

@@ -93,7 +93,17 @@ pub(super) const ROWS: &[FaultCase] = &[
             Sensor(LateralError, Plus(0.5)),
             Injection::Wire(Wire::Lost(&[LANE], Some(60))),
         ],
-    ),
+    )
+    .may_hand_over(),
+    row(
+        "camera-blinks-and-speeds-drift",
+        "lane preview lost, and second speed drifts away at 5 m/s2: 2 m/s apart after 400 ms",
+        &[
+            Injection::Wire(Wire::Lost(&[LANE], None)),
+            Sensor(Speed2, Drifting(5.0)),
+        ],
+    )
+    .hands_over(400 + SLIP_MS),
     // One LSB beyond the range, once and always.
     row(
         "lateral-error-beyond-once",
@@ -292,13 +302,14 @@ pub(super) const ROWS: &[FaultCase] = &[
         "lateral-error-step",
         "e_y' 0.5 m off, as at road works",
         &[Sensor(LateralError, Plus(0.5))],
-    ),
+    )
+    .may_hand_over(),
     row(
         "lateral-error-step-far",
         "e_y' 3 m off",
         &[Sensor(LateralError, Plus(3.0))],
     )
-    .hands_over(ELSEWHERE_MS),
+    .contradicts(),
     row(
         "lateral-error-flipped",
         "e_y' with the wrong sign",
@@ -378,7 +389,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_y' times 10",
         &[JERK, Sensor(LateralError, Times(10.0))],
     )
-    .only_rules()
+    .may_hand_over_at_once()
     .torque(5.0),
     row(
         "yaw-error-x0",
@@ -398,7 +409,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_theta' times 10",
         &[JERK, Sensor(YawError, Times(10.0))],
     )
-    .only_rules()
+    .may_hand_over_at_once()
     .torque(5.0),
     row(
         "noise-3-sigma",
