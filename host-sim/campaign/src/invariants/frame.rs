@@ -3,15 +3,14 @@
 use haptic_core::bus::Frame;
 
 use super::{LIMIT_NM, MEMORY_FAULT, OVERRIDE_FROM_NM, OVERRIDE_SLOPE};
-use crate::bytes::{self, ACTIVE, FAULT, HANDOVER, LOCKED, Status};
+use crate::bytes::{self, ACTIVE, FAULT, HANDOVER, LANE_STEP, LOCKED, Status};
 
 /// Bits of the faults of class B, of class C, and of class Locked. A copy of the core's list on purpose: a test compares
 /// them, so that a new fault is classed here by a person too.
 const CLASSES: [u64; 3] = [0x7_80FF, 0x1F00, 0x6000];
 
-/// Bit of the fault that no hand is on the wheel: a warning, whatever the mode. And of a line elsewhere: one in Active.
+/// Bit of the fault that no hand is on the wheel: a warning, whatever the mode.
 const HANDS_OFF: u64 = 1 << 19;
-const LANE_STEP: u64 = 1 << 15;
 
 /// The classes that a guidance frame must name with these faults.
 fn classes_of(faults: u64) -> u64 {
