@@ -19,7 +19,8 @@ const CORE: Arrows = &[
     // The codes of limits, modes and faults, and the names of the parameters that it carries.
     ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity"]),
     ("config", &["envelope", "estimator", "law", "monitor", "params", "plausibility", "probe", "quantity", "redundant", "schedule"]),
-    ("controller", &["config", "envelope", "faults", "hands", "injection", "law", "modes", "past", "plausibility", "probe", "quantity", "ramp", "redundant"]),
+    ("coast", &["law", "quantity", "redundant"]),
+    ("controller", &["coast", "config", "envelope", "faults", "hands", "injection", "law", "modes", "past", "plausibility", "probe", "quantity", "ramp", "redundant"]),
     ("download", &["bus", "config", "faults", "modes", "params", "stored"]),
     ("ecu", &["actuator", "background", "bus", "config", "controller", "envelope", "estimator", "faults", "injection", "law", "modes", "monitor", "plausibility", "quantity", "redundant"]),
     ("envelope", &["quantity", "redundant"]),

@@ -70,7 +70,8 @@ fn send(machine: &mut Machine, params: &Params, in_use: u32, without: Option<usi
         speeds: [Speed::ZERO; 2],
         yaw_rate: None,
     };
-    for counter in 0..5 {
+    // A hundred messages in a row, behind the three of a new sender.
+    for counter in 0..104 {
         machine.send(&slcan::format(&standing.encode(counter)));
         // Ten milliseconds of the machine's time: torque frames come one in each.
         for _ in 0..10 {
@@ -79,7 +80,7 @@ fn send(machine: &mut Machine, params: &Params, in_use: u32, without: Option<usi
     }
     // The machine does not wait for this client: with a speed before every frame none of them meets an old one, and all
     // go out in one piece.
-    let mut counter = 5;
+    let mut counter = 104;
     let mut piece = Vec::new();
     let mut send_standing = |frame: &Frame| {
         for _ in 0..4 {

@@ -5,6 +5,7 @@
 
 mod step;
 
+use crate::coast::Coast;
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason};
 use crate::faults::{Fault, FaultSet};
@@ -108,8 +109,6 @@ pub struct Inputs {
     pub motion: Input<Motion>,
     /// What the host requests.
     pub request: Input<Request>,
-    /// The new lane sample is of another line than the last.
-    pub line_moved: bool,
     /// Faults found outside: on the bus, by the monitor, at the output.
     pub faults: FaultSet,
 }
@@ -123,7 +122,6 @@ impl Inputs {
             column: Input::Lost,
             motion: Input::Lost,
             request: Input::Lost,
-            line_moved: false,
             faults: FaultSet::NONE,
         }
     }
@@ -156,6 +154,7 @@ words! {
         plausibility: PlausibilityState,
         /// The share of the law's torque that acts at the speed in use; 0 before there is one.
         share: Ratio,
+        coast: Coast,
         ramp: Ramp,
     }
 }
@@ -192,6 +191,7 @@ impl Changed {
     const LANE: Self = Self(8);
     const COLUMN: Self = Self(16);
     const RAMP: Self = Self(32);
+    const COAST: Self = Self(64);
 
     const fn add(&mut self, part: Self) {
         self.0 |= part.0;
@@ -285,6 +285,7 @@ impl Memory {
             law: LawState::NEW,
             plausibility: PlausibilityState::NEW,
             share: Ratio::ZERO,
+            coast: Coast::NEW,
             ramp: Ramp::NONE,
         }
     }
@@ -397,11 +398,12 @@ impl Controller {
             return state.lose_memory(now);
         }
         let memory = state.memory.value_mut();
-        let step = Step {
+        let mut step = Step {
             config: self.config.value(),
             now,
             applied,
             inputs,
+            lane: inputs.lane,
             elapsed: now.since(memory.hot.last_step),
             injection,
         };
@@ -434,6 +436,9 @@ fn seal(memory: &mut Redundant<Memory>, changed: Changed) {
     }
     if changed.has(Changed::COLUMN) {
         memory.seal_part(|v| &mut v.plausibility.column);
+    }
+    if changed.has(Changed::COAST) {
+        memory.seal_part(|v| &mut v.coast);
     }
     if changed.has(Changed::RAMP) {
         memory.seal_part(|v| &mut v.ramp);

@@ -17,7 +17,7 @@ use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
     Message, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, WriteOutcome,
 };
-use crate::config::Config;
+use crate::config::Setup;
 use crate::faults::{Fault, FaultSet};
 use crate::modes::Mode;
 use crate::params::{PARAMETERS, Params};
@@ -170,7 +170,8 @@ impl Download {
         }
         let params = Params::from_values(&self.values);
         self.unlocked_ms = None;
-        let is_good = Config::new(&params).is_ok();
+        // What the next start would refuse is not taken.
+        let is_good = Setup::new(&params).is_ok();
         self.outcome = if is_good {
             WriteOutcome::Taken
         } else {

@@ -99,7 +99,8 @@ pub struct Ecu {
     receivers: Receivers,
     history: History,
     reset: ResetCause,
-    warned_at: Option<u32>,
+    /// In which step the warnings of a mode began.
+    warned_at: Option<(u32, Mode)>,
     /// The monitor's test is due. Not kept twice: a flip costs one test or brings one more.
     is_test_due: bool,
     background: Background,
@@ -305,7 +306,7 @@ impl Ecu {
         .encode(steps as u8)
     }
 
-    /// A warning in the step that needs it, then one each turn; a line of the fault history each turn.
+    /// A warning in the step that needs it, in each mode, then one each turn; a line of the fault history each turn.
     #[expect(
         clippy::as_conversions,
         reason = "a counter is cut to its four bits; there are at most 32 lines"
@@ -314,7 +315,8 @@ impl Ecu {
         let mut frames = Vec::new();
         let due = |since: u32| steps.wrapping_sub(since).is_multiple_of(TURN);
         if command.warning {
-            let since = *self.warned_at.get_or_insert(steps);
+            let before = self.warned_at.filter(|(_, mode)| *mode == command.mode);
+            let (since, _) = *self.warned_at.insert(before.unwrap_or((steps, command.mode)));
             if due(since) {
                 let counter = steps.wrapping_sub(since) / TURN;
                 let warning = Warning {

@@ -70,7 +70,7 @@ macro_rules! faults {
 }
 
 faults! {
-    /// B: no usable lane preview for 30 ms.
+    /// B: no usable lane preview for 30 ms, or for 1 s more of guidance.
     0 LaneTimeout: B, 0;
     /// B: the lane preview's sender does not vouch for it.
     1 LaneInvalid: B, 0;
@@ -83,7 +83,7 @@ faults! {
     /// B: no usable speed for 30 ms.
     5 SpeedTimeout: B, 0;
     /// B: the two speeds differ by 2 m/s or more.
-    6 SpeedImplausible: B, 500;
+    6 SpeedImplausible: B, 800;
     /// B: no usable command for 30 ms.
     7 CommandTimeout: B, 0;
     /// C: steps late or missing.
@@ -100,7 +100,7 @@ faults! {
     13 Parameters: Locked, 0;
     /// Locked: three resets within 10 s, or ten since power-up.
     14 ResetLoop: Locked, 0;
-    /// B: lane previews arrive, and for 30 ms each is too far from the last one used to be true.
+    /// B: lane previews arrive, and for 30 ms, or 4 s of guidance, each is too far from the last one used to be true.
     15 LaneStep: B, 0;
     /// B: speeds arrive, and for 30 ms each is too far from the last one used to be true.
     16 SpeedStep: B, 0;
@@ -189,6 +189,12 @@ impl FaultSet {
     pub fn unseen(self) -> Micros {
         let present = Fault::ALL.into_iter().filter(|fault| self.contains(*fault));
         present.map(Fault::unseen).max().unwrap_or_default()
+    }
+
+    /// The set with one fault more.
+    #[must_use]
+    pub const fn with(self, fault: Fault) -> Self {
+        Self(self.0 | Self::bit(fault))
     }
 
     /// Adds a fault.

@@ -152,7 +152,12 @@ impl LawState {
         self.has_last != 0 && self.last == *sample
     }
 
-    /// The line is another one from this sample on: it goes on at the rates of the old one.
+    /// The sample taken last, if there is one.
+    pub(crate) fn last(&self) -> Option<LaneSample> {
+        (self.has_last != 0).then_some(self.last)
+    }
+
+    /// The line is where this sample has it, and goes on at the rates that it had.
     pub fn relocate(&mut self, sample: LaneSample) {
         self.last = sample;
     }

@@ -102,6 +102,7 @@
 pub mod actuator;
 mod background;
 pub mod bus;
+pub mod coast;
 pub mod config;
 pub mod controller;
 pub mod download;

@@ -63,6 +63,8 @@ words! {
     /// What a new lane sample changes.
     pub(crate) struct Picture {
         lane: Lane,
+        /// How old it was when it came.
+        came_us: i32,
         /// An older lane sample, for rates, and how much older it is.
         before: Lane,
         older_us: i32,
@@ -111,8 +113,15 @@ const PROBE_END_US: i32 = 1_030_000;
 pub const ASTRAY_MS: i32 = 20;
 /// Lane data older than this must not move the wheel in Active: a sample's age, and three periods of the slowest camera.
 const OLDEST_LANE_US: i32 = 360_000;
-/// A sample older than this is continued at its rates.
+/// For so long more the lane may go on: a second without a picture, and 0.3 s to let go of it where pictures then show another
+/// line. The band is wider by 1 mN.m for each millisecond since the last.
+const COAST_US: i32 = 1_400_000;
+/// A picture is left aside, as of another line, only after so long without one: less than any time-out. Whoever calls the pictures
+/// of a camera of 40 Hz and more another line's is not believed.
+const UNSEEN_US: i32 = 25_000;
+/// A sample older than this is continued at its rates, for so long at most.
 const PROMPT_LANE_US: i32 = 40_000;
+const LONGEST_LATE_US: i32 = OLDEST_LANE_US - PROMPT_LANE_US;
 /// Override bound: from 0.8 N.m of opposing torque, 3 N.m per N.m, and what two frames' time can change.
 const OVERRIDE_FROM_MNM: i32 = 800;
 const OVERRIDE_SLOPE: i32 = 3;
@@ -138,6 +147,7 @@ impl MonitorState {
                 e_y_mm: 0,
                 e_theta_urad: 0,
             },
+            came_us: 0,
             before: Lane {
                 e_y_mm: 0,
                 e_theta_urad: 0,
@@ -250,15 +260,17 @@ impl Monitor {
 
     #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
-        if state.now.age_us > OLDEST_LANE_US && torque != 0 {
+        if state.now.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
         }
-        // What an old sample has become since, at most: the errors went on at their rates.
+        // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
         let late_us = state.now.age_us.saturating_sub(PROMPT_LANE_US);
-        let position = if late_us < 1000 {
-            state.picture.position_mnm
-        } else {
-            let late_ms = late_us / 1000;
+        let (position, rate) = (state.picture.position_mnm, state.picture.rate_mnm);
+        let both = position.saturating_add(rate);
+        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
+        let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
+        if late_us >= 1000 {
+            let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
             let [per_m, per_rad, ..] = self.gains_mnm;
             let (e_y_mmps, e_theta_urps) = state.rates();
             let carried = per_m
@@ -267,18 +279,20 @@ impl Monitor {
                 .saturating_add(
                     per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
                 );
-            state.picture.position_mnm.saturating_add(carried)
-        };
-        let both = position.saturating_add(state.picture.rate_mnm);
+            let position = position.saturating_add(carried);
+            let both = position.saturating_add(rate);
+            (low, high) = (low.min(position).min(both), high.max(position).max(both));
+        }
         let probe = if state.now.probe_left_us > 0 {
             self.probe_mnm
         } else {
             0
         };
-        let band = self.band_mnm.saturating_add(probe);
-        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
-        let high = position.max(both).max(0).saturating_add(band);
-        let low = position.min(both).min(0).saturating_sub(band);
+        let band = self
+            .band_mnm
+            .saturating_add(probe)
+            .saturating_add(late_us.max(0) / 1000);
+        let (low, high) = (low.saturating_sub(band), high.saturating_add(band));
         let falling = torque.saturating_abs() < state.now.torque_mnm.saturating_abs();
         if (low..=high).contains(&torque) {
             state.now.astray_ms = 0;
@@ -300,7 +314,7 @@ impl Monitor {
             1 => grown = torque,
             2 => mode = STANDBY,
             3 => state.now.driver_mnm = -20_000,
-            4 => state.now.age_us = 1_000_000,
+            4 => state.now.age_us = 2_000_000,
             5 => (torque, grown) = (0, -400),
             _ => (torque, state.now.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
         }
@@ -321,7 +335,11 @@ impl MonitorState {
     #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
         self.now.age_us = self.now.age_us.saturating_add(elapsed_us);
-        if let Some(bytes) = evidence.lane {
+        let unseen_us = self.now.age_us.saturating_sub(self.picture.came_us);
+        let lane = evidence
+            .lane
+            .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
+        if let Some(bytes) = lane {
             let new = Lane {
                 e_y_mm: field(bytes, 12, 17).saturating_mul(1000) / 8192,
                 e_theta_urad: field(bytes, 29, 17).saturating_mul(15_259) / 1000,
@@ -338,7 +356,7 @@ impl MonitorState {
             } else {
                 self.picture.older_us = self.picture.older_us.saturating_add(apart_us);
             }
-            (self.picture.lane, self.now.age_us) = (new, age_us);
+            (self.picture.lane, self.picture.came_us, self.now.age_us) = (new, age_us, age_us);
         }
         if let Some(bytes) = evidence.column {
             self.now.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
@@ -347,7 +365,7 @@ impl MonitorState {
         if evidence.demand.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
             self.now.probe_left_us = PROBE_END_US;
         }
-        evidence.lane.is_some()
+        lane.is_some()
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -370,6 +388,12 @@ impl MonitorState {
             .saturating_mul(1000);
         (e_y_mmps, e_theta_urps)
     }
+}
+
+/// Whether a guidance frame says LaneTimeout or LaneStep.
+#[cold]
+fn says_aside(guidance: &[u8; 8]) -> bool {
+    field(guidance, 37, 1) | field(guidance, 52, 1) != 0
 }
 
 /// A signed little-endian bit field.

@@ -7,12 +7,16 @@
 //! [`crate::law`], so that a flip moves the torque by less than the monitor's band; what the checks take can declare
 //! or hide a fault for one second.
 
-use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second, saturate};
+use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second, saturate, signed_quotient};
 
 /// A power of two, so that the place is a mask.
 const RING: usize = 32;
 /// Two directions of the line are kept so far apart, so that the ring holds the time between near and far point.
 const APART: Micros = Micros::from_ms(20);
+
+/// The line's bend is that between its last direction and one so many before: 0.3 s at least, over which 2 mrad of noise
+/// make 0.01 rad/s.
+const BEND: usize = 15;
 
 /// The time over which the rate before a sample is taken, and how often it is in a second.
 const BEFORE: Micros = Micros::from_ms(50);
@@ -143,6 +147,21 @@ impl Past {
         let direction = direction.wrapping_add(saturate(way));
         let psi = self.heading(now, at).psi_at(at);
         Some(Radians::from_bits(direction.wrapping_sub(psi)))
+    }
+
+    /// By how much the direction of the line at the far point changes, against the vehicle's heading, from one instant to a
+    /// later one if the line goes on to bend as it did.
+    #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
+    #[must_use]
+    pub fn onward(&self, now: Instant, from: Instant, to: Instant) -> Radians {
+        let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
+        let (newest, direction) = place(0);
+        let (oldest, before) = place(self.known_lines.saturating_sub(1).min(BEND));
+        let bent = i64::from(direction.wrapping_sub(before)).saturating_mul(1_000_000);
+        let rate = signed_quotient(bent, newest.since(oldest).us());
+        let psi = |at: Instant| self.heading(now, at).psi_at(at);
+        let turned = psi(to).wrapping_sub(psi(from));
+        Radians::from_bits(per_second(rate, to.since(from)).saturating_sub(turned))
     }
 
     /// The line was lost.

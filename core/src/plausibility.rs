@@ -23,8 +23,8 @@
 //! pushes for a moment and the column answers later comes to nothing. The inertia (0.11 kg.m2 at hand speeds: 0.02 N.m.s) is
 //! far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is estimated slowly, and bounded.
 //!
-//! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists and is not
-//! that of a line that was chosen anew ([`is_another_line`]), the input goes stale and is a fault.
+//! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists, the input goes
+//! stale, and in Active the lane seen last goes on ([`crate::coast`]). A yaw rate that no vehicle has is left out for 0.1 s.
 //!
 //! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
 //! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
@@ -76,8 +76,10 @@ words! {
         /// The measured yaw rate, if there is one.
         yaw_rate: TurningRate,
         has_yaw_rate: u32,
-        /// Messages in a row whose speeds were apart.
-        apart: u32,
+        /// For how long impossible yaw rates have been left out.
+        held: Micros,
+        /// For how long the speeds have been apart.
+        apart: Micros,
     }
 }
 
@@ -115,7 +117,8 @@ impl PlausibilityState {
             turning_gain: TurningRatePerAngle::ZERO,
             yaw_rate: TurningRate::ZERO,
             has_yaw_rate: 0,
-            apart: 0,
+            held: Micros::from_us(0),
+            apart: Micros::from_us(0),
         },
         lane: LaneState {
             is_known: 0,
@@ -164,16 +167,38 @@ impl PlausibilityState {
         self.motion.speed
     }
 
-    /// Takes two speeds; `false` when they have been too far apart in three messages in a row.
+    /// Takes two speeds that come so long after the last. Whether they agree, and whether they did within
+    /// [`SPEEDS_PATIENCE`].
     #[must_use]
-    pub fn speeds_agree(&mut self, [a, b]: [Speed; 2]) -> (bool, bool) {
+    pub fn speeds_agree(&mut self, [a, b]: [Speed; 2], elapsed: Micros) -> (bool, bool) {
         let agree = speeds_agree(a, b);
-        self.motion.apart = if agree {
+        let apart = if agree {
             0
         } else {
-            self.motion.apart.saturating_add(1)
+            self.motion.apart.us().saturating_add(elapsed.us())
         };
-        (agree, self.motion.apart < SPEEDS_PATIENCE)
+        self.motion.apart = Micros::from_us(apart);
+        (agree, apart <= SPEEDS_PATIENCE.us())
+    }
+
+    /// The yaw rate to use of one that comes so long after the last: in the place of one that no vehicle has the last one, for
+    /// [`YAW_RATE_PATIENCE`].
+    #[must_use]
+    pub fn possible_yaw_rate(&mut self, new: TurningRate, passed: Micros) -> TurningRate {
+        let m = &mut self.motion;
+        let sideways = product(m.speed.bits(), new.bits()).unsigned_abs();
+        let stepped = m.yaw_rate.bits().abs_diff(new.bits());
+        let is_possible = sideways <= u64::from(MOST_SIDEWAYS) << FRAC_BITS
+            && stepped <= YAW_RATE_STEP.bits().unsigned_abs();
+        m.held = if is_possible {
+            Micros::from_us(0)
+        } else {
+            Micros::from_us(m.held.us().saturating_add(passed.us()))
+        };
+        if is_possible || m.held > YAW_RATE_PATIENCE || m.has_yaw_rate == 0 {
+            return new;
+        }
+        m.yaw_rate
     }
 
     /// The movement predicted, and what of it was not seen, positive in its direction; negative where more was seen than was
@@ -187,6 +212,12 @@ impl PlausibilityState {
             missing
         };
         (predicted, missing)
+    }
+
+    /// Takes where the lane went on to without a picture.
+    pub(crate) fn go_on(&mut self, past: &mut Past, now: Instant, sample: LaneSample) {
+        past.see(now, sample.at, sample.e_theta);
+        self.lane.last = sample;
     }
 
     /// The lane was lost: what comes next has no past.
@@ -207,8 +238,16 @@ pub const LANE_STEP: Metres = Metres::from_m(0.3);
 pub const YAW_STEP: Radians = Radians::from_rad(0.1);
 /// Largest honest change of a speed between two messages: 1 m/s in 10 ms is 10 g.
 pub const SPEED_STEP: Speed = Speed::from_m_per_s(1.0);
-/// One message may be that of a wheel that slips.
-const SPEEDS_PATIENCE: u32 = 3;
+/// Largest honest change of the yaw rate between two messages: a swerve has 4 rad/s2, which is 0.1 rad/s in 25 ms.
+pub const YAW_RATE_STEP: TurningRate = TurningRate::from_rad_per_s(0.15);
+/// Largest honest product of speed and yaw rate, m/s2.
+pub const MOST_SIDEWAYS: u32 = 12;
+/// For so long a yaw rate beyond these is left out.
+const YAW_RATE_PATIENCE: Micros = Micros::from_ms(100);
+/// Change of a vehicle's speed in a second.
+pub(crate) const BRAKES: Speed = Speed::from_m_per_s(12.0);
+/// For so long a wheel may slip: the brakes let it go within 0.1 s, and on ice within 0.3 s.
+pub(crate) const SPEEDS_PATIENCE: Micros = Micros::from_ms(300);
 /// Two sources that differ by this much are not both right.
 const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 
@@ -219,29 +258,11 @@ pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
         && last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
 }
 
-/// A line that moves so far from one sample to the next is one of another picture of the same lane: works, an exit.
-const LINE_SHIFT: Metres = Metres::from_m(0.4);
-/// Widths of a lane.
-const LANE_WIDTHS: [Metres; 2] = [Metres::from_m(2.3), Metres::from_m(4.3)];
-
-/// Whether a sample too far from the last one may be that of a line chosen anew: a little beside the old one, or a lane's
-/// width from it and no further from the vehicle, as it is when the vehicle changes lanes. One that is further away than
-/// the old one would pull the vehicle where nobody wants to go.
+/// Whether a speed follows from the last one, which has been held for so long.
 #[must_use]
-pub fn is_another_line(last: &LaneSample, new: &LaneSample) -> bool {
-    let moved = last.e_y.bits().abs_diff(new.e_y.bits());
-    let [narrow, wide] = LANE_WIDTHS.map(|width| width.bits().unsigned_abs());
-    let shift = LINE_SHIFT.bits().unsigned_abs();
-    let room = last.e_y.bits().unsigned_abs().saturating_add(shift);
-    let is_near = (narrow..=wide).contains(&moved) && new.e_y.bits().unsigned_abs() <= room;
-    last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
-        && (moved <= shift || is_near)
-}
-
-/// Whether a speed follows from the last one.
-#[must_use]
-pub fn speed_step_is_possible(last: Speed, new: Speed) -> bool {
-    last.bits().abs_diff(new.bits()) <= SPEED_STEP.bits().unsigned_abs()
+pub fn speed_step_is_possible(last: Speed, new: Speed, held: Micros) -> bool {
+    let braked = per_second(BRAKES.bits(), held);
+    last.bits().abs_diff(new.bits()) <= SPEED_STEP.bits().saturating_add(braked).unsigned_abs()
 }
 
 /// Whether two sources of speed agree: less than 2 m/s apart.
@@ -387,9 +408,7 @@ impl Plausibility {
             let rate = if measured {
                 self.line_rate(state, past, now, state.lane.last.at)
             } else {
-                let heading = saturate(product(state.motion.speed.bits(), state.lane.last.e_theta.bits()));
-                let far = saturate(product(self.far_time.bits(), state.motion.speed.bits()));
-                Some(heading.saturating_sub(product_below(far, state.turning().bits())))
+                Some(self.bend_rate(state, state.lane.last.e_theta))
             };
             // Where the line is not known for long enough, nothing is predicted.
             let predicted = rate.map_or(seen, |rate| per_second(rate, dt));
@@ -421,6 +440,35 @@ impl Plausibility {
         let along = saturate(product(state.motion.speed.bits(), near.bits()));
         let reach = saturate(product(self.near_time.bits(), state.motion.speed.bits()));
         Some(along.saturating_sub(product_below(reach, turning.bits())))
+    }
+
+    /// How fast it must move where the line bends as the vehicle turns, 2^-24 m/s.
+    fn bend_rate(&self, state: &PlausibilityState, e_theta: Radians) -> i32 {
+        let heading = saturate(product(state.motion.speed.bits(), e_theta.bits()));
+        let far = saturate(product(self.far_time.bits(), state.motion.speed.bits()));
+        heading.saturating_sub(product_below(far, state.turning().bits()))
+    }
+
+    /// The lane at an instant after a sample of it, along the line that the far point has passed and by the rate of turn: what
+    /// a picture would show that does not come.
+    #[must_use]
+    pub fn gone_on(
+        &self,
+        state: &PlausibilityState,
+        past: &Past,
+        now: Instant,
+        last: &LaneSample,
+        at: Instant,
+    ) -> LaneSample {
+        let rate = self.line_rate(state, past, now, last.at);
+        let rate = rate.unwrap_or_else(|| self.bend_rate(state, last.e_theta));
+        let moved = per_second(rate, at.since(last.at));
+        let turned = past.onward(now, last.at, at);
+        LaneSample {
+            e_y: Metres::from_bits(last.e_y.bits().saturating_add(moved)),
+            e_theta: Radians::from_bits(last.e_theta.bits().saturating_add(turned.bits())),
+            at,
+        }
     }
 
     /// How much of the margins is used up: lane (m), column (N.m.s).

@@ -5,11 +5,13 @@
 //! table). Where the driver pushes against the torque there is nothing left to keep, and it goes faster. Neither ramp
 //! ever grows.
 
-use crate::quantity::{Instant, Micros, Torque, TorqueRate, signed_quotient};
+use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, share_of, signed_quotient};
 use crate::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
+/// The least that is left of it where the lane was gone on with.
+pub const GONE_ON: Micros = Micros::from_ms(1000);
 /// Without a driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
 const WITHOUT_COLUMN: u32 = 2;
 /// A column that contradicts itself may hide a hand that pushes, and has misled the override already: 0.5 s. From 5 N.m the
@@ -41,6 +43,14 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
     } else {
         1
     }
+}
+
+/// How long a handover lasts beside a lane of which so much was trusted. Without a picture trust falls on the line of a
+/// handover, which goes on where that was; but nobody takes over in less than [`GONE_ON`].
+#[must_use]
+pub fn handover_of(trust: Ratio) -> Micros {
+    let left = share_of(trust.bits(), HANDOVER.us().cast_signed());
+    Micros::from_us(left.cast_unsigned()).max(GONE_ON)
 }
 
 words! {

@@ -196,6 +196,16 @@ fn a_value_out_of_its_range_spoils_the_set() {
             a_3: 100.0,
             ..SET
         },
+        // Gains of 32, and a slow filter: the monitor's band would be wider than its limit, and the next start refuses it.
+        Params {
+            k_1: 4.0,
+            a_1: 8.0,
+            a_2: 8.0,
+            a_3: 8.0,
+            a_4: 8.0,
+            rate_corner_hz: 0.5,
+            ..SET
+        },
     ] {
         assert_eq!(
             receive(&frames(&bad), Mode::Standby),

@@ -97,11 +97,18 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
             rig.tick();
             let held = rig.applied;
             rig.silent[sender] = true;
-            for _ in 0..30 {
+            // A lane is gone on with for a second.
+            for _ in 0..if sender == LANE { 1030 } else { 30 } {
                 assert_eq!(rig.tick().command.mode, Mode::Active, "{fault:?}");
             }
+            let held = if sender == LANE { rig.applied } else { held };
             // Without a driver torque no hand can end it sooner: half the time.
-            let length = if sender == COLUMN { 1000 } else { 2000 };
+            // A lane has been gone on with on the same line for a second.
+            let length = if matches!(sender, COLUMN | LANE) {
+                1000
+            } else {
+                2000
+            };
             for k in 1..=length {
                 let step = rig.tick();
                 assert_eq!(step.command.mode, Mode::Handover, "{fault:?} {k}");
@@ -129,10 +136,10 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
 
 #[test]
 fn a_handover_starts_from_the_torque_before_the_silence() {
-    // The law asks for more and more, also while the lane is silent; the torque of just before is what is trusted.
+    // The law asks for more and more, also while the command is silent; the torque of just before is what is trusted.
     let mut rig = Rig::active_in_curve(0.4);
     let mut torque = 0.4;
-    while torque < 1.0 || !rig.ticks.is_multiple_of(8) {
+    while torque < 1.0 || !rig.ticks.is_multiple_of(10) {
         torque += 0.0024;
         rig.curve(torque);
         rig.tick();
@@ -140,7 +147,7 @@ fn a_handover_starts_from_the_torque_before_the_silence() {
     let trusted = rig.applied;
     rig.curve(torque + 0.2);
     rig.tick();
-    rig.silent[LANE] = true;
+    rig.silent[DEMAND] = true;
     rig.run(30);
     assert!(rig.applied > 1.08, "{}", rig.applied);
     // The reduction limit brings it down to the ramp at 8 mN.m per step.
@@ -155,7 +162,7 @@ fn a_handover_starts_from_the_torque_before_the_silence() {
 }
 
 #[test]
-fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() {
+fn a_handover_after_an_implausible_input_starts_from_the_torque_800_ms_before() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::active_in_curve(sign * 0.4);
         // The second source drifts to 1.9 m/s above the first.
@@ -171,10 +178,10 @@ fn a_handover_after_an_implausible_input_starts_from_the_torque_500_ms_before() 
             outputs.push(rig.applied);
         }
         rig.speeds[1] = crate::rig::SPEED + 2.1;
-        let (ms, step) = rig.run_until(31, |step| step.command.mode == Mode::Handover);
+        let (ms, step) = rig.run_until(320, |step| step.command.mode == Mode::Handover);
         assert!(step.command.faults.contains(Fault::SpeedImplausible));
         let declared = outputs.len() + ms as usize - 1;
-        let trusted = outputs[declared - 500];
+        let trusted = outputs[declared - 800];
         assert!(
             (0.4..0.8).contains(&(sign * trusted)) && sign * rig.applied > 1.0,
             "{trusted} of {}",
@@ -250,7 +257,7 @@ fn a_handover_goes_faster_while_the_driver_pushes_against_it_and_no_longer() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::active_in_curve(sign * 1.5);
         let start = rig.applied.abs();
-        rig.silent[LANE] = true;
+        rig.silent[DEMAND] = true;
         rig.run_until(60, |step| step.command.mode == Mode::Handover);
         for (driver, times) in [(-0.09, 1.0), (-0.11, 3.0), (0.11, 1.0), (-0.3, 3.0), (0.0, 1.0)] {
             rig.driver = Some(sign * driver);
@@ -351,19 +358,23 @@ fn a_resumed_sender_shows_three_clean_frames() {
 #[test]
 fn a_jump_of_the_lane_or_the_speed_is_rejected_and_becomes_a_fault_when_it_stays() {
     let mut rig = Rig::active_in_curve(1.0);
-    rig.lane.e_y = haptic_core::quantity::Metres::from_m(rig.lane.e_y.m() - 0.5);
+    rig.lane.e_y = haptic_core::quantity::Metres::from_m(rig.lane.e_y.m() - 3.5);
     rig.rejects.clear();
-    let (ms, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
-    assert!(ms <= 31 + 8, "{ms}");
+    let (ms, step) = rig.run_until(60, |step| step.command.faults.contains(Fault::LaneStep));
+    assert!(ms <= 31 + 8 && step.command.mode == Mode::Active, "{ms}");
+    assert!(rig.rejects.len() >= 3 && rig.rejects.iter().all(|r| *r == Reject::Step));
+    // Four seconds for a line that comes no nearer, and three frames of a sender that was refused.
+    let (ms, step) = rig.run_until(4100, |step| step.command.mode == Mode::Handover);
+    assert!((4000..=4032).contains(&ms), "{ms}");
     assert!(step.command.faults.contains(Fault::LaneStep));
     assert!(
         !step.command.faults.contains(Fault::LaneTimeout),
         "frames do arrive"
     );
-    assert!(rig.rejects.len() >= 3 && rig.rejects.iter().all(|r| *r == Reject::Step));
     let mut rig = Rig::active_in_curve(1.0);
-    rig.speeds = [crate::rig::SPEED + 1.5; 2];
-    let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    rig.speeds = [crate::rig::SPEED + 6.0; 2];
+    let (ms, step) = rig.run_until(400, |step| step.command.mode == Mode::Handover);
+    assert!((320..=345).contains(&ms), "{ms}");
     assert!(step.command.faults.contains(Fault::SpeedStep));
     assert!(
         !step.command.faults.contains(Fault::SpeedTimeout),
@@ -397,7 +408,7 @@ fn an_invalid_preview_is_the_reason_of_its_time_out() {
     // A blink.
     assert_eq!(rig.run(100).command.faults, FaultSet::NONE);
     rig.lane.valid = false;
-    let (_, step) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    let (_, step) = rig.run_until(1060, |step| step.command.mode == Mode::Handover);
     assert!(step.command.faults.contains(Fault::LaneInvalid));
 }
 
@@ -412,10 +423,10 @@ fn speeds_that_disagree_and_speeds_too_low() {
         }
         // Both round to the bus's 2^-8 m/s.
         rig.speeds = [16.0, 16.0 + apart];
-        // One message may be that of a wheel that slips, and two: the third is a fault.
-        let step = rig.run(10);
+        // A wheel may slip for 0.3 s.
+        let step = rig.run(290);
         assert_eq!(step.command.mode, Mode::Active, "{apart}");
-        let step = rig.run(10);
+        let step = rig.run(20);
         assert_eq!(step.command.mode, expected, "{apart}");
         let implausible = step.command.faults.contains(Fault::SpeedImplausible);
         assert_eq!(implausible, expected == Mode::Handover);
@@ -513,7 +524,7 @@ fn a_fade_lasts_until_the_torque_is_zero_even_where_steps_are_late() {
 fn a_handover_becomes_a_fade_when_the_driver_switches_off() {
     let mut rig = Rig::active_in_curve(1.5);
     rig.silent[LANE] = true;
-    rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    rig.run_until(1060, |step| step.command.mode == Mode::Handover);
     rig.engage = false;
     rig.run_until(11, |step| step.command.mode == Mode::Fade);
     rig.run_until(400, |step| step.command.mode == Mode::Standby);
@@ -523,7 +534,7 @@ fn a_handover_becomes_a_fade_when_the_driver_switches_off() {
 fn what_the_driver_pushes_away_in_a_handover_does_not_come_back() {
     let mut rig = Rig::active_in_curve(1.5);
     rig.silent[LANE] = true;
-    rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    rig.run_until(1060, |step| step.command.mode == Mode::Handover);
     // 2.4 N.m against the torque leaves 5 - 3*(2.4 - 0.8) = 0.2 N.m.
     rig.driver = Some(-2.4);
     rig.run_until(3, |step| step.command.limit == LimitReason::DriverOverride);
@@ -811,8 +822,8 @@ fn a_lane_preview_that_never_ages_is_stale_to_the_monitor() {
     rig.tick();
     rig.ecu.keep_lane_fresh();
     rig.silent[LANE] = true;
-    let (ms, step) = rig.run_until(400, |step| step.command.mode != Mode::Active);
-    assert_eq!((ms, step.command.mode), (361, Mode::Fault));
+    let (ms, step) = rig.run_until(1800, |step| step.command.mode != Mode::Active);
+    assert_eq!((ms, step.command.mode), (1761, Mode::Fault));
     assert!(step.command.faults.contains(Fault::Monitor) && !step.permitted);
 }
 
@@ -921,7 +932,7 @@ fn warnings_and_lines_of_the_history_are_counted_and_half_a_turn_apart() {
         let mut frames = step.others.iter().filter(|frame| frame.id() == id);
         frames.next().map(|frame| frame.data()[1] & 0x0F)
     };
-    let (_, first) = rig.run_until(60, |step| step.command.mode == Mode::Handover);
+    let (_, first) = rig.run_until(1060, |step| step.command.mode == Mode::Handover);
     let mut warnings = vec![counter(&first, Warning::ID)];
     let mut lines = 0;
     for _ in 0..400 {

@@ -283,7 +283,6 @@ fn the_controller_alone_gives_the_law() {
                     authority: Ratio::from_si(1.0),
                     probe: false,
                 }),
-                line_moved: false,
                 faults: FaultSet::NONE,
             };
             let command = controller.step(&mut state, now, applied, &inputs);

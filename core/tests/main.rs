@@ -1,6 +1,7 @@
 //! The core's tests, one program: a module a subject. `cargo test -p haptic-core law_oracle::` runs one of them.
 
 mod attacks;
+mod coast;
 mod column;
 mod dbc;
 mod download;

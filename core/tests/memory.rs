@@ -15,7 +15,9 @@ fn rigs() -> Vec<Rig> {
     fade.engage = false;
     let mut handover = active.clone();
     handover.silent[0] = true;
-    let mut rigs = vec![standby, active, fade, handover];
+    let coasting = handover.clone();
+    handover.run(1000);
+    let mut rigs = vec![standby, active, coasting, fade, handover];
     for rig in &mut rigs {
         rig.run(50);
     }
@@ -25,10 +27,13 @@ fn rigs() -> Vec<Rig> {
 #[test]
 fn every_flip_ends_in_fault_within_a_step() {
     let mut flips = 0;
-    for (rig, mode) in rigs()
-        .into_iter()
-        .zip([Mode::Standby, Mode::Active, Mode::Fade, Mode::Handover])
-    {
+    for (rig, mode) in rigs().into_iter().zip([
+        Mode::Standby,
+        Mode::Active,
+        Mode::Active,
+        Mode::Fade,
+        Mode::Handover,
+    ]) {
         assert_eq!(rig.clone().tick().command.mode, mode);
         for region in Region::ALL {
             let bits = rig.ecu.redundant_bits(region);

@@ -202,7 +202,8 @@ fn against_the_driver() {
 
 #[test]
 fn old_lane_data_in_active() {
-    for (age, last_good_ms) in [(0, 360), (100, 350), (400, 320)] {
+    // 360 ms, and 1.4 s in which the lane goes on.
+    for (age, last_good_ms) in [(0, 1760), (100, 1750), (400, 1720)] {
         let mut bench = Bench::at(5.0, 40);
         assert!(bench.show(Some(lane(0, 0, age)), None, guidance(40, ACTIVE), 1000));
         for _ in 0..last_good_ms {
@@ -320,8 +321,34 @@ fn rates_are_forgotten_in_a_gap() {
     assert_eq!(steps(-65_535, 500, 361), 20);
 }
 
+/// A torque of 0.5 N.m that the last picture asked for, and from then on, after a gap, pictures every 8 ms that ask for nothing:
+/// 20 steps, or as long as they are left aside because the frame says LaneTimeout (bit 37) or LaneStep (52) after 25 ms without.
+#[test]
+fn pictures_that_come_in_time_count_whatever_is_said_of_them() {
+    let torque = counts(500).0;
+    let steps = |said: u64, gap_ms: u32| {
+        let mut bench = Bench::at(5.0, torque);
+        assert!(bench.show(Some(lane(8192, 0, 0)), None, guidance(torque, FADE), 1000));
+        (1..100)
+            .take_while(|ms| {
+                let comes = *ms >= gap_ms && (ms - gap_ms).is_multiple_of(8);
+                let frame = u64::from_le_bytes(guidance(torque, ACTIVE)) | said;
+                bench.show(comes.then(|| lane(0, 0, 0)), None, frame.to_le_bytes(), 1000)
+            })
+            .count() as u32
+    };
+    for said in [1 << 37, 1 << 52] {
+        assert_eq!(steps(said, 8), 7 + 20);
+        assert_eq!(steps(said, 25), 24 + 20);
+        assert_eq!(steps(said, 26), 99);
+    }
+    // LaneInvalid says nothing of a picture that is used.
+    assert_eq!(steps(1 << 38, 26), 25 + 20);
+}
+
 /// Errors that passed zero at a constant rate with the last picture, and no picture since. From 40 ms of age on the
-/// position goes on at its rate, so a torque beyond the band of the last picture comes to be within it.
+/// position goes on at its rate and the band grows by 1 mN.m/ms, so a torque beyond the band of the last picture comes to be
+/// within it.
 #[test]
 fn an_old_sample_is_carried_at_its_rates() {
     for sign in [1, -1] {
@@ -332,7 +359,7 @@ fn an_old_sample_is_carried_at_its_rates() {
             (0, 524, 250, 10),
         ] {
             // Within the band 65 ms after the last picture; judged from an age of so many ms on.
-            let torque = sign * counts(300 + at_once_mnm + 25 * per_ms).0;
+            let torque = sign * counts(300 + at_once_mnm + 25 * (per_ms + 1)).0;
             let permitted = |from_ms: i64| {
                 let mut bench = Bench::at(5.0, torque);
                 for k in -30..=0 {

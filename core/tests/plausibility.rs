@@ -453,7 +453,12 @@ fn steps_at_their_edges() {
         assert!(possible(y, theta) && possible(0.0, 0.0));
         assert!(!possible(y + LSB, 0.0) && !possible(0.0, theta + LSB + LSB));
         let v = |x: f64| Speed::from_m_per_s(20.0 + sign * x);
-        assert!(speed_step_is_possible(v(0.0), v(1.0)) && !speed_step_is_possible(v(0.0), v(1.0 + LSB)));
+        // 1 m/s, and 12 m/s2 while the last one was held.
+        for (held_ms, most) in [(0, 1.0), (100, 2.2)] {
+            let held = Micros::from_ms(held_ms);
+            assert!(speed_step_is_possible(v(0.0), v(most - 1e-4), held));
+            assert!(!speed_step_is_possible(v(0.0), v(most + 1e-4), held));
+        }
         assert!(speeds_agree(v(0.0), v(2.0 - LSB)) && !speeds_agree(v(0.0), v(2.0)));
     }
 }

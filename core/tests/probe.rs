@@ -113,7 +113,7 @@ fn a_handover_keeps_no_wave_of_it() {
     for ms in (500..900).step_by(23) {
         let mut rig = probing(0.4);
         rig.run(ms);
-        rig.silent[0] = true;
+        rig.silent[3] = true;
         rig.run_until(60, |step| step.command.mode == Mode::Handover);
         let mut last = rig.applied;
         let applied = last;

@@ -1,7 +1,7 @@
 //! The ways to zero against hand values: linear, never growing, started from what can be trusted.
 
-use haptic_core::quantity::{Instant, Micros, Torque, TorqueRate};
-use haptic_core::ramp::{HANDOVER, History, Ramp, pace, smaller_of_same_sign};
+use haptic_core::quantity::{Instant, Micros, Ratio, Torque, TorqueRate};
+use haptic_core::ramp::{HANDOVER, History, Ramp, handover_of, pace, smaller_of_same_sign};
 
 /// The resolution of a torque, N.m.
 const LSB: f64 = 1.0 / 16_777_216.0;
@@ -28,6 +28,20 @@ fn a_handover_is_a_straight_line_of_two_seconds() {
         assert!(ramp.is_done());
         assert_eq!(ramp.step(Micros::from_ms(1)), Torque::ZERO);
         assert_eq!(ramp.step(Micros::from_us(u32::MAX)), Torque::ZERO);
+    }
+}
+
+/// Trust falls by a half in a second, as a handover of 2 s; a second is left of it at least.
+#[test]
+fn a_handover_goes_on_where_trust_was() {
+    for (trust, us) in [
+        (1.0, 2_000_000),
+        (0.75, 1_500_000),
+        (0.5, 1_000_000),
+        (0.2, 1_000_000),
+        (0.0, 1_000_000),
+    ] {
+        assert_eq!(handover_of(Ratio::from_si(trust)), Micros::from_us(us), "{trust}");
     }
 }
 

@@ -439,13 +439,15 @@ fn live_says_of_a_recorded_bus_what_changed_and_when() {
             .as_f64()
             .unwrap()
     };
-    let handover = when("mode Active -> Handover");
+    let lost = when("fault LaneTimeout (class B)");
     // The last picture before 3 s may be a camera's period old.
-    assert!((3.02..=3.045).contains(&handover), "{handover}");
+    assert!((3.02..=3.045).contains(&lost), "{lost}");
+    // For a second guidance goes on without a picture, and in another the torque is zero.
+    let handover = when("mode Active -> Handover");
+    assert!((handover - lost - 1.0).abs() < 0.0015, "{handover}");
     assert_eq!(when("driver warning: take over"), handover);
-    assert_eq!(when("fault LaneTimeout (class B)"), handover);
     let over = when("mode Handover -> Standby");
-    assert!((over - handover - 2.0).abs() < 0.01, "{over}");
+    assert!((over - lost - 2.0).abs() < 0.01, "{over}");
     let statuses = lines.iter().filter(|line| line["status"].is_object());
     let speeds: Vec<f64> = statuses
         .filter_map(|line| line["status"]["speed_m_per_s"].as_f64())

@@ -10,8 +10,8 @@ use serde_json::Value;
 /// A left curve of a radius of 800 m, held for a minute at 60 km/h.
 const HELD: &str = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
                     [[segment]]\nlength = 1000\ncurvature = 0.00125\n";
-/// A camera that is blind for half a second every few seconds: the ECU hands over after 30 ms of that.
-const BLIND: &str = "[sensor_errors]\ndropouts = 720\ndropout = 0.5\n";
+/// A camera that is blind for 1.5 s every few seconds: the ECU hands over after a second of that.
+const BLIND: &str = "[sensor_errors]\ndropouts = 720\ndropout = 1.5\n";
 const RELIANCES: [&str; 3] = ["high", "mid", "low"];
 
 fn folder() -> tempfile::TempDir {
@@ -173,7 +173,7 @@ fn a_sweep_has_columns_for_it_and_counts() {
     let folder = folder();
     let here = folder.path();
     let sweep = "metrics = [\"peak_lateral_error_m\"]\n[scenario]\ncourse = \"held.toml\"\n\
-                 [scenario.sensor_errors]\ndropout = 0.5\n[vary]\ncondition = [\"manual\", \"high\", \"mid\", \"low\"]\n\
+                 [scenario.sensor_errors]\ndropout = 1.5\n[vary]\ncondition = [\"manual\", \"high\", \"mid\", \"low\"]\n\
                  \"sensor_errors.dropouts\" = [0, 720]\n";
     fs::write(here.join("sweep.toml"), sweep).unwrap();
     let output = host_sim(here, &["sweep", "sweep.toml", "--out", "s"]);
@@ -241,7 +241,7 @@ fn the_means_of_a_study_say_which_sessions_were_not_guided_throughout() {
     let here = folder.path();
     let study = "name = \"blind\"\n[scenario]\ncourse = \"held.toml\"\n[[condition]]\nname = \"manual\"\n\
                  scenario = { condition = \"manual\" }\n[[condition]]\nname = \"guided\"\n\
-                 scenario = { sensor_errors = { dropouts = 720.0, dropout = 0.5 } }\n\
+                 scenario = { sensor_errors = { dropouts = 720.0, dropout = 1.5 } }\n\
                  [[participant]]\nname = \"P01\"\npublished = 2\n[[participant]]\nname = \"P02\"\npublished = 3\n";
     fs::write(here.join("study.toml"), study).unwrap();
     let output = host_sim(here, &["study", "study.toml", "--out", "s"]);

@@ -48,6 +48,8 @@ impl Action {
             authority,
             probe,
             hand_torque_nm,
+            // Not in Python: a driver in Python has points of its own.
+            beside_m: _,
             world: WorldFaults {
                 torque_lost,
                 lane_lost,
@@ -79,6 +81,7 @@ impl Action {
             authority,
             probe,
             hand_torque_nm: finite(py, "hand_torque_nm", hand_torque_nm, "N.m")?,
+            beside_m: 0.0,
             world: WorldFaults {
                 torque_lost,
                 lane_lost,

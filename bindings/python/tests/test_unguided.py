@@ -15,8 +15,8 @@ HELD = {
         {"length": 1000.0, "curvature": 0.00125},
     ]
 }
-# A camera that is blind for half a second now and then: the ECU hands over after 30 ms of that.
-BLIND = {"dropouts": 720.0, "dropout": 0.5}
+# A camera that is blind for 1.5 s now and then: the ECU hands over after a second of that.
+BLIND = {"dropouts": 720.0, "dropout": 1.5}
 RELIANCES = ("high", "mid", "low")
 MODES = ("Boot", "Standby", "Active", "Fade", "Handover", "Fault", "Locked")
 FAULTS = {0: "LaneTimeout", 19: "HandsOff"}
@@ -114,7 +114,7 @@ def test_a_sweep_has_columns_for_it(tmp_path):
     spec.write_text(
         'metrics = ["sdlp_m"]\n[scenario.course]\nname = "c"\nlane_width = 3.6\n'
         + segments
-        + '[scenario.sensor_errors]\ndropout = 0.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropouts" = [0, 720]\n'
+        + '[scenario.sensor_errors]\ndropout = 1.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropouts" = [0, 720]\n'
     )
     result = hg.sweep(spec, out=tmp_path / "out")
     rows = list(csv.DictReader(result.csv.open()))

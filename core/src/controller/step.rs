@@ -2,6 +2,7 @@
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
 use super::{Changed, Command, Due, Input, Inputs, Memory, READY, Request};
+use crate::coast::{Coast, GOES_ON, Shows};
 use crate::config::Config;
 use crate::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::faults::{Fault, FaultSet};
@@ -10,11 +11,12 @@ use crate::injection::Injection;
 use crate::law::{LaneSample, LawState, Since};
 use crate::modes::{Event, Events, Mode};
 use crate::past::Past;
+use crate::plausibility::lane_step_is_possible;
 use crate::probe::ProbeState;
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
-use crate::ramp::{HANDOVER, History, Ramp, pace, smaller_of_same_sign};
+use crate::ramp::{History, Ramp, handover_of, pace, smaller_of_same_sign};
 
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
@@ -32,33 +34,48 @@ const EARLY_STEPS: u8 = 3;
 /// A lane sample that is no older than this when it comes needs no other making up for than its rates.
 const PROMPT: Micros = Micros::from_ms(10);
 
+/// Spans beyond half a wrap of the clock are negative.
+const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
+/// What does not end guidance while the lane goes on.
+const RIDDEN_OUT: FaultSet = FaultSet::NONE
+    .with(Fault::LaneTimeout)
+    .with(Fault::LaneInvalid)
+    .with(Fault::LaneStep);
+
 /// One step, with what it must not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
     pub(super) now: Instant,
     pub(super) applied: Torque,
     pub(super) inputs: &'a Inputs,
+    /// The lane that the law is shown: the input's, or in its place the one seen last as it went on.
+    pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
     pub(super) injection: &'a I,
 }
 
 impl<I: Injection> Step<'_, I> {
     pub(super) fn run(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut Changed,
         history: &mut History,
         past: &mut Past,
         due: &mut Due,
     ) -> Command {
+        let before = Mode::from_code(v.hot.small.mode.into()).unwrap_or(Mode::Fault);
+        let [mut ridden_out, mut said] = [FaultSet::NONE; 2];
+        if before == Mode::Active && !(v.coast.is_idle() && self.inputs.lane.value().is_some()) {
+            changed.add(Changed::COAST);
+            [ridden_out, said] = self.coast(v, changed, past);
+        }
         let fast_enough = self.is_fast_enough();
         let lost = self.look(v, changed, fast_enough, past, due);
         let (late, early) = self.keep_time(v);
-        let mut faults = lost.union(v.faults()).union(self.inputs.faults);
+        let mut faults = lost.union(v.faults()).union(self.inputs.faults).union(said);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
         v.hot.kept |= faults.common(FaultSet::CRITICAL).bits();
 
-        let before = Mode::from_code(v.hot.small.mode.into()).unwrap_or(Mode::Fault);
         if before == Mode::Active {
             v.hot
                 .hands
@@ -68,16 +85,19 @@ impl<I: Injection> Step<'_, I> {
             matches!(before, Mode::Active | Mode::Fade) && v.hot.hands.without() >= WARN,
             Fault::HandsOff,
         );
-        let mode = self.next_mode(v, before, faults, fast_enough);
+        let mode = self.next_mode(v, before, faults.without(ridden_out), fast_enough);
         if mode != before {
             changed.add(Changed::LAW);
+            changed.add(Changed::COAST);
             changed.add(Changed::RAMP);
             self.enter(v, mode, faults, history);
         }
         let (torque, probe, limit) = self.torque(v, changed, mode, faults);
         v.hot.probe_applied = probe.unwrap_or(Torque::ZERO);
-        let warning =
-            matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked) || faults.contains(Fault::HandsOff);
+        // While it lets go of its line, whoever relies on guidance has to know.
+        let warning = (mode == Mode::Active && faults.contains(Fault::LaneStep))
+            || matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
+            || faults.contains(Fault::HandsOff);
         Command {
             torque,
             probe,
@@ -86,6 +106,59 @@ impl<I: Injection> Step<'_, I> {
             faults,
             warning,
         }
+    }
+
+    /// The lane where its picture did not come, or did not agree. Returns the faults that do not end guidance because of it,
+    /// and what there is to say of the pictures.
+    #[cold]
+    #[inline(never)]
+    fn coast(&mut self, v: &mut Memory, changed: &mut Changed, past: &mut Past) -> [FaultSet; 2] {
+        let Some(last) = v.law.last() else {
+            return [FaultSet::NONE; 2];
+        };
+        let gone_on = |v: &Memory, past: &Past, at| {
+            let checks = &self.config.plausibility;
+            checks.gone_on(&v.plausibility, past, self.now, &last, at)
+        };
+        let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
+        let since = self.since(v, last);
+        let asked = self.config.law.asked(&v.law, self.now, since.as_ref());
+        match self.inputs.lane {
+            Input::Lost => v.coast.lose(asked),
+            Input::New(sample) if !is_older(sample) => {
+                let agrees = lane_step_is_possible(&gone_on(v, past, sample.at), &sample);
+                match v.coast.see(&sample, agrees, asked) {
+                    Shows::TheLine => v.law.relocate(sample),
+                    Shows::ANewLine => {
+                        v.law = LawState::NEW;
+                        v.plausibility.forget_lane();
+                        past.forget_line();
+                    }
+                    Shows::Another => {}
+                }
+                changed.add(Changed::LAW);
+                changed.add(Changed::LANE);
+            }
+            _ => {}
+        }
+        v.coast.pass(self.elapsed);
+        let mut said = FaultSet::NONE;
+        said.insert_if(v.coast.is_apart(), Fault::LaneStep);
+        if !v.coast.goes_on() {
+            return [FaultSet::NONE, said];
+        }
+        let passed = self.now.since(v.heard.lane);
+        // A camera may be later than before, or jitter: where the lane went on to waits for a picture to compare.
+        let waits = self.inputs.lane.value().is_some_and(is_older);
+        // It is of no use yet.
+        said.insert_if(waits && !v.coast.is_apart(), Fault::LaneTimeout);
+        self.lane = if passed < GOES_ON || waits {
+            Input::Held(last)
+        } else {
+            // As old as the pictures were.
+            Input::New(gone_on(v, past, last.at.after(passed)))
+        };
+        [RIDDEN_OUT, said]
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
@@ -98,7 +171,6 @@ impl<I: Injection> Step<'_, I> {
         due: &mut Due,
     ) -> FaultSet {
         let Inputs {
-            lane,
             column,
             motion,
             request,
@@ -108,14 +180,20 @@ impl<I: Injection> Step<'_, I> {
         let mut kept = v.faults();
 
         if let Input::New(motion) = motion {
+            let passed = self.now.since(v.heard.motion);
             v.heard.motion = self.now;
             changed.add(Changed::HEARD);
             changed.add(Changed::MOTION);
-            let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds);
+            let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds, passed);
             kept.set(!plausible, Fault::SpeedImplausible);
-            if agree {
-                checks.motion(&mut v.plausibility, motion.speeds[0], motion.yaw_rate());
-            }
+            let speed = if agree {
+                motion.speeds[0]
+            } else {
+                v.plausibility.speed()
+            };
+            let yaw_rate = motion.yaw_rate();
+            let yaw_rate = yaw_rate.map(|rate| v.plausibility.possible_yaw_rate(rate, passed));
+            checks.motion(&mut v.plausibility, speed, yaw_rate);
             v.share = self.config.schedule.share(v.plausibility.speed());
             past.turn(self.now, v.plausibility.turning());
         }
@@ -141,17 +219,10 @@ impl<I: Injection> Step<'_, I> {
                 kept.set(false, Fault::ColumnImplausible);
             }
         }
-        match lane {
-            Input::New(sample) => {
+        match self.lane {
+            Input::New(_) => {
                 v.heard.lane = self.now;
                 changed.add(Changed::HEARD);
-                if self.inputs.line_moved {
-                    changed.add(Changed::LANE);
-                    changed.add(Changed::LAW);
-                    v.plausibility.forget_lane();
-                    past.forget_line();
-                    v.law.relocate(*sample);
-                }
             }
             Input::Held(_) => {}
             Input::Lost => {
@@ -194,10 +265,15 @@ impl<I: Injection> Step<'_, I> {
             );
             kept.set(!plausible, Fault::ColumnImplausible);
         }
-        if let Some(sample) = to_check(&self.inputs.lane, &mut due.lane) {
+        if let Some(sample) = to_check(&self.lane, &mut due.lane) {
             changed.add(Changed::LANE);
-            let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
-            kept.set(!plausible, Fault::LaneImplausible);
+            if v.coast.goes_on() {
+                // No picture, so nothing to compare.
+                v.plausibility.go_on(past, self.now, sample);
+            } else {
+                let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
+                kept.set(!plausible, Fault::LaneImplausible);
+            }
         }
     }
 
@@ -229,13 +305,13 @@ impl<I: Injection> Step<'_, I> {
 
     /// What the vehicle turned since the lane sample in use, if that was old when it came.
     fn make_up_for_age(&self, v: &mut Memory, past: &Past) {
-        let Some(sample) = self.inputs.lane.value() else {
+        let Some(sample) = self.lane.value() else {
             return;
         };
         let age = self.now.since(sample.at);
         if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
             (v.hot.turned, v.hot.rate_then) = (Radians::ZERO, TurningRate::ZERO);
-        } else if let Input::New(_) = self.inputs.lane {
+        } else if let Input::New(_) = self.lane {
             (v.hot.turned, v.hot.rate_then) = past.turned(self.now, sample.at);
         } else {
             let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
@@ -316,6 +392,8 @@ impl<I: Injection> Step<'_, I> {
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
         v.hot.small.mode = mode as u8;
+        let trust = v.coast.trust;
+        v.coast = Coast::NEW;
         v.hot.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.
@@ -330,7 +408,8 @@ impl<I: Injection> Step<'_, I> {
                 // took away does not come back.
                 let applied =
                     smaller_of_same_sign(self.applied, without(self.applied, Some(v.hot.probe_applied)));
-                v.ramp = Ramp::over(history.handover_start(self.now, suspect, applied), HANDOVER);
+                let start = history.handover_start(self.now, suspect, applied);
+                v.ramp = Ramp::over(start, handover_of(trust));
             }
             _ => {}
         }
@@ -387,7 +466,7 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(Changed::RAMP);
                 let ending = smaller_of_same_sign(v.ramp.step(passed), self.applied);
                 // While the lane still comes, no more than the law asks for: the curve may end before the ramp does.
-                if mode == Mode::Handover && self.inputs.lane.value().is_some() {
+                if mode == Mode::Handover && self.lane.value().is_some() {
                     (smaller_of_same_sign(ending, asked), None)
                 } else {
                     (ending, None)
@@ -427,14 +506,15 @@ impl<I: Injection> Step<'_, I> {
 
     /// The probe's torque, while it is wanted or on its way out.
     fn probe(&self, v: &mut Memory) -> Option<Torque> {
-        let wanted = self.inputs.request.value().is_some_and(|r| r.probe);
+        // Without trust left there is no guidance to ride on.
+        let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
         self.config.probe.step(&mut v.hot.probe, self.elapsed, wanted)
     }
 
     /// The law's torque, scaled by the authority: of the last request, or all of it where none is heard any more. Zero without
     /// a lane.
     fn guidance(&self, v: &mut Memory, changed: &mut Changed) -> Torque {
-        let asked = self.inputs.lane.value().map_or(Torque::ZERO, |sample| {
+        let asked = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.knows(&sample) {
                 changed.add(Changed::LAW);
                 self.config.law.take(&mut v.law, sample);
@@ -443,12 +523,13 @@ impl<I: Injection> Step<'_, I> {
                 .law
                 .asked(&v.law, self.now, self.since(v, sample).as_ref())
         });
-        let asked = self.injection.law(asked);
+        let asked = self.injection.law(v.coast.bounded(asked));
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
         // Neither is more than one.
         let share = share_of(authority.bits(), v.share.bits());
+        let share = share_of(share, v.coast.trust.bits());
         Torque::from_bits(share_of(share, asked.bits()))
     }
 }

@@ -127,7 +127,6 @@ impl Ecu {
             Region::Controller => flip(&mut self.state.memory, bit, &mut words),
             Region::Ecu => {
                 flip(&mut self.receivers.lane, bit, &mut words);
-                flip(&mut self.receivers.refused, bit, &mut words);
                 flip(&mut self.receivers.column, bit, &mut words);
                 flip(&mut self.receivers.motion, bit, &mut words);
                 flip(&mut self.receivers.request, bit, &mut words);

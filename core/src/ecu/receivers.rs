@@ -13,8 +13,8 @@ use crate::bus::{Frame, Reject};
 use crate::controller::{Column, Input, Inputs, Motion, Request};
 use crate::faults::Fault;
 use crate::law::LaneSample;
-use crate::plausibility::{is_another_line, lane_step_is_possible, speed_step_is_possible};
-use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque};
+use crate::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
+use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
 use crate::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
@@ -23,6 +23,8 @@ const COLUMN_PERIOD_US: u32 = 2000;
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 /// Slower is standing.
 const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
+/// Messages of the vehicle that have to be used in a row where it is to stand.
+const UNDISTURBED: u32 = 100;
 
 /// The latest value of one input, with what judges the next. What is small shares a word: a step checks every one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +33,8 @@ pub(super) struct Slot<T> {
     e2e: ReceiverState,
     /// [`LOST`], [`HELD`] or [`NEW`], as an [`Input`].
     state: u8,
-    /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason.
+    /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason. Of speeds, how many
+    /// messages in a row had one that stepped.
     doubt: u8,
     /// When it was heard.
     at: Instant,
@@ -162,33 +165,6 @@ fn take<T: Words, U: From<T>>(guarded: &mut Redundant<Slot<T>>, now: Instant, se
     }
 }
 
-/// A lane sample that was too far from the last one used, and whether there is one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(C)]
-pub(super) struct Refused {
-    is_there: u16,
-    /// 1 when the sample in use is of another line than the one before.
-    moved: u16,
-    sample: LaneSample,
-}
-
-impl Words for Refused {
-    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
-        let [is_there, moved] = halves(change(word([self.is_there, self.moved])));
-        Self {
-            is_there,
-            moved,
-            sample: self.sample.map_words(change),
-        }
-    }
-
-    #[inline(always)]
-    fn agreement(&self, other: &Self) -> u32 {
-        let [mine, others] = [self, other].map(|refused| word([refused.is_there, refused.moved]));
-        mine.agreement(&others) & self.sample.agreement(&other.sample)
-    }
-}
-
 /// Two halves as a word.
 fn word([low, high]: [u16; 2]) -> u32 {
     u32::from(low) | u32::from(high) << 16
@@ -199,18 +175,11 @@ fn halves(word: u32) -> [u16; 2] {
     [word as u16, (word >> 16) as u16]
 }
 
-/// Takes a preview; `None` if what was refused last is damaged. Two in a row that agree with each other, and with a line
-/// chosen anew, begin that line.
-fn take_preview(
-    slot: &mut Slot<LaneSample>,
-    refused: &mut Redundant<Refused>,
-    lane: &LanePreview,
-    now: Instant,
-) -> Option<Result<(), Reject>> {
-    let before = *refused.get()?;
+/// Takes a preview.
+fn take_preview(slot: &mut Slot<LaneSample>, lane: &LanePreview, now: Instant) -> Result<(), Reject> {
     slot.doubt = u8::from(!lane.valid);
     if !lane.valid {
-        return Some(Ok(()));
+        return Ok(());
     }
     let sample = LaneSample {
         e_y: lane.e_y,
@@ -221,26 +190,56 @@ fn take_preview(
         // A span of almost a whole wrap of the clock is a step back in time: what differences samples would take it
         // for a gap and start anew.
         if sample.at.since(last.at) > HALF_WRAP {
-            return Some(Err(Reject::Older));
+            return Err(Reject::Older);
         }
         if !lane_step_is_possible(&last, &sample) {
-            let agrees = before.is_there != 0 && lane_step_is_possible(&before.sample, &sample);
-            if !(agrees && is_another_line(&last, &sample)) {
-                refused.amend(|refused| (refused.sample, refused.is_there) = (sample, 1));
-                slot.doubt = STEP;
-                return Some(Err(Reject::Step));
-            }
-            refused.put(|refused| &mut refused.moved, 1);
+            slot.doubt = STEP;
+            return Err(Reject::Step);
         }
     }
-    if before.is_there != 0 {
-        refused.put(|refused| &mut refused.is_there, 0);
-    }
     if lane.age > OLDEST_SAMPLE {
-        return Some(Err(Reject::Older));
+        return Err(Reject::Older);
     }
     slot.put(sample, now, LANE_PERIOD);
-    Some(Ok(()))
+    Ok(())
+}
+
+/// The speeds to use of a message. One that steps, of a wheel that locks, slips or spins, follows the other one; where both
+/// do, they are held. `None` if that lasts for longer than [`SPEEDS_PATIENCE`].
+fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
+    let Some(last) = slot.last() else {
+        slot.doubt = 0;
+        return Some(speeds);
+    };
+    let ([a, b], [a_before, b_before]) = (speeds, last.speeds);
+    let moved = |from: Speed, other: Speed, other_before: Speed| {
+        let by = other.bits().wrapping_sub(other_before.bits());
+        Speed::from_bits(from.bits().saturating_add(by))
+    };
+    // A message comes every 10 to 25 ms: no product of a count and a period wraps.
+    let lasts = |doubt: u8| Micros::from_us(u32::from(doubt).wrapping_mul(slot.period.us()));
+    let follow_within = |held: Micros| {
+        let follows = |last: Speed, new: Speed| speed_step_is_possible(last, new, held);
+        [follows(a_before, a), follows(b_before, b)]
+    };
+    // Two that are held may be left behind by the vehicle; one goes with the other.
+    let follows = match follow_within(Micros::from_us(0)) {
+        [false, false] => follow_within(lasts(slot.doubt)),
+        follows => follows,
+    };
+    let followed = match follows {
+        [true, true] => {
+            slot.doubt = 0;
+            return Some(speeds);
+        }
+        [true, false] => [a, moved(b_before, a, a_before)],
+        [false, true] => [moved(a_before, b, b_before), b],
+        [false, false] => last.speeds,
+    };
+    let doubt = slot.doubt.saturating_add(1);
+    let is_short = lasts(doubt) <= SPEEDS_PATIENCE;
+    slot.doubt = doubt;
+    is_short.then_some(followed)
 }
 
 /// Bytes of frames accepted since the last step, for the monitor's own decoding.
@@ -299,7 +298,6 @@ impl From<RequestWords> for Request {
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
     pub(super) lane: Redundant<Slot<LaneSample>>,
-    pub(super) refused: Redundant<Refused>,
     pub(super) column: Redundant<Slot<Column>>,
     pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
@@ -308,6 +306,24 @@ pub(super) struct Receivers {
     /// Steps for which a frame under an identifier of this ECU is still a fault. Not kept twice: a flip raises the fault
     /// for a while, or ends it early.
     foreign: u32,
+    standing: Standing,
+}
+
+/// How slow the vehicle may be. Not kept twice: it moves nothing.
+#[derive(Debug, Clone, Copy)]
+struct Standing {
+    /// The larger speed, which falls no faster than a vehicle brakes.
+    at_most: Speed,
+    /// Messages in a row that were used.
+    in_a_row: u32,
+}
+
+impl Standing {
+    fn hear(&mut self, [a, b]: [Speed; 2], passed: Micros) {
+        let braked = per_second(BRAKES.bits(), passed);
+        let still = Speed::from_bits(self.at_most.bits().saturating_sub(braked));
+        (self.at_most, self.in_a_row) = (still.max(a).max(b), self.in_a_row.saturating_add(1));
+    }
 }
 
 impl Receivers {
@@ -329,32 +345,31 @@ impl Receivers {
         };
         Self {
             lane: Slot::redundant(e2e, lane, now),
-            refused: Redundant::new(Refused {
-                is_there: 0,
-                moved: 0,
-                sample: lane,
-            }),
             column: Slot::redundant(e2e, column, now),
             motion: Slot::redundant(e2e, Motion::default(), now),
             request: Slot::redundant(e2e, request, now),
             actuator: Actuator::default(),
             accepted: Accepted::NONE,
             foreign: 0,
+            standing: Standing {
+                at_most: Speed::ZERO,
+                in_a_row: 0,
+            },
         }
     }
 
     /// Takes a frame. `None` if the receiver that it is for is damaged.
     pub(super) fn receive(&mut self, frame: &Frame, now: Instant) -> Option<Result<(), Reject>> {
         let Self {
-            refused,
             actuator,
             accepted,
+            standing,
             ..
         } = self;
         match frame.id() {
             LanePreview::ID => self.lane.change(|slot| {
                 let preview = LanePreview::decode(&mut slot.e2e, frame)?;
-                take_preview(slot, refused, &preview, now).unwrap_or(Ok(()))?;
+                take_preview(slot, &preview, now)?;
                 if preview.valid {
                     accepted.lane = Some(*frame.bytes());
                 }
@@ -372,22 +387,19 @@ impl Receivers {
                 accepted.column = Some(*frame.bytes());
                 Ok(())
             }),
-            Vehicle::ID => self.motion.change(|slot| {
-                let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
-                let follows = |last: Motion| {
-                    last.speeds
-                        .iter()
-                        .zip(&speeds)
-                        .all(|(last, new)| speed_step_is_possible(*last, *new))
-                };
-                if slot.last().is_some_and(|last| !follows(last)) {
-                    slot.doubt = STEP;
-                    return Err(Reject::Step);
+            Vehicle::ID => {
+                let heard = self.motion.change(|slot| {
+                    let Vehicle { speeds, yaw_rate } = Vehicle::decode(&mut slot.e2e, frame)?;
+                    let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
+                    standing.hear(speeds, now.since(slot.at));
+                    slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
+                    Ok(())
+                });
+                if heard != Some(Ok(())) {
+                    standing.in_a_row = 0;
                 }
-                slot.doubt = 0;
-                slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
-                Ok(())
-            }),
+                heard
+            }
             Demand::ID => self.request.change(|slot| {
                 let demand = Demand::decode(&mut slot.e2e, frame)?;
                 let request = RequestWords {
@@ -408,10 +420,12 @@ impl Receivers {
         }
     }
 
-    /// Whether the vehicle stands: both speeds are known and next to nothing.
+    /// Whether the vehicle stands: both speeds are known and next to nothing, it can have come to that, and for a hundred
+    /// messages none was refused, as those of a second sender are.
     pub(super) fn stands(&self) -> bool {
-        let motion = self.motion.get().and_then(Slot::last);
-        motion.is_some_and(|motion| motion.speeds.iter().all(|speed| *speed <= STANDSTILL))
+        let is_known = self.motion.get().and_then(Slot::last).is_some();
+        let Standing { at_most, in_a_row } = self.standing;
+        is_known && at_most <= STANDSTILL && in_a_row >= UNDISTURBED
     }
 
     /// The last lane preview passes for one that came now.
@@ -422,11 +436,7 @@ impl Receivers {
     /// Whether no receiver is damaged.
     #[inline(always)]
     pub(super) fn are_whole(&self) -> bool {
-        self.lane.agrees()
-            && self.refused.agrees()
-            && self.column.agrees()
-            && self.motion.agrees()
-            && self.request.agrees()
+        self.lane.agrees() && self.column.agrees() && self.motion.agrees() && self.request.agrees()
     }
 
     /// What a step sees of receivers that are whole, into [`Inputs::lost`].
@@ -436,10 +446,6 @@ impl Receivers {
         take(&mut self.column, now, &mut inputs.column);
         take(&mut self.motion, now, &mut inputs.motion);
         take(&mut self.request, now, &mut inputs.request);
-        if self.refused.value().moved != 0 {
-            self.refused.put(|refused| &mut refused.moved, 0);
-            inputs.line_moved = true;
-        }
         let faults = &mut inputs.faults;
         // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
         if inputs.lane == Input::Lost {
@@ -448,7 +454,7 @@ impl Receivers {
             faults.insert_if(doubt == STEP, Fault::LaneStep);
         }
         if inputs.motion == Input::Lost {
-            faults.insert_if(self.motion.value().doubt == STEP, Fault::SpeedStep);
+            faults.insert_if(self.motion.value().doubt != 0, Fault::SpeedStep);
         }
         if self.foreign > 0 {
             self.foreign = self.foreign.saturating_sub(1);
@@ -495,17 +501,12 @@ mod tests {
         };
         let mut slot = Slot::new(ReceiverState::NEW, sample, start);
         slot.put(sample, start, LANE_PERIOD);
-        let mut refused = Redundant::new(Refused {
-            is_there: 0,
-            moved: 0,
-            sample,
-        });
         let lane = LanePreview {
             valid: true,
             age,
             ..LanePreview::default()
         };
-        take_preview(&mut slot, &mut refused, &lane, start.after(apart)).unwrap()
+        take_preview(&mut slot, &lane, start.after(apart))
     }
 
     #[test]

@@ -13,7 +13,7 @@ const BUS_LSB: f64 = 1.0 / 4096.0;
 const UNSEEN: [(Fault, u64); 3] = [
     (Fault::LaneImplausible, 2_000_000),
     (Fault::ColumnImplausible, 1_500_000),
-    (Fault::SpeedImplausible, 500_000),
+    (Fault::SpeedImplausible, 800_000),
 ];
 /// For how long outputs are kept here: the longest of these, with 40 ms between two outputs that the ECU keeps, and late
 /// steps, us.
@@ -181,6 +181,7 @@ impl Watch {
             );
         }
         let must_warn = matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
+            || (mode == Mode::Active && step.command.faults.contains(Fault::LaneStep))
             || step.command.faults.contains(Fault::HandsOff);
         assert_eq!(step.command.warning, must_warn, "warning: {}", context());
         if must_warn && mode != self.mode && !matches!(self.mode, Mode::Handover | Mode::Fault | Mode::Locked)
@@ -225,13 +226,13 @@ impl Watch {
         self.by_limit[step.command.limit as usize] += 1;
     }
 
-    /// Whether every input is one that the slowest sender may leave behind: three of its periods, and a lane sample that was
-    /// at most 150 ms old when it came. That each sender is waited for no longer than its own period asks, tests of their
+    /// Whether every input is one that the slowest sender may leave behind: three of its periods, for a lane a second more,
+    /// and a lane sample that was at most 150 ms old when it came. That each sender is waited for no longer than its own period asks, tests of their
     /// own show.
     fn is_fresh(&self, heard: &Heard, t_us: u64) -> bool {
         let lane = heard
             .lane
-            .is_some_and(|(age, t)| t_us - t <= 200_001 && age <= 150_000);
+            .is_some_and(|(age, t)| t_us - t <= 1_201_001 && age <= 150_000);
         let others = [heard.driver.map(|d| d.1), heard.engage.map(|e| e.1), heard.speeds];
         lane && others.iter().all(|t| t.is_some_and(|t| t_us - t <= 75_000))
     }

@@ -21,6 +21,8 @@ pub(super) const FADE: u64 = 3;
 pub(super) const HANDOVER: u64 = 4;
 pub(super) const FAULT: u64 = 5;
 pub(super) const LOCKED: u64 = 6;
+/// Bit of the fault of a line elsewhere, which is a warning in Active.
+pub(super) const LANE_STEP: u64 = 1 << 15;
 
 const DATA_IDS: [u8; 16] = [
     0xD9, 0xAD, 0xC1, 0x0B, 0x75, 0xF8, 0xE0, 0x7C, 0x7A, 0xE6, 0xAE, 0x92, 0x9B, 0x3E, 0xEA, 0x5E,

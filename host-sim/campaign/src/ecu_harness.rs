@@ -12,7 +12,7 @@ use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use super::bytes::Status;
-use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER};
+use super::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LANE_STEP};
 use super::injection::{Clock, Injection, Inside};
 use super::invariants::InvariantChecker;
 use super::residual::{Residual, Seen};
@@ -296,6 +296,10 @@ impl<'a> EcuHarness<'a> {
         }
         record.reset = status.reset;
         if step >= self.onset {
+            // Which line is gone on with, and which is taken, the second opinion does not know: nothing is too early then.
+            if status.mode == ACTIVE && status.faults & LANE_STEP != 0 {
+                record.used = f64::INFINITY;
+            }
             record.peak_nm = record.peak_nm.max(status.torque_nm.abs());
             record.overridden |= status.limit == DRIVER_OVERRIDE;
             if status.torque_nm == 0.0 && status.mode == ACTIVE {

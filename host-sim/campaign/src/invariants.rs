@@ -15,10 +15,10 @@
 //! | override | the bound that shrinks from 0.8 N.m of opposing driver torque |
 //! | modes | T = 0 in Boot, Standby, Fault, Locked; Fault and Locked are never left |
 //! | engaging | into Active only from 500 ms of Standby and by a request that rose |
-//! | inputs | no input older than 30 ms in Active, no picture of a late camera older than 350 ms |
+//! | inputs | no input older than 30 ms in Active, no picture older than a second more, of a late camera 1.35 s |
 //! | handover | never grows, keeps its sign, at or below its line or on the way there at 8 N.m/s, zero after 2 s; the line goes three times as fast while the driver opposes, twice without a column, four times beside one that contradicts itself, and starts from zero after an implausible lane |
 //! | fade | never grows, falls by 4 N.m/s |
-//! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked |
+//! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked, and beside LaneStep in Active |
 
 mod frame;
 
@@ -43,6 +43,8 @@ const TIMEOUT_US: u32 = 30_000;
 const LATE_US: u32 = 8_000;
 /// Oldest sample of a camera that is late: 150 ms, and three of the longest times between two pictures.
 const LATE_CAMERA_US: u32 = 350_000;
+/// Without a picture guidance goes on for so long.
+const BLIND_US: u32 = 1_000_000;
 const READY_US: u32 = 500_000;
 const FADE_NM_PER_S: f64 = 4.0;
 const HANDOVER_S: f64 = 2.0;
@@ -64,7 +66,7 @@ const LSB_NM: f64 = 1.0 / 4096.0;
 const TINY_NM: f64 = 1e-6;
 
 /// Bits of the faults of implausible inputs, with the time before which an output is trusted, us.
-const UNSEEN_US: [(u64, u32); 2] = [(1 << 4, 1_500_000), (1 << 6, 500_000)];
+const UNSEEN_US: [(u64, u32); 2] = [(1 << 4, 1_500_000), (1 << 6, 800_000)];
 /// What lies between two outputs that the ECU remembers, us, and to spare; and the most that the probe may have taken away.
 const APART_US: u32 = 60_000;
 const PROBE_NM: f64 = 0.2;
@@ -340,10 +342,10 @@ impl InvariantChecker {
         if mode == ACTIVE {
             for (at, name) in self.true_at_us.iter().zip(["lane", "column", "speed", "request"]) {
                 let age_us = at.map_or(u32::MAX, |at| now_us.wrapping_sub(at));
-                let most_us = if name == "lane" && self.camera_is_late {
-                    LATE_CAMERA_US
-                } else {
-                    TIMEOUT_US + LATE_US
+                let most_us = match name {
+                    "lane" if self.camera_is_late => LATE_CAMERA_US + BLIND_US,
+                    "lane" => TIMEOUT_US + LATE_US + BLIND_US,
+                    _ => TIMEOUT_US + LATE_US,
                 };
                 if age_us > most_us {
                     return Err(format!("Active with a {name} of {age_us} us"));

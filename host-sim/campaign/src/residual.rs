@@ -4,8 +4,8 @@
 //! in which what arrives contradicts itself. This file decides that moment without the core: the change of the
 //! near-point error that speed, yaw error and yaw rate predict against the change seen, and the column's
 //! torques against its movement, each through a memory of 1 s. Vehicle and margins are the documented ones
-//! (`docs/explanation/plausibility.md`), from table 9. A sample further away than a vehicle can move is passed over;
-//! when there is nothing else for 30 ms, that is seen.
+//! (`docs/explanation/plausibility.md`), from table 9. A sample further away than a vehicle can move is passed over, until the
+//! line that it tells of is taken; when there is nothing else for four seconds, that is seen.
 
 use std::collections::VecDeque;
 
@@ -36,8 +36,11 @@ const MOTOR_LAG: f64 = 64.0 / 3.0;
 /// Slowest speed that is guided, m/s.
 const LEAST_SPEED_M_PER_S: f64 = 5.0;
 const MEMORY_S: f64 = 1.0;
-const TIMEOUT_S: f64 = 0.030;
-const HALF_STEP_S: f64 = 0.0005;
+/// How long a line may be elsewhere; until the old one is let go of, three frames of its sender included; and where it is taken.
+const ELSEWHERE_S: f64 = 4.0;
+const LET_GO_S: f64 = 0.55;
+const NEAR_M: f64 = 0.8;
+const NEAR_RAD: f64 = 0.2;
 /// t'_n, and how long before the far point is where the near point is now, s.
 const NEAR_TIME_S: f64 = 0.3;
 const BETWEEN_S: f64 = 0.4;
@@ -64,11 +67,9 @@ fn is_a_step(last: [f64; 2], new: [f64; 2]) -> bool {
     (new[0] - last[0]).abs() > LANE_STEP_M || (new[1] - last[1]).abs() > YAW_STEP_RAD
 }
 
-/// Whether they may be those of a line chosen anew: 0.4 m aside, or a lane's width and no further away than that.
-fn is_another_line(last: [f64; 2], new: [f64; 2]) -> bool {
-    let moved = (new[0] - last[0]).abs();
-    let next_lane = (2.3..=4.3).contains(&moved) && new[0].abs() <= last[0].abs() + 0.4;
-    (new[1] - last[1]).abs() <= YAW_STEP_RAD && (moved <= 0.4 || next_lane)
+/// Whether a line that is elsewhere may be taken: near, and along the road.
+fn is_near([e_y_m, e_theta_rad]: [f64; 2]) -> bool {
+    e_y_m.abs() <= NEAR_M && e_theta_rad.abs() <= NEAR_RAD
 }
 
 /// What a fault can be seen by.
@@ -119,8 +120,6 @@ pub(super) struct Residual {
     headings: VecDeque<[f64; 3]>,
     /// When, and the line's direction at the far point in the frame of the headings.
     lines: VecDeque<[f64; 2]>,
-    /// The last pair of errors that was too far from the one before.
-    refused: Option<[f64; 2]>,
     lane_bias_m_per_s: f64,
     column_bias_nm: f64,
     predicted_m: f64,
@@ -164,7 +163,6 @@ impl Residual {
             lane: None,
             headings: VecDeque::new(),
             lines: VecDeque::new(),
-            refused: None,
             lane_bias_m_per_s: 0.0,
             column_bias_nm: 0.0,
             predicted_m: 0.0,
@@ -241,21 +239,16 @@ impl Residual {
     pub(super) fn lane(&mut self, time_s: f64, e_y_m: f64, e_theta_rad: f64) {
         let e_y_m = e_y_m.clamp(-LANE_RANGE_M, LANE_RANGE_M);
         let e_theta_rad = e_theta_rad.clamp(-YAW_RANGE_RAD, YAW_RANGE_RAD);
-        if let Some((_, y, theta)) = self.lane
-            && is_a_step([y, theta], [e_y_m, e_theta_rad])
+        if let Some((before_s, y, theta)) = self.lane
+            && (is_a_step([y, theta], [e_y_m, e_theta_rad]) || time_s - before_s >= LET_GO_S)
         {
-            let agrees = self
-                .refused
-                .is_some_and(|before| !is_a_step(before, [e_y_m, e_theta_rad]));
-            if !(agrees && is_another_line([y, theta], [e_y_m, e_theta_rad])) {
-                self.refused = Some([e_y_m, e_theta_rad]);
+            if time_s - before_s < LET_GO_S || !is_near([e_y_m, e_theta_rad]) {
                 return;
             }
             // What comes next has no past.
             self.lines.clear();
             (self.predicted_m, self.moved_m, self.lane) = (0.0, 0.0, None);
         }
-        self.refused = None;
         if let Some((before_s, y, _)) = self.lane {
             let dt = time_s - before_s;
             let moved = e_y_m - y;
@@ -309,9 +302,9 @@ impl Residual {
 
     /// Share of the lane's margin that is used: 1 and more can be seen.
     pub(super) fn lane_used(&self) -> f64 {
-        // No possible sample for 30 ms.
+        // No possible sample for as long as guidance goes on without.
         let silence_s = self.lane.map_or(0.0, |(at_s, ..)| self.now_s - at_s);
-        if silence_s > TIMEOUT_S + HALF_STEP_S {
+        if silence_s > ELSEWHERE_S {
             return f64::INFINITY;
         }
         let missing = (self.predicted_m - self.moved_m) * self.predicted_m.signum();

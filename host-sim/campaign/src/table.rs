@@ -208,6 +208,12 @@ pub fn rows() -> impl Iterator<Item = &'static FaultCase> {
 /// Reaction to an input that is stale: 30 ms of age, seen in the next cycle. The last good sample may be older
 /// than the onset, never younger.
 const STALE_MS: u32 = 31;
+/// Reaction to a lane that is lost: guidance goes on for a second without a picture.
+const BLIND_MS: u32 = STALE_MS + 1001;
+/// Reaction to pictures of a line elsewhere that comes no nearer: four seconds.
+const ELSEWHERE_MS: u32 = STALE_MS + 4001;
+/// Reaction to speeds that step or are apart: 0.3 s are ridden out, with a message or two of 10 ms.
+const SLIP_MS: u32 = STALE_MS + 320;
 /// Reaction to a contradiction, from the instant in which it can be seen.
 const CONTRADICTION_MS: u32 = 200;
 /// From the instant in which the motor delivers what no honest one would, if it goes on: 10 ms of patience, two

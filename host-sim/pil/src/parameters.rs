@@ -26,13 +26,13 @@ const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 const STATUSES: usize = 5;
 /// The parameters in use come one every 100 ms, and a frame may be lost.
 const VALUES_WITHIN: Duration = Duration::from_secs(10);
-/// Speeds before a set: three that a new sender has to show, and more. At their period.
-const SPEEDS: u8 = 6;
+/// So many speeds of zero come first: the three of a new sender, and the hundred in a row of a vehicle that stands. In one piece:
+/// a pause of this computer between two would be a loss.
+const SPEEDS: u8 = 110;
 /// Before each frame of a set: those that a sender has to show anew, and one more.
 const SPEEDS_BETWEEN: u8 = 4;
 /// So often is a set sent whose speeds were too old when it came.
 const ATTEMPTS: u32 = 10;
-const SPEED_PERIOD: Duration = Duration::from_millis(10);
 
 /// The ECU at the other end of an adapter.
 pub struct Product {
@@ -139,10 +139,8 @@ impl Product {
     /// Speeds of zero, for an ECU on a bench: nobody else sends any. Returns the counter of the next.
     fn send_standstill(&mut self) -> Result<u8, PilError> {
         let mut counter = 0;
-        for _ in 0..SPEEDS {
-            self.port.send(&[standing(&mut counter)])?;
-            std::thread::sleep(SPEED_PERIOD);
-        }
+        let speeds: Vec<Frame> = (0..SPEEDS).map(|_| standing(&mut counter)).collect();
+        self.port.send(&speeds)?;
         Ok(counter)
     }
 

@@ -224,7 +224,8 @@ fn parameters_can_be_tried() {
         (Speed::from_m_per_s(5.0), 0, WriteOutcome::NotStanding),
         (still, 3, WriteOutcome::NotUnlocked),
     ] {
-        client.drive(&mut bench, 300, speed, &mut counter);
+        // A jump from 5 m/s to nothing is held for 0.33 s, and a hundred messages say that it stands.
+        client.drive(&mut bench, 2000, speed, &mut counter);
         send(&mut client, in_use);
         let heard = client.drive(&mut bench, 1100, speed, &mut counter);
         assert_eq!(last(&heard).outcome, outcome);

@@ -12,6 +12,8 @@ pub struct Action {
     pub probe: Option<bool>,
     /// Torque of a hand on the wheel beside the driver model's, N.m, positive turns left. The torque sensor sees it.
     pub hand_torque_nm: f64,
+    /// Where the driver steers to beside the lane's centre, m to the right: the next lane.
+    pub beside_m: f64,
     /// What the world does wrong, beside the failure that the scenario plans.
     pub world: WorldFaults,
 }

@@ -47,6 +47,8 @@ pub struct WorldKind {
     pub what: &'static str,
     /// Whether roads and cars are like that, so that every declaration is one too many.
     pub judged: bool,
+    /// Whether it has all of [`EVERYTHING`] beside its parts.
+    everything: bool,
     parts: &'static [Part],
 }
 
@@ -77,12 +79,35 @@ enum Part {
     Blind,
     /// A speed that falls and rises by up to 3 m/s2.
     Braking,
+    /// Gusts at bridges: 1 kN within 0.3 s.
+    Gusts,
+    /// What happens now and then, see [`Happens`].
+    Blinks,
+    Slips,
+    Works,
+    LaneChanges,
+    NoYawRate,
 }
 
-use Part::{Assist, Bank, Blind, Braking, Camera, Friction, Motor, Slippery, Steep, Wind};
+/// What happens to honest inputs now and then.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Happens {
+    /// The camera sees nothing for a while.
+    pub blinks: bool,
+    /// The wheels slip or lock.
+    pub slips: bool,
+    /// The line moves aside, and back.
+    pub works: bool,
+    /// A lane change by hand of which nobody is told.
+    pub lane_changes: bool,
+    /// No yaw rate is measured.
+    pub no_yaw_rate: bool,
+}
+
+use Part::{Assist, Bank, Blind, Braking, Camera, Friction, Gusts, Motor, Slippery, Steep, Wind};
 
 /// Every world, from paper to beyond.
-pub const WORLDS: [WorldKind; 12] = [
+pub const WORLDS: [WorldKind; 19] = [
     world("calibrated", "a calibrated car, flat road, no friction", &[]),
     world(
         "friction",
@@ -104,41 +129,67 @@ pub const WORLDS: [WorldKind; 12] = [
         "friction, tyres, tolerances, bank and wind together",
         EVERYTHING,
     ),
-    world(
+    more(
         "motor",
         "everything, and a motor with 2 to 20 ms of lag, 10 % of error, 0.02 N.m of ripple",
-        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Motor],
+        &[Motor],
     ),
-    world(
+    more(
         "assist",
         "everything, and a power assist of 8 N.m at 3 N.m of driver torque, half of it at 60 km/h",
-        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Assist],
+        &[Assist],
     ),
-    world(
+    more(
         "camera",
         "everything, and a camera 40 ms late, 10 ms of jitter, 0.03 m and 2 mrad of noise",
-        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Camera],
+        &[Camera],
     ),
-    world(
+    more(
         "braking",
         "everything, and a speed that falls to 60 % and rises again, by up to 3 m/s2",
-        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Braking],
+        &[Braking],
+    ),
+    more(
+        "blinks",
+        "everything, and a camera that sees nothing for 0.04 to 0.8 s, 12 times an hour",
+        &[Part::Blinks],
+    ),
+    more(
+        "slips",
+        "everything, and wheels that lock for 30 to 250 ms, 6 times an hour",
+        &[Part::Slips],
+    ),
+    more(
+        "works",
+        "everything, and a line that jumps by 0.35 to 0.75 m and back, 3 times an hour",
+        &[Part::Works],
+    ),
+    more(
+        "lane-changes",
+        "everything, and lane changes by hand of which nobody is told, 22 an hour",
+        &[Part::LaneChanges],
+    ),
+    more("gusts", "everything, and gusts to 1 kN within 0.3 s", &[Gusts]),
+    more(
+        "events",
+        "everything, blinks, slips, works, lane changes and gusts together",
+        &[Gusts, Part::Blinks, Part::Slips, Part::Works, Part::LaneChanges],
     ),
     beyond(
-        "slippery",
-        "everything, mu 0.3 and curves to 3 m/s2",
-        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Slippery],
+        "no-yaw-rate",
+        "everything, and no yaw rate on the bus",
+        &[Part::NoYawRate],
     ),
-    beyond(
-        "steep",
-        "everything, superelevation to 10 %",
-        &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind, Steep],
-    ),
-    beyond(
-        "blind",
-        "on paper, but the camera sees nothing for 0.5 s, 30 times an hour",
-        &[Blind],
-    ),
+    beyond("slippery", "everything, mu 0.3 and curves to 3 m/s2", &[Slippery]),
+    beyond("steep", "everything, superelevation to 10 %", &[Steep]),
+    WorldKind {
+        judged: false,
+        ..world(
+            "blind",
+            "on paper, but the camera sees nothing for 0.5 s, 30 times an hour",
+            &[Blind],
+        )
+    },
 ];
 
 const EVERYTHING: &[Part] = &[Friction, Part::Tyres, Part::Tolerances, Bank, Wind];
@@ -148,25 +199,45 @@ const fn world(name: &'static str, what: &'static str, parts: &'static [Part]) -
         name,
         what,
         judged: true,
+        everything: false,
         parts,
+    }
+}
+
+/// Everything, and more.
+const fn more(name: &'static str, what: &'static str, parts: &'static [Part]) -> WorldKind {
+    WorldKind {
+        everything: true,
+        ..world(name, what, parts)
     }
 }
 
 const fn beyond(name: &'static str, what: &'static str, parts: &'static [Part]) -> WorldKind {
     WorldKind {
         judged: false,
-        ..world(name, what, parts)
+        ..more(name, what, parts)
     }
 }
 
 impl WorldKind {
     fn has(&self, part: Part) -> bool {
-        self.parts.contains(&part)
+        self.parts.contains(&part) || (self.everything && EVERYTHING.contains(&part))
     }
 
     /// Whether cars brake and accelerate in it.
     pub fn changes_speed(&self) -> bool {
         self.has(Braking)
+    }
+
+    /// What happens in it now and then.
+    pub fn happens(&self) -> Happens {
+        Happens {
+            blinks: self.has(Part::Blinks),
+            slips: self.has(Part::Slips),
+            works: self.has(Part::Works),
+            lane_changes: self.has(Part::LaneChanges),
+            no_yaw_rate: self.has(Part::NoYawRate),
+        }
     }
 
     /// How the road lies across.
@@ -196,7 +267,12 @@ impl WorldKind {
             },
             mu: if self.has(Slippery) { 0.3 } else { off.mu },
             // Three standard deviations are 600 N, and with the lever 300 N.m.
-            gust_sd: if self.has(Wind) { 200.0 } else { off.gust_sd },
+            gust_sd: match self {
+                _ if self.has(Gusts) => 330.0,
+                _ if self.has(Wind) => 200.0,
+                _ => off.gust_sd,
+            },
+            gust_corner: if self.has(Gusts) { 1.0 } else { off.gust_corner },
             wind_lever: 0.5,
             motor_ripple: if self.has(Motor) { 0.02 } else { off.motor_ripple },
             motor_lag: if self.has(Motor) { 0.002 } else { off.motor_lag },

@@ -59,7 +59,7 @@ fn at(found_s: f64, wanted_s: f64) -> bool {
 fn a_run_says_what_the_bus_says() {
     let blind = SensorErrors {
         dropouts: 720.0,
-        dropout: 0.5,
+        dropout: 1.5,
         ..SensorErrors::default()
     };
     for condition in [Condition::High, Condition::Mid, Condition::Low] {
@@ -122,8 +122,12 @@ fn what_the_scenario_lets_fail_is_asked_for() {
     ] {
         for sensors in [Sensors::Paper, Sensors::Exact] {
             // The last picture is up to a camera's period old, and good for 30 ms; past the bus there is none in the next step.
-            let over_bus = kind == FailureKind::Input && sensors == Sensors::Paper;
-            let left_s = if over_bus { 20.003 + 0.03 - 0.004 } else { 20.003 };
+            // Guidance goes on for a second without.
+            let left_s = match (kind, sensors) {
+                (FailureKind::Input, Sensors::Paper) => 20.003 + 0.03 - 0.004 + 1.0,
+                (FailureKind::Input, _) => 20.003 + 1.0,
+                _ => 20.003,
+            };
             let failure = Failure {
                 kind,
                 time_s: 20.003,

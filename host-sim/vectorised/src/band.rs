@@ -109,6 +109,13 @@ impl<const N: usize> Band<N> {
         }
     }
 
+    /// Without a picture the band grows: the monitor's by as much a millisecond, from 9 ms of that on.
+    pub(super) fn grow(&mut self, lane: usize, lost_ms: u32) {
+        if lost_ms > 10 {
+            (self.low[lane], self.high[lane]) = (self.low[lane] - 1, self.high[lane] + 1);
+        }
+    }
+
     /// Counts the steps in which the torque is away from that.
     #[inline(always)]
     pub(super) fn judge(

@@ -31,6 +31,9 @@ const PUSHED_NM: f64 = PUSHED as f64 / ONE;
 /// Far inside what the frames carry, rad and rad/s.
 const LARGEST_WHEEL: f64 = 12.0;
 const LARGEST_YAW_RATE: f64 = 1.9;
+/// A yaw rate's step and the acceleration to the side with it, m/s2, a little less than core's.
+const YAW_RATE_STEP: f64 = plausibility::YAW_RATE_STEP.rad_per_s() - 0.001;
+const LARGEST_SIDEWAYS: f64 = plausibility::MOST_SIDEWAYS as f64 - 0.1;
 /// Counts of a yaw rate on the bus, per rad/s.
 const YAW_RATE_COUNTS: f64 = 4096.0;
 /// Times in s: between frames of the column, and of the vehicle.
@@ -141,12 +144,20 @@ impl<const N: usize> Checks<N> {
     #[inline(always)]
     pub(super) fn vehicle(&mut self, yaw_rate: &[f64; N], matters: &[i32; N], suspect: &mut [i32; N]) {
         for l in 0..N {
-            suspect[l] |=
-                !flag(yaw_rate[l].abs() <= LARGEST_YAW_RATE) & matters[l] & Reason::SensorRange.bit();
+            let sideways = yaw_rate[l].abs() * self.speed[l];
+            let is_possible = (yaw_rate[l].abs() <= LARGEST_YAW_RATE)
+                & (sideways <= LARGEST_SIDEWAYS)
+                & ((yaw_rate[l] - self.yaw_rate[l]).abs() <= YAW_RATE_STEP);
+            suspect[l] |= !flag(is_possible) & matters[l] & Reason::SensorRange.bit();
             self.heading[l] += self.yaw_rate[l] * VEHICLE_S;
             self.yaw_rate[l] = (yaw_rate[l] * YAW_RATE_COUNTS).round() * (1.0 / YAW_RATE_COUNTS);
             self.aligning[l] = self.speed[l] * self.yaw_rate[l] * self.aligning_gain[l];
         }
+    }
+
+    /// The speed heard last, m/s.
+    pub(super) fn speed(&self, lane: usize) -> f64 {
+        self.speed[lane]
     }
 
     /// A frame of the column: driver torque and the guidance torque applied as the ECU has them, N.m, and the wheel angle

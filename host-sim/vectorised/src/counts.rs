@@ -1,5 +1,6 @@
 //! Quantities as counts of 2^-24 of their unit, as `haptic-core` has them.
 
+use haptic_core::quantity::Micros;
 use haptic_sim::scenario::Scenario;
 
 pub(super) const ONE: f64 = (1 << 24) as f64;
@@ -40,6 +41,11 @@ pub(super) fn per_second(bits: i32, share: i64) -> i32 {
 #[inline(always)]
 pub(super) fn on_the_bus(bits: i32, cut: u32) -> i32 {
     (bits.wrapping_add(1 << (cut - 1)) >> cut) << cut
+}
+
+/// Whole milliseconds.
+pub(super) const fn ms(span: Micros) -> u32 {
+    span.us() / 1000
 }
 
 #[inline(always)]

@@ -7,11 +7,11 @@
 
 use haptic_core::bus::messages::TIMEOUT;
 use haptic_core::params::Params;
-use haptic_core::quantity::Micros;
 use haptic_core::{envelope, hands, law, plausibility, ramp, schedule};
 
 use super::band::Band;
-use super::counts::{MS, ONE, bits, flag, on_the_bus, per_second, small_bits, speed_heard, whole};
+use super::coast::{Coast, GOES_ON_MS};
+use super::counts::{MS, ONE, bits, flag, ms, on_the_bus, per_second, small_bits, speed_heard, whole};
 use super::probe::Probes;
 use super::rejected::Reason;
 use haptic_sim::models::sensors::TORQUE_RESOLUTION_NM;
@@ -25,7 +25,7 @@ const OFF: i32 = 2;
 /// An LSB of a torque on the bus.
 pub(super) const TORQUE_LSB: i32 = 1 << 12;
 const WINDOW_GROWTH: i32 = bits(envelope::WINDOW_GROWTH.nm());
-const WINDOW_STEPS: i32 = ms(envelope::WINDOW);
+const WINDOW_STEPS: i32 = ms(envelope::WINDOW) as i32;
 const OVERRIDE_FROM: i32 = bits(envelope::OVERRIDE_FROM.nm());
 const OVERRIDE_SLOPE: i32 = envelope::OVERRIDE_SLOPE.si() as i32;
 const MAX_RATE: i32 = law::MAX_RATE as i32;
@@ -38,19 +38,15 @@ const FELT: i32 = bits(hands::FELT.nm());
 const HELD: i32 = bits(hands::HELD.nm());
 const ACTS: i32 = bits(hands::ACTS.nm());
 /// A bit less than core's patience.
-const HANDS_MS: i32 = ms(hands::END) - 10;
+const HANDS_MS: i32 = ms(hands::END) as i32 - 10;
 /// Far inside what a column frame carries, N.m.
 const LARGEST_DRIVER_NM: f64 = 10.0;
 /// Between a loss of the lane preview and its time-out, ms; then the handover.
-pub(super) const TIMEOUT_MS: u32 = ms(TIMEOUT) as u32 + 1;
-const HANDOVER_MS: i32 = ms(ramp::HANDOVER);
+pub(super) const TIMEOUT_MS: u32 = ms(TIMEOUT) + 1;
+const HANDOVER_MS: i32 = ms(ramp::GONE_ON) as i32;
 const OPPOSES: i32 = bits(ramp::OPPOSES.nm());
 /// Torques kept for a handover, one every 5 ms.
 const PAST: usize = 16;
-/// Whole milliseconds.
-const fn ms(span: Micros) -> i32 {
-    (span.us() / 1000) as i32
-}
 
 /// The ECUs.
 #[repr(C, align(64))]
@@ -98,6 +94,9 @@ pub(super) struct Ecus<const N: usize> {
     kept: usize,
     band: Band<N>,
     probes: Probes<N>,
+    /// Runs whose lane preview fails, and whether there is one.
+    coasts: [Option<Box<Coast>>; N],
+    has_coasts: bool,
 }
 
 /// One update of a filtered rate: core's rounded quotient. A quotient of doubles is off by one at most, which what is left
@@ -153,6 +152,8 @@ impl<const N: usize> Ecus<N> {
             kept: 0,
             band: Band::new(),
             probes: Probes::new(),
+            coasts: [const { None }; N],
+            has_coasts: false,
         }
     }
 
@@ -203,6 +204,17 @@ impl<const N: usize> Ecus<N> {
         self.probes.begin(lane, &p, has_probe);
     }
 
+    /// The lane preview of a run fails, and its time-out is in a step.
+    pub(super) fn will_lose(&mut self, lane: usize, coast: Option<Coast>) {
+        self.coasts[lane] = coast.map(Box::new);
+        self.has_coasts = self.coasts.iter().any(Option::is_some);
+    }
+
+    /// Whether some run's lane preview fails.
+    pub(super) fn has_coasts(&self) -> bool {
+        self.has_coasts
+    }
+
     /// A speed that is another than before is heard.
     pub(super) fn hear_speed(&mut self, lane: usize, p: &Params, speed: i32) {
         self.scheduled[lane] = scheduled(p, speed);
@@ -220,15 +232,53 @@ impl<const N: usize> Ecus<N> {
         (self.matters[lane], self.mode[lane]) = (0, OFF);
     }
 
-    /// The lane preview is stale: the last torque from before it was lost fades.
+    /// The lane preview is lost for too long: the last torque from before the lane went on last fades.
     pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
-        let before = (step - 1) / 5 - (step - TIMEOUT_MS - 1) / 5;
+        self.coasts[lane] = None;
+        let before = (step - 1) / 5 - (step - GOES_ON_MS - 1) / 5;
         let trusted = self.past[self.kept.wrapping_sub(1 + before as usize) % PAST][lane];
         let applied = self.applied[lane];
         // Half a wave of the probe does not stand for two seconds, and what the other half took does not come back.
         let applied = smaller_of_same_sign(applied, applied.wrapping_sub(self.probes.applied[lane]));
         self.mode[lane] = HANDOVER;
         self.ramp_from[lane] = smaller_of_same_sign(trusted, applied);
+    }
+
+    /// What reaches a run whose lane preview fails, in the step in which it does.
+    #[cold]
+    pub(super) fn watch(&mut self, lane: usize, step: u32, heard: Option<[f64; 2]>, looks: bool) {
+        let Some(coast) = self.coasts[lane].as_mut().filter(|coast| coast.watches(step)) else {
+            return;
+        };
+        if let Some(came) = heard {
+            coast.vehicle(step, came);
+        }
+        if looks && self.hears[lane] != 0 {
+            coast.picture(step, [self.e_y[lane], self.e_theta[lane]]);
+        }
+    }
+
+    /// The lane goes on without a picture where there is none any more.
+    #[cold]
+    fn go_on(&mut self, lane: usize, step: u32) -> Option<u32> {
+        let lost_ms = self.coasts[lane].as_ref()?.lost_ms(step)?;
+        let asked = self.asked(lane).0;
+        let coast = self.coasts[lane].as_mut()?;
+        if lost_ms == 1 {
+            coast.asked = asked;
+            let has_probe = flag(self.probes.is_on(lane));
+            self.suspect[lane] |= has_probe & self.matters[lane] & Reason::FailureWithProbe.bit();
+        }
+        self.band.grow(lane, lost_ms);
+        if let Some(([e_y, e_theta], passed_ms)) = coast.go_on(step) {
+            let (tau, dt_us) = (self.tau[lane], (passed_ms * 1000) as i32);
+            let moved = e_y.wrapping_sub(self.e_y[lane]);
+            let turned = e_theta.wrapping_sub(self.e_theta[lane]);
+            self.e_y_rate[lane] = filtered(tau, self.e_y_rate[lane], moved, dt_us);
+            self.e_theta_rate[lane] = filtered(tau, self.e_theta_rate[lane], turned, dt_us);
+            (self.e_y[lane], self.e_theta[lane], self.age[lane]) = (e_y, e_theta, 0);
+        }
+        Some(lost_ms)
     }
 
     /// Takes the driver's torque from the column's sensor, N.m.
@@ -318,7 +368,7 @@ impl<const N: usize> Ecus<N> {
             }
         }
         let mut wanted = [0; N];
-        self.law(&mut wanted);
+        self.law(&mut wanted, own);
         let mut hands_over = 0;
         for l in 0..N {
             hands_over |= self.mode[l] & HANDOVER;
@@ -352,27 +402,48 @@ impl<const N: usize> Ecus<N> {
             .judge(&self.applied, &self.mode, &self.matters, &mut self.suspect);
     }
 
-    /// Equation (9).
+    /// Equation (9): what is asked for, and whether it needs more than 32 bits, where core saturates.
     #[inline(always)]
-    fn law(&mut self, wanted: &mut [i32; N]) {
+    fn asked(&self, l: usize) -> (i32, bool) {
         let [on_e_y, on_e_y_rate, on_e_theta, on_e_theta_rate] = &self.gains;
+        let now = |error: i32, rate: i32| {
+            ((error >> 3).wrapping_add(1) >> 1).wrapping_add(per_second(rate, i64::from(self.age[l])))
+        };
+        let sum = term(on_e_y[l], now(self.e_y[l], self.e_y_rate[l]))
+            .wrapping_add(term(on_e_y_rate[l], self.e_y_rate[l]))
+            .wrapping_add(term(on_e_theta[l], now(self.e_theta[l], self.e_theta_rate[l])))
+            .wrapping_add(term(on_e_theta_rate[l], self.e_theta_rate[l]));
+        let rounded = sum.wrapping_add(1 << 19);
+        let is_wide = (rounded.wrapping_add(1 << 51) as u64) >> 52 != 0;
+        (((rounded as u64) >> 20) as i32, is_wide)
+    }
+
+    /// Its share.
+    #[inline(always)]
+    fn law(&mut self, wanted: &mut [i32; N], own: &[i32; N]) {
+        let mut lost = [None; N];
+        if self.has_coasts {
+            for l in 0..N {
+                lost[l] = self.go_on(l, own[l] as u32);
+            }
+        }
         for l in 0..N {
-            let now = |error: i32, rate: i32| {
-                ((error >> 3).wrapping_add(1) >> 1).wrapping_add(per_second(rate, i64::from(self.age[l])))
-            };
-            let term = |gain: i32, value: i32| i64::from(gain).wrapping_mul(i64::from(value));
-            let sum = term(on_e_y[l], now(self.e_y[l], self.e_y_rate[l]))
-                .wrapping_add(term(on_e_y_rate[l], self.e_y_rate[l]))
-                .wrapping_add(term(on_e_theta[l], now(self.e_theta[l], self.e_theta_rate[l])))
-                .wrapping_add(term(on_e_theta_rate[l], self.e_theta_rate[l]));
-            let rounded = sum.wrapping_add(1 << 19);
-            // More than 32 bits would saturate.
-            let is_wide = (rounded.wrapping_add(1 << 51) as u64) >> 52 != 0;
+            let (asked, is_wide) = self.asked(l);
             self.suspect[l] |= flag(is_wide) & self.matters[l] & Reason::Law.bit();
-            let asked = ((rounded as u64) >> 20) as i32;
             let shared = term(self.scheduled[l], asked).wrapping_add(1 << 23);
             wanted[l] = ((shared as u64) >> 24) as i32;
-            self.age[l] = self.age[l].wrapping_add(MS as i32);
+        }
+        if self.has_coasts {
+            for l in 0..N {
+                if let (Some(coast), Some(lost_ms)) = (&self.coasts[l], lost[l]) {
+                    let (asked, share) = coast.left(lost_ms, self.asked(l).0, self.scheduled[l]);
+                    let shared = term(share, asked).wrapping_add(1 << 23);
+                    wanted[l] = ((shared as u64) >> 24) as i32;
+                }
+            }
+        }
+        for age in &mut self.age {
+            *age = age.wrapping_add(MS as i32);
         }
     }
 
@@ -468,6 +539,11 @@ impl<const N: usize> Ecus<N> {
     pub(super) fn matters(&self) -> &[i32; N] {
         &self.matters
     }
+}
+
+#[inline(always)]
+fn term(gain: i32, value: i32) -> i64 {
+    i64::from(gain).wrapping_mul(i64::from(value))
 }
 
 /// Share of the torque at a speed.

@@ -24,6 +24,7 @@
 
 mod band;
 mod checks;
+mod coast;
 mod counts;
 mod divide;
 mod ecu;

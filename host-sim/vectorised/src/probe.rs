@@ -49,6 +49,11 @@ impl<const N: usize> Probes<N> {
         self.is_any = self.amplitude.iter().any(|amplitude| *amplitude != 0);
     }
 
+    /// Whether a run has one.
+    pub(super) fn is_on(&self, lane: usize) -> bool {
+        self.amplitude[lane] != 0
+    }
+
     /// From its second step on a run's steps take a millisecond each.
     #[inline(always)]
     pub(super) fn let_time_pass(&mut self) {

@@ -32,6 +32,8 @@ pub enum Reason {
     TooLong,
     /// Too few runs are left for a batch.
     TooFew,
+    /// The lane preview fails beside a probe, which winds down meanwhile.
+    FailureWithProbe,
     /// Near the end of what a frame carries.
     SensorRange,
     /// A picture that is far from the one before.
@@ -60,7 +62,7 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 19] = [
+    pub const ALL: [(Self, &str); 20] = [
         (
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
@@ -74,6 +76,7 @@ impl Reason {
         (Self::FailureEnds, "a failure that ends"),
         (Self::TooLong, "longer than 2000 s"),
         (Self::TooFew, "too few for a batch"),
+        (Self::FailureWithProbe, "a lane preview that fails beside a probe"),
         (Self::SensorRange, "a sensor near the end of its range"),
         (Self::LaneStep, "lane errors that jump"),
         (Self::Speed, "a speed that jumps, or is too slow"),

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use haptic_log::trace::{Sample, Trace};
 
 use super::checks::Checks;
+use super::coast::{BLIND_MS, Coast};
 use super::ecu::{Ecus, TIMEOUT_MS};
 use super::rejected::Reason;
 use super::sensing::Senses;
@@ -59,7 +60,7 @@ struct Slot {
     is_whole: bool,
     /// The next step in which something is planned.
     event: u32,
-    /// The step of the time-out behind a lane preview that fails.
+    /// The step in which a lane preview that fails ends guidance.
     timeout: u32,
 }
 
@@ -141,10 +142,15 @@ impl<const N: usize> Runs<N> {
         slot.unguided_cause = 0.0;
         slot.is_whole = false;
         slot.timeout = u32::MAX;
+        let mut coast = None;
         if failure.kind == FailureKind::Input {
-            let last = (0..plan.failure_steps[0]).rev().find(|step| camera_looks(*step));
-            slot.timeout = last.map_or(0, |last| last + TIMEOUT_MS);
+            let failure_step = plan.failure_steps[0];
+            let last = (0..failure_step).rev().find(|step| camera_looks(*step));
+            let lost = last.map_or(0, |last| last + TIMEOUT_MS);
+            slot.timeout = lost + BLIND_MS;
+            coast = Some(Coast::new(scenario.setup().config, failure_step, lost));
         }
+        self.ecus.will_lose(lane, coast);
         slot.remnant = (scenario.driver().remnant_sd_nm != 0.0).then_some(pair.remnant);
         slot.plan = Some((plan, pair.arm));
         self.has_remnants = self.slots.iter().any(|slot| slot.remnant.is_some());

@@ -9,9 +9,11 @@ use haptic_sim::guidance::{NoGuidance, OverBus};
 use haptic_sim::models::driver::ArmGains;
 use haptic_sim::scenario::Condition;
 use haptic_sim::simulation::{Ending, Run, SAMPLE_RATE_HZ};
+use haptic_sim::worlds::Happens;
 use haptic_sim::{Action, Outcome, Scenario, Simulation};
 use haptic_vectorised::{Event, Options};
 
+use super::events::Eventful;
 use super::{ByHand, Declaration, LEG_S, Leg, LegNumber};
 use crate::vectorised::{Checked, Group};
 
@@ -33,6 +35,11 @@ pub(super) fn side_by_side(
     [first, of]: [usize; 2],
     mut done: impl FnMut(usize, Leg) -> Result<(), String>,
 ) -> Result<(), String> {
+    // Vectorised runs know of nothing that happens.
+    if legs.iter().any(|leg| leg.world.happens() != Happens::default()) {
+        let mut alone = legs.iter().enumerate();
+        return alone.try_for_each(|(place, leg)| done(place, leg.drive(root)?));
+    }
     let guided = legs.iter().map(|leg| leg.scenario(root));
     let guided: Vec<Scenario> = guided.collect::<Result<_, _>>()?;
     let manual: Vec<Scenario> = guided.iter().map(manual).collect::<Result<_, _>>()?;
@@ -62,7 +69,7 @@ pub(super) fn side_by_side(
     let hands: Vec<ByHand> = hands.into_iter().flatten().collect();
     let rejected = group(&guided).run_batch(
         options,
-        |place| with_ecu(&guided[place]).0,
+        |place| with_ecu(&guided[place], Happens::default()).0,
         |place, event| match event {
             Event::Ended(run) => {
                 let reported = Reported {
@@ -79,7 +86,7 @@ pub(super) fn side_by_side(
         },
     )?;
     rejected.into_iter().try_for_each(|place| {
-        let (run, reported) = with_ecu(&guided[place]);
+        let (run, reported) = with_ecu(&guided[place], Happens::default());
         done(
             place,
             legs[place].leg(&guided[place], &run, reported, hands[place]),
@@ -111,11 +118,15 @@ pub(super) fn by_hand(scenario: &Scenario) -> Run {
 }
 
 /// A leg's drive with the shipping ECU, and what it reported.
-pub(super) fn with_ecu(scenario: &Scenario) -> (Run, Reported) {
-    let mut simulation = Simulation::with(scenario, OverBus::new(scenario.setup()));
+pub(super) fn with_ecu(scenario: &Scenario, happens: Happens) -> (Run, Reported) {
+    let ecu = Eventful::new(OverBus::new(scenario.setup()), happens, scenario.seed());
+    let mut simulation = Simulation::with(scenario, ecu);
     let (mut watch, mut samples) = (Watch::new(), room());
     while watch.steps < LEG_STEPS && watch.reported.mode != Mode::Fault {
-        let action = watch.action();
+        let action = Action {
+            beside_m: simulation.guidance().beside_m(watch.steps),
+            ..watch.action()
+        };
         let Some(outcome) = simulation.step(&action) else {
             break;
         };

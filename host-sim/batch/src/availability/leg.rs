@@ -149,7 +149,7 @@ impl LegNumber {
     /// As [`LegNumber::scenario`].
     pub fn drive(&self, root: u64) -> Result<Leg, String> {
         let scenario = self.scenario(root)?;
-        let (run, reported) = with_ecu(&scenario);
+        let (run, reported) = with_ecu(&scenario, self.world.happens());
         Ok(self.leg(&scenario, &run, reported, ByHand::of(&by_hand(&scenario))))
     }
 

@@ -16,6 +16,7 @@
 //! Not here: what is missed. `haptic-campaign` injects faults into the same world.
 
 mod drive;
+mod events;
 mod leg;
 mod roads;
 

@@ -3,7 +3,7 @@
 use haptic_core::bus::Frame;
 
 use super::{LIMIT_NM, MEMORY_FAULT, OVERRIDE_FROM_NM, OVERRIDE_SLOPE};
-use crate::bytes::{self, FAULT, HANDOVER, LOCKED, Status};
+use crate::bytes::{self, ACTIVE, FAULT, HANDOVER, LANE_STEP, LOCKED, Status};
 
 /// Bits of the faults of class B, of class C, and of class Locked. A copy of the core's list on purpose: a test compares
 /// them, so that a new fault is classed here by a person too.
@@ -46,7 +46,9 @@ pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status
 }
 
 pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
-    let must_warn = matches!(status.mode, HANDOVER | FAULT | LOCKED) || status.faults & HANDS_OFF != 0;
+    let must_warn = matches!(status.mode, HANDOVER | FAULT | LOCKED)
+        || status.faults & HANDS_OFF != 0
+        || (status.mode == ACTIVE && status.faults & LANE_STEP != 0);
     if status.warning != must_warn {
         return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
     }

@@ -97,10 +97,9 @@ impl FaultCase {
         }
     }
 
-    /// Frames that a fault leaves too far apart may be stale.
-    pub(super) const fn gaps_may_hand_over(self) -> Self {
+    /// Whatever a handover is due to.
+    pub(super) const fn may_hand_over_at_once(self) -> Self {
         Self {
-            class: Class::R,
             expect: Expect::MayHandOver,
             ..self
         }

@@ -1,6 +1,6 @@
 //! Faults of the bus: frames lost, late, again, damaged, forged. All of them also run in QEMU.
 
-use super::{FaultCase, STALE_MS, row};
+use super::{BLIND_MS, FaultCase, STALE_MS, row};
 use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
 use crate::injection::{Injection, RequestFault, Wire};
 
@@ -25,7 +25,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row("lost-4", "four frames of each message in a row lost", &[lost(4)]).hands_over(STALE_MS).q(),
     row("lost-10", "ten frames of each message in a row lost", &[lost(10)]).hands_over(STALE_MS).q(),
     row("lost-column-10", "ten column frames in a row lost: 20 ms", &[wire(Wire::Lost(&[COLUMN], Some(10)))]).bridged().q(),
-    row("silent-lane", "no lane preview", &[wire(Wire::Lost(&[LANE], None))]).hands_over(STALE_MS).q(),
+    row("silent-lane", "no lane preview", &[wire(Wire::Lost(&[LANE], None))]).hands_over(BLIND_MS).q(),
     row("silent-column", "no column frames", &[wire(Wire::Lost(&[COLUMN], None))]).hands_over(STALE_MS).q(),
     row("silent-vehicle", "no speeds", &[wire(Wire::Lost(&[VEHICLE], None))]).hands_over(STALE_MS).q(),
     row("silent-host", "no command", &[wire(Wire::Lost(&[DEMAND], None))]).hands_over(STALE_MS).q(),
@@ -41,7 +41,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row("wrong-length", "frames of seven bytes", &[wire(Wire::Short)]).hands_over(STALE_MS).q(),
     row("wrong-identifier", "frames under an unknown identifier", &[wire(Wire::Renamed)]).hands_over(STALE_MS).q(),
     row("ten-times-the-rate", "ten frames where one is due, counters running", &[wire(Wire::Burst(10))]).q(),
-    row("jitter", "frames up to 25 ms late, in order: a gap may pass the time-out", &[wire(Wire::Jittered(25))]).gaps_may_hand_over().q(),
+    row("jitter", "frames up to 25 ms late, in order: a gap may pass the time-out", &[wire(Wire::Jittered(25))]).bridged().may_hand_over_at_once().q(),
     row("request-toggles", "request toggles at 50 Hz", &[Injection::Request(RequestFault::Toggles)]).fades(22).q(),
     row("bus-off", "bus off for 100 ms, then back", &[SILENCE]).hands_over(STALE_MS).lasts(100).q(),
 ];

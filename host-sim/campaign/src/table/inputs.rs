@@ -3,7 +3,7 @@
 //! Sigma of the lane errors is 5 mm and 0.5 mrad. A jerk of the wheel moves the vehicle where a fault can only
 //! be seen by a movement that does not come.
 
-use super::{FaultCase, STALE_MS, row};
+use super::{BLIND_MS, ELSEWHERE_MS, FaultCase, SLIP_MS, STALE_MS, row};
 use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
 use crate::injection::{Change, Hand, Injection, RequestFault, Signal, Start, Wire};
 use crate::residual::Seen;
@@ -71,7 +71,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         ],
     )
     .contradicts(),
-    row("lane-invalid", "lane preview marked invalid", &[Invalid]).hands_over(STALE_MS),
+    row("lane-invalid", "lane preview marked invalid", &[Invalid]).hands_over(BLIND_MS),
     row(
         "lane-invalid-blink",
         "lane preview marked invalid for 15 ms",
@@ -79,6 +79,31 @@ pub(super) const ROWS: &[FaultCase] = &[
     )
     .bridged()
     .lasts(15),
+    row(
+        "camera-blinks",
+        "lane preview marked invalid for 0.9 s",
+        &[Invalid],
+    )
+    .bridged()
+    .lasts(900),
+    row(
+        "camera-blinks-and-jumps",
+        "lane preview lost for 0.5 s, and e_y' 0.5 m off from then on",
+        &[
+            Sensor(LateralError, Plus(0.5)),
+            Injection::Wire(Wire::Lost(&[LANE], Some(60))),
+        ],
+    )
+    .may_hand_over(),
+    row(
+        "camera-blinks-and-speeds-drift",
+        "lane preview lost, and second speed drifts away at 5 m/s2: 2 m/s apart after 400 ms",
+        &[
+            Injection::Wire(Wire::Lost(&[LANE], None)),
+            Sensor(Speed2, Drifting(5.0)),
+        ],
+    )
+    .hands_over(400 + SLIP_MS),
     // One LSB beyond the range, once and always.
     row(
         "lateral-error-beyond-once",
@@ -91,7 +116,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_y' one LSB above 4 m",
         &[always(LANE, 12, 17, 32_769)],
     )
-    .hands_over(STALE_MS),
+    .hands_over(BLIND_MS),
     row(
         "yaw-error-beyond-once",
         "e_theta' one LSB below -0.5 rad, one frame",
@@ -103,7 +128,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_theta' one LSB below -0.5 rad",
         &[always(LANE, 29, 17, -32_769)],
     )
-    .hands_over(STALE_MS),
+    .hands_over(BLIND_MS),
     row(
         "driver-torque-beyond-once",
         "T_d one LSB above 20 N.m, one frame",
@@ -158,25 +183,25 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_y' at the least raw value",
         &[always(LANE, 12, 17, -65_536)],
     )
-    .hands_over(STALE_MS),
+    .hands_over(BLIND_MS),
     row(
         "lateral-error-raw-max",
         "e_y' at the largest raw value",
         &[always(LANE, 12, 17, 65_535)],
     )
-    .hands_over(STALE_MS),
+    .hands_over(BLIND_MS),
     row(
         "yaw-error-raw-min",
         "e_theta' at the least raw value",
         &[always(LANE, 29, 17, -65_536)],
     )
-    .hands_over(STALE_MS),
+    .hands_over(BLIND_MS),
     row(
         "yaw-error-raw-max",
         "e_theta' at the largest raw value",
         &[always(LANE, 29, 17, 65_535)],
     )
-    .hands_over(STALE_MS),
+    .hands_over(BLIND_MS),
     row(
         "driver-torque-raw-min",
         "T_d at the least raw value",
@@ -225,25 +250,25 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_y' of i32::MIN in the sender",
         &[Sensor(LateralError, StuckAt(-2_147_483_648.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(ELSEWHERE_MS),
     row(
         "lateral-error-max",
         "e_y' of i32::MAX in the sender",
         &[Sensor(LateralError, StuckAt(2_147_483_647.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(ELSEWHERE_MS),
     row(
         "yaw-error-min",
         "e_theta' of i32::MIN in the sender",
         &[Sensor(YawError, StuckAt(-2_147_483_648.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(ELSEWHERE_MS),
     row(
         "yaw-error-max",
         "e_theta' of i32::MAX in the sender",
         &[Sensor(YawError, StuckAt(2_147_483_647.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(ELSEWHERE_MS),
     row(
         "wheel-angle-min",
         "phi of i32::MIN in the sender",
@@ -264,7 +289,7 @@ pub(super) const ROWS: &[FaultCase] = &[
             Sensor(Speed2, StuckAt(2_147_483_647.0)),
         ],
     )
-    .hands_over(STALE_MS),
+    .hands_over(SLIP_MS),
     // Steps, signs, drifts, gains, noise.
     row(
         "lateral-error-step-once",
@@ -275,10 +300,16 @@ pub(super) const ROWS: &[FaultCase] = &[
     .lasts(8),
     row(
         "lateral-error-step",
-        "e_y' 0.5 m off",
+        "e_y' 0.5 m off, as at road works",
         &[Sensor(LateralError, Plus(0.5))],
     )
-    .hands_over(STALE_MS),
+    .may_hand_over(),
+    row(
+        "lateral-error-step-far",
+        "e_y' 3 m off",
+        &[Sensor(LateralError, Plus(3.0))],
+    )
+    .contradicts(),
     row(
         "lateral-error-flipped",
         "e_y' with the wrong sign",
@@ -304,6 +335,37 @@ pub(super) const ROWS: &[FaultCase] = &[
     )
     .contradicts(),
     row(
+        "yaw-rate-spiked",
+        "yaw rate of 1.9 rad/s in two messages",
+        &[Sensor(YawRate, StuckAt(1.9))],
+    )
+    .bridged()
+    .lasts(20),
+    row(
+        "yaw-rate-stuck",
+        "yaw rate frozen",
+        &[JERK, Sensor(YawRate, Frozen)],
+    )
+    .may_hand_over(),
+    row(
+        "yaw-rate-inverted",
+        "yaw rate with the wrong sign",
+        &[JERK, Sensor(YawRate, Times(-1.0))],
+    )
+    .may_hand_over(),
+    row(
+        "yaw-rate-zero",
+        "yaw rate 0 and valid",
+        &[JERK, Sensor(YawRate, StuckAt(0.0))],
+    )
+    .may_hand_over(),
+    row(
+        "yaw-rate-offset-20",
+        "yaw rate 20 mrad/s off",
+        &[Sensor(YawRate, Plus(0.02))],
+    )
+    .may_hand_over(),
+    row(
         "lateral-error-drifting",
         "e_y' drifts by 0.1 m/s",
         &[Sensor(LateralError, Drifting(0.1))],
@@ -321,12 +383,13 @@ pub(super) const ROWS: &[FaultCase] = &[
     )
     .may_hand_over()
     .torque(5.0),
+    // Ten times an error jumps: which line is taken then, the second opinion does not follow.
     row(
         "lateral-error-x10",
         "e_y' times 10",
         &[JERK, Sensor(LateralError, Times(10.0))],
     )
-    .may_hand_over()
+    .may_hand_over_at_once()
     .torque(5.0),
     row(
         "yaw-error-x0",
@@ -346,7 +409,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "e_theta' times 10",
         &[JERK, Sensor(YawError, Times(10.0))],
     )
-    .may_hand_over()
+    .may_hand_over_at_once()
     .torque(5.0),
     row(
         "noise-3-sigma",
@@ -452,7 +515,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "speeds 0 at once",
         &[Sensor(Speed1, StuckAt(0.0)), Sensor(Speed2, StuckAt(0.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(SLIP_MS),
     row(
         "speed-negative",
         "a speed one LSB below 0",
@@ -464,19 +527,33 @@ pub(super) const ROWS: &[FaultCase] = &[
         "speeds jump by 5 m/s up and down",
         &[Sensor(Speed1, Jumping(5.0)), Sensor(Speed2, Jumping(5.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(SLIP_MS),
+    row(
+        "wheels-slip",
+        "both speeds 4 m/s low for 60 ms, as brakes let go",
+        &[Sensor(Speed1, Plus(-4.0)), Sensor(Speed2, Plus(-4.0))],
+    )
+    .bridged()
+    .lasts(60),
+    row(
+        "wheel-slips",
+        "one speed 5 m/s low for 0.25 s",
+        &[Sensor(Speed1, Plus(-5.0))],
+    )
+    .bridged()
+    .lasts(250),
     row(
         "speeds-apart",
         "second speed 2 m/s higher",
         &[Sensor(Speed2, Plus(2.0))],
     )
-    .hands_over(STALE_MS),
+    .hands_over(SLIP_MS),
     row(
         "speeds-drift-apart",
         "second speed drifts away at 5 m/s2: 2 m/s apart after 400 ms",
         &[Sensor(Speed2, Drifting(5.0))],
     )
-    .hands_over(440),
+    .hands_over(400 + SLIP_MS),
     row("heading-wraps", "the road's heading passes +-pi: no jump", &[]).from(Start::HeadingWraps),
     // The host's request.
     row(

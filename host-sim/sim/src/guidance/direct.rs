@@ -57,7 +57,6 @@ impl Guidance for Direct {
                 authority: Ratio::from_si(observation.request.authority),
                 probe: observation.request.probe,
             }),
-            line_moved: false,
             faults: FaultSet::NONE,
         };
         let applied = Torque::from_nm(observation.motor_torque_nm);

@@ -159,9 +159,10 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         }
         let motion = self.driver_vehicle.motion();
         let looked = self.driver_points.look(&self.road, &self.driver_vehicle, &motion);
-        let Some((preview, points_m)) = looked else {
+        let Some((mut preview, points_m)) = looked else {
             return self.diverge();
         };
+        preview.e_y_m -= action.beside_m;
         if points_m[1] >= self.end_m {
             self.ending = Some(Ending::CourseEnd);
             return None;

@@ -21,10 +21,12 @@ impl<const N: usize> Runs<N> {
             ..
         } = self;
         let matters = *ecus.matters();
+        let mut turns = None;
         if phase.is_multiple_of(VEHICLE_MS) {
             speeds.hear(ecus, checks, &matters);
             let yaw_rate = senses.yaw_rate(own, &worlds.state[YAW_RATE]);
             checks.vehicle(&yaw_rate, &matters, &mut ecus.suspect);
+            turns = Some(yaw_rate);
         }
         if phase.is_multiple_of(COLUMN_MS) {
             let [driver_nm, wheel] = senses.column(driver_nm, &worlds.state[WHEEL]);
@@ -45,6 +47,12 @@ impl<const N: usize> Runs<N> {
             let times = [dt_ms, phase % VEHICLE_MS];
             let keeps = phase.is_multiple_of(CAMERA_MS);
             checks.picture(&seen, times, own, keeps, &heard, &mut ecus.suspect);
+        }
+        if ecus.has_coasts() {
+            for (l, own) in own.iter().enumerate() {
+                let heard = turns.map(|yaw_rate| [checks.speed(l), yaw_rate[l]]);
+                ecus.watch(l, *own as u32, heard, looks);
+            }
         }
     }
 
