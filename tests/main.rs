@@ -11,6 +11,7 @@ mod identify_bus_trace;
 mod identify_changes;
 mod identify_degenerate;
 mod identify_foreign_logs;
+mod identify_layouts;
 mod identify_participants;
 mod identify_spoiled;
 mod layering;

@@ -30,7 +30,7 @@ mod trace;
 mod web;
 mod wheel;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -115,6 +115,11 @@ enum Command {
         #[arg(long)]
         bless: bool,
     },
+    /// Recordings of real people below a directory of the user's: `host-sim real-drives`, built for it.
+    RealDrives {
+        /// The directory.
+        directory: PathBuf,
+    },
     /// The documents as a book to browse, in target/book/html (needs mdbook). Exit code 1 if a link leads nowhere.
     Book,
     /// Runs an image in QEMU and prints its log.
@@ -135,6 +140,14 @@ enum Bench {
     Speed(speed::Options),
     /// The identification of a recorded drive: ours and SciPy's, to the same loss.
     Identify,
+}
+
+fn real_drives(directory: &Path) -> anyhow::Result<()> {
+    tool::run(
+        tool::cargo()
+            .args(["run", "--release", "-q", "-p", "host-sim", "--", "real-drives"])
+            .arg(directory),
+    )
 }
 
 fn main() -> ExitCode {
@@ -171,6 +184,7 @@ fn main() -> ExitCode {
             Err(error) => Err(error),
         },
         Command::Trace { bless } => trace::run(bless),
+        Command::RealDrives { directory } => real_drives(&directory),
         Command::Book => book::build(),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),
         Command::Log { file, elf } => qemu::print_log(&file, elf),

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use haptic_analysis::identify::{DriveLog, FixError, Mapping, Options, Recording, of_table, open_mapped};
+use haptic_analysis::identify::{
+    DriveLog, FixError, Layout, Mapping, Options, Recording, of_table, open_mapped,
+};
 use haptic_batch::identify::{
     Method, identify as one, identify_pieces, identify_several as several, single_track,
 };
@@ -36,6 +38,7 @@ pub(crate) struct How<'py> {
     preprocessing: bool,
     lane_smoothing: bool,
     maps: Vec<String>,
+    layout: Option<String>,
     dbc: Option<PathBuf>,
     vehicle: Option<Bound<'py, Scenario>>,
 }
@@ -65,6 +68,8 @@ impl How<'_> {
         let maps = self.maps.iter().map(|map| map.parse());
         let maps = maps.collect::<Result<Vec<Mapping>, _>>();
         let maps = maps.map_err(|error| errors::input(py, error))?;
+        let layout = self.layout.as_deref().map(Layout::named).transpose();
+        let layout = layout.map_err(|error| errors::input(py, error))?;
         let how = Recording {
             dbc: self.dbc.as_deref(),
             vehicle: self
@@ -73,6 +78,7 @@ impl How<'_> {
                 .map(|scenario| single_track(&scenario.get().inner)),
             manual: self.manual,
             stretches: &options.stretches,
+            layout: layout.as_ref(),
         };
         match drive {
             Drive::File(path) => open_mapped(path, &maps, &how).map_err(|error| errors::input(py, error)),

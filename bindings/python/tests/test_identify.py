@@ -212,6 +212,7 @@ def test_a_recording_of_the_bus_takes_another_vehicle_and_another_bus(tmp_path):
         (dict(map={"e_y_m": "t*wide"}), "the scale is no number other than 0"),
         (dict(dbc="core/haptic.dbc"), "dbc: only for a recording of the bus"),
         (dict(vehicle=hg.Scenario()), "vehicle: only for a recording of the bus"),
+        (dict(layout="openlka"), "layout: only for a file"),
     ],
 )
 def test_a_mapping_that_cannot_be_is_refused(options, says):
@@ -223,6 +224,15 @@ def test_a_mapping_of_a_file_is_refused_by_name():
     for given, says in [({"e_y": "t"}, "e_y"), ({"e_y_m": "none"}, "none"), ({"e_y_m": "t*0"}, "scale")]:
         with pytest.raises(hg.InputError, match=says):
             hg.identify(LOGS / "guided-probe-clean.csv", map=given)
+
+
+def test_a_layout_takes_the_shared_stretch_of_somebody_elses_recording():
+    recording = LOGS.parent / "layouts" / "openlka.csv"
+    low, high = hg.identify(recording, layout="openlka")["k_hg"].interval_95
+    assert low <= 0.3 <= high
+    for layout, says in [("open-lka", "one of openlka"), ("udacity", "there is no channel")]:
+        with pytest.raises(hg.InputError, match=says):
+            hg.identify(recording, layout=layout)
 
 
 def test_what_cannot_be_fixed_is_refused():

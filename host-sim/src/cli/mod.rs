@@ -24,6 +24,7 @@ mod names;
 mod output;
 mod participants;
 mod progress;
+mod real_drives;
 mod recording;
 mod reliance;
 mod results;
@@ -86,6 +87,10 @@ enum Command {
     Identify(identify::Arguments),
     /// Several drivers beside each other: what differs between two, what a group is like
     Drivers(drivers::Arguments),
+    /// Recordings of real people: read or refused, half against half
+    ///
+    /// A driver that is fitted to one half of each drive predicts the other.
+    RealDrives(real_drives::Arguments),
     /// Which experiment tells a driver's parameters to a given error: probe, course, length
     Design(design::Arguments),
     /// Participants and conditions from one file, in a balanced order
@@ -179,6 +184,7 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Lab(arguments) => lab::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Drivers(arguments) => drivers::run(arguments),
+        Command::RealDrives(arguments) => real_drives::run(arguments),
         Command::Design(arguments) => design::run(arguments),
         Command::Study(arguments) => study::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),

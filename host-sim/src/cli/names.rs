@@ -14,7 +14,15 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ),
     (
         "People",
-        &["identify", "drivers", "design", "study", "validate", "convert"],
+        &[
+            "identify",
+            "drivers",
+            "real-drives",
+            "design",
+            "study",
+            "validate",
+            "convert",
+        ],
     ),
     (
         "The ECU in simulation",

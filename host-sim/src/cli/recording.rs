@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use haptic_analysis::identify::{DriveLog, Mapping, Recording, open_mapped};
+use haptic_analysis::identify::{DriveLog, Layout, Mapping, Recording, open_mapped};
 use haptic_batch::files::load_scenario;
 use haptic_batch::identify::single_track;
 
@@ -26,6 +26,10 @@ pub(super) struct RecordingArguments {
     /// without a scale its unit is converted if the file says it; may be repeated
     #[arg(long, value_name = "NAME=CHANNEL[*SCALE]")]
     map: Vec<String>,
+    /// Whose recording it is: openlka, openpilot, sadc, udacity, cognitive-driver-model, or a layout of one's own. Of a drive
+    /// that an automation shares in turns, --manual takes the stretches by hand, otherwise the others are taken
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    layout: Option<String>,
 }
 
 impl RecordingArguments {
@@ -51,6 +55,7 @@ impl RecordingArguments {
             .map(|map| map.parse())
             .collect::<Result<Vec<Mapping>, _>>()
             .map_err(|e| format!("--{e}"))?;
+        let layout = self.layout.as_deref().map(Layout::named).transpose()?;
         let recording = Recording {
             dbc: self.dbc.as_deref(),
             vehicle: self
@@ -60,6 +65,7 @@ impl RecordingArguments {
                 .transpose()?,
             manual,
             stretches,
+            layout: layout.as_ref(),
         };
         Ok(open_mapped(path, &maps, &recording)?)
     }

@@ -172,6 +172,7 @@ def identify(
     preprocessing: bool = True,
     lane_smoothing: bool = True,
     map: Optional[Mapping[str, str]] = None,
+    layout: Union[str, os.PathLike[str], None] = None,
     dbc: Union[str, os.PathLike[str], None] = None,
     vehicle: Optional[Scenario] = None,
 ) -> Fit:
@@ -207,6 +208,10 @@ def identify(
     map : mapping of str to str, optional
         Columns of another name or unit, such as ``{"wheel_angle_rad": "SteeringAngle*0.0174533"}`` or
         ``{"speed_m_per_s": "Speed [km/h]"}``. Without a scale the unit is converted if the file or the name says it.
+    layout : str or path, optional
+        Whose recording the file is: ``"openlka"``, ``"openpilot"``, ``"sadc"``, ``"udacity"``, ``"cognitive-driver-model"``, or a
+        layout of one's own (``.toml``). Of a drive that an automation shares in turns, `manual` takes the stretches by hand,
+        otherwise the others are taken.
     dbc : path, optional
         What the frames of a recording of the bus mean, if it is not the product's own bus.
     vehicle : Scenario, optional
@@ -236,6 +241,8 @@ def identify(
     for name, given in (("dbc", dbc), ("vehicle", vehicle)):
         if given is not None and not all(files):
             raise InputError(f"{name}: only for a recording of the bus; columns need none")
+    if layout is not None and not all(files):
+        raise InputError("layout: only for a file; columns are named by map")
     how = dict(
         manual=manual,
         fix=fixed,
@@ -247,6 +254,7 @@ def identify(
         preprocessing=preprocessing,
         lane_smoothing=lane_smoothing,
         maps=[f"{name}={channel}" for name, channel in maps.items()],
+        layout=None if layout is None else os.fspath(layout),
         dbc=None if dbc is None else os.fspath(dbc),
         vehicle=vehicle,
     )

@@ -10,7 +10,7 @@ fn refuse(e: impl std::fmt::Display) -> RecordingError {
     RecordingError(e.to_string())
 }
 
-/// Columns of numbers; an empty field is NaN. A column that holds no number at all is passed over, as text is.
+/// Columns of numbers; an empty field is NaN, `True` and `False` are 1 and 0. A column that holds no number at all is passed over, as text is.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Series>, RecordingError> {
     let mut table = TableReader::new(bytes).map_err(refuse)?;
     let mut columns = headings(table.header());
@@ -18,7 +18,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Series>, RecordingError> {
     for row in table.rows() {
         let row = row.map_err(refuse)?;
         for (c, column) in columns.iter_mut().enumerate() {
-            let value = number(row.field(c));
+            let value = number(row.field(c)).or_else(|| truth(row.field(c)));
             // Text before any number is a column of text; later it is a mistake.
             if value.is_none() && has_numbers[c] {
                 return Err(refuse(TableError::NotANumber {
@@ -34,6 +34,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Series>, RecordingError> {
     }
     let kept = columns.into_iter().zip(is_text).filter(|(_, is_text)| !is_text);
     Ok(kept.map(|(column, _)| column).collect())
+}
+
+/// What Python writes of a flag.
+fn truth(field: &str) -> Option<f64> {
+    match field {
+        "True" => Some(1.0),
+        "False" => Some(0.0),
+        _ => None,
+    }
 }
 
 /// Columns by their headings, without the units in brackets unless those alone tell two of them apart.

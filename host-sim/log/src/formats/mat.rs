@@ -1,6 +1,6 @@
 //! MATLAB level 5 (`save -v6` and `-v7`): each channel a column of doubles, `units` and `sources` structs of text.
 //!
-//! Read are real vectors of any class, plain or compressed. The crate matfile is not used: it reads numbers alone, so the
+//! Read are real vectors of any class, plain or compressed, and matrices of a few of them beside each other. The crate matfile is not used: it reads numbers alone, so the
 //! units would be lost.
 
 use super::bytes::{Bytes, Room};
@@ -11,12 +11,16 @@ const COMPRESSED: u32 = 15;
 const STRUCT: u32 = 2;
 const CHAR: u32 = 4;
 const DOUBLE: u32 = 6;
+/// Most signals of a matrix; a larger one is none of signals.
+const MOST_SIGNALS: usize = 16;
 /// Longest name of a field or variable, with its zero.
 const NAME: usize = 64;
 
 /// What a variable holds.
 enum Value {
     Numbers(Vec<f64>),
+    /// Numbers by columns, and how many rows there are.
+    Matrix(Vec<f64>, usize),
     Text(String),
     Fields(Vec<(String, Value)>),
     Other,
@@ -83,22 +87,28 @@ fn matrix(b: Bytes<'_>, depth: u32) -> Result<(String, Value), RecordingError> {
     let class = flags.u32(0)? & 0xFF;
     let complex = flags.u32(0)? & 0x800 != 0;
     let (_, dimensions, at) = element(b, at)?;
-    let count: f64 = numbers(5, dimensions).iter().product();
+    let size = numbers(5, dimensions);
+    let count: f64 = size.iter().product();
     let (_, name, mut at) = element(b, at)?;
     let name = text(1, name);
-    let vector = numbers(5, dimensions).iter().filter(|n| **n != 1.0).count() <= 1;
+    let real = !complex && size.len() <= 2;
+    let vector = size.iter().filter(|n| **n != 1.0).count() <= 1;
     let value = match class {
         CHAR => {
             let (kind, contents, _) = element(b, at)?;
             Value::Text(text(kind, contents))
         }
-        DOUBLE..=15 if vector && !complex => {
+        DOUBLE..=15 if real || (vector && !complex) => {
             let (kind, contents, _) = element(b, at)?;
             let values = numbers(kind, contents);
             if values.len() as f64 != count {
                 return Err(format!("channel {name}: {} values where it says {count}", values.len()).into());
             }
-            Value::Numbers(values)
+            if vector {
+                Value::Numbers(values)
+            } else {
+                Value::Matrix(values, size[0] as usize)
+            }
         }
         STRUCT if count == 1.0 && depth == 0 => {
             let (_, length, next) = element(b, at)?;
@@ -164,6 +174,23 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
                     ..Series::default()
                 });
             }
+            // A few signals beside each other: NAME.1, NAME.2 and so on.
+            (name, Value::Matrix(values, rows))
+                if rows > 0 && rows.min(values.len() / rows) <= MOST_SIGNALS =>
+            {
+                room.take(values.len())?;
+                let in_rows = rows <= values.len() / rows;
+                let signals = if in_rows { rows } else { values.len() / rows };
+                columns.extend((0..signals).map(|i| Series {
+                    name: format!("{name}.{}", i + 1),
+                    values: if in_rows {
+                        values.iter().skip(i).step_by(rows).copied().collect()
+                    } else {
+                        values[i * rows..(i + 1) * rows].to_vec()
+                    },
+                    ..Series::default()
+                }));
+            }
             (name, Value::Fields(fields)) if name == "units" => units = fields,
             (name, Value::Fields(fields)) if name == "sources" => sources = fields,
             _ => {}
@@ -177,14 +204,11 @@ pub(super) fn read(file: &[u8]) -> Result<Vec<Series>, RecordingError> {
         column.unit = said(&units, &column.name);
         column.source = said(&sources, &column.name);
     }
-    // What is no channel: single values, vectors of another length than most.
-    let rows = columns
-        .iter()
-        .find(|c| c.name == "time_s")
-        .map(|c| c.values.len());
-    if let Some(rows) = rows {
-        columns.retain(|column| column.values.len() == rows);
-    }
+    // What is no channel: single values, vectors of another length than the time, or than the longest.
+    let time = columns.iter().find(|c| c.name == "time_s");
+    let longest = || columns.iter().map(|c| c.values.len()).max().unwrap_or(0);
+    let rows = time.map_or_else(longest, |c| c.values.len());
+    columns.retain(|column| column.values.len() == rows);
     Ok(columns)
 }
 

@@ -15,6 +15,7 @@ mod files;
 pub mod handover;
 pub mod identify;
 mod pieces;
+pub mod real_drives;
 pub mod reliance;
 pub mod run;
 pub mod stability;

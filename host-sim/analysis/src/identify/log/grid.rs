@@ -11,8 +11,8 @@ use super::{GUIDANCE_COLUMN, LogError, SHORTEST_S, refuse, too_short};
 /// at 120 Hz and 12.5 % at 250 Hz.
 const TIME_STAMP_TOLERANCE: f64 = 0.15;
 
-/// Sample periods that the models here are valid for, s: the muscle's lag of 0.1 s needs 20 Hz at least.
-const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.05);
+/// Sample periods that are read, s: below 10 Hz the muscle's lag of 0.1 s is lost between two rows.
+const SAMPLE_PERIOD_RANGE_S: (f64, f64) = (1e-4, 0.11);
 
 /// Between uneven stamps that are farther apart than so many usual steps nothing is read off.
 const LONGEST_STEP: f64 = 3.5;

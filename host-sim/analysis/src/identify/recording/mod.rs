@@ -7,6 +7,7 @@
 //! pictures would hide the camera's noise; the others on the line between their neighbours.
 
 mod instants;
+mod layout;
 mod mapping;
 
 use std::path::Path;
@@ -19,6 +20,7 @@ use haptic_log::units;
 use super::bus_trace;
 use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 use instants::at_the_torque;
+pub use layout::Layout;
 pub use mapping::Mapping;
 
 /// What can be mapped: the columns that a log must have, and the speed.
@@ -57,6 +59,9 @@ pub fn of_bytes(
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     once(maps)?;
+    if let Some(layout) = how.layout {
+        return layout.read(&bytes, format, maps, how).map_err(LogError::new);
+    }
     // Text files keep their own readers: those name lines, and tell a table from a trace by its looks.
     let is_text = matches!(format, None | Some(Format::Csv | Format::Candump));
     if maps.is_empty() && is_text && !has_units(&bytes) {

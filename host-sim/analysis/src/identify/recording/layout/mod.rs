@@ -1,0 +1,260 @@
+//! Layouts: what the columns of somebody else's recordings are, as a file says it.
+//!
+//! A layout is TOML (`host-sim/analysis/layouts/`, or a user's own). Its columns are sums of channels times numbers. Columns
+//! `offset_m` (of the lane's centre, left positive, beside the vehicle) and `curvature_1pm` stand for the driver's two points;
+//! `shared` is above 0.5 where an automation steers too. Other names serve the layout's own checks. What those find is refused or
+//! left out here; the rest is a log's columns, which are read and checked as any others.
+
+mod checks;
+mod points;
+
+use std::collections::BTreeMap;
+
+use haptic_log::formats::{self, Contents, Format, TimeColumn};
+use haptic_log::recording::{Group, Recording, Series};
+use serde::Deserialize;
+
+use super::super::bus_trace;
+use super::{DriveLog, LogError, Mapping, NAMES, SPEED_COLUMN, UNITS, of_channels};
+use checks::counted;
+use points::{Table, slopes, two_points};
+
+const BUILT_IN: [(&str, &str); 5] = [
+    ("openlka", include_str!("../../../../layouts/openlka.toml")),
+    ("openpilot", include_str!("../../../../layouts/openpilot.toml")),
+    ("sadc", include_str!("../../../../layouts/sadc.toml")),
+    ("udacity", include_str!("../../../../layouts/udacity.toml")),
+    (
+        "cognitive-driver-model",
+        include_str!("../../../../layouts/cognitive-driver-model.toml"),
+    ),
+];
+
+/// Less driving than this is refused, s.
+const LEAST_S: f64 = 10.0;
+/// What the recordings of one source hold.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// Its name: the built-in one, or the file's.
+    #[serde(skip)]
+    pub name: String,
+    /// Where the recordings can be had.
+    pub source: String,
+    /// Under which licence.
+    pub licence: String,
+    /// The commit of the source that it was tried on; none: untested.
+    pub tried_on: Option<String>,
+    /// What a reader of the estimates has to know.
+    note: Option<String>,
+    /// What the recordings lack, so that nobody can be identified from them.
+    missing: Option<String>,
+    /// The headings of a table without any.
+    #[serde(default)]
+    headings: Vec<String>,
+    columns: BTreeMap<String, String>,
+    /// Channels that must not be used, and why.
+    #[serde(default)]
+    never: BTreeMap<String, String>,
+    /// Ranges of columns; rows outside are left out.
+    #[serde(default)]
+    keep: BTreeMap<String, [f64; 2]>,
+    #[serde(default)]
+    limits: BTreeMap<String, Limit>,
+    #[serde(default)]
+    slopes: Vec<Slope>,
+}
+
+/// A range that every value of a column has.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Limit {
+    range: [f64; 2],
+    why: String,
+}
+
+/// A range of the slope of one column on another.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Slope {
+    of: String,
+    on: String,
+    range: [f64; 2],
+    why: String,
+}
+
+impl Layout {
+    /// The built-in layout of a name, or that in the file of a name that ends in `.toml`.
+    ///
+    /// # Errors
+    /// No such name or file; a file that is no layout.
+    pub fn named(name: &str) -> Result<Self, LogError> {
+        let refuse = |what: String| LogError::new(format!("layout {name}: {what}"));
+        let built_in = BUILT_IN.iter().find(|(known, _)| *known == name);
+        let text = match built_in {
+            Some((_, text)) => (*text).to_owned(),
+            None if name.ends_with(".toml") => {
+                std::fs::read_to_string(name).map_err(|e| refuse(e.to_string()))?
+            }
+            None => {
+                let known = BUILT_IN.map(|(known, _)| known).join(", ");
+                return Err(refuse(format!("one of {known}, or a file NAME.toml is wanted")));
+            }
+        };
+        let layout: Self = toml::from_str(&text).map_err(|e| refuse(e.to_string()))?;
+        Ok(Self {
+            name: name.into(),
+            ..layout
+        })
+    }
+
+    /// All that are built in.
+    ///
+    /// # Errors
+    /// As [`Layout::named`]; never for the files that are tested.
+    pub fn built_in() -> Result<Vec<Self>, LogError> {
+        BUILT_IN.iter().map(|(name, _)| Self::named(name)).collect()
+    }
+
+    /// Whether a file has all channels of this layout.
+    #[must_use]
+    pub fn fits(&self, bytes: &[u8], format: Option<Format>) -> bool {
+        self.table(bytes, format, &[]).is_ok()
+    }
+
+    /// The log in a file's bytes: of the stretches by hand, or of those shared with an automation.
+    pub(super) fn read(
+        &self,
+        bytes: &[u8],
+        format: Option<Format>,
+        maps: &[Mapping],
+        how: &bus_trace::Recording<'_>,
+    ) -> Result<(DriveLog, Vec<String>), String> {
+        let (time_s, mut table) = self.table(bytes, format, maps)?;
+        let rows = time_s.len();
+        let seconds = time_s.last().zip(time_s.first()).map_or(0.0, |(b, a)| b - a);
+        let dt_s = seconds / rows.saturating_sub(1).max(1) as f64;
+        self.within_limits(&table)?;
+        if let Some(missing) = &self.missing {
+            return Err(format!(
+                "{rows} rows of {seconds:.1} s are read, but {} recordings lack {missing}: no driver can be identified",
+                self.name
+            ));
+        }
+        if let Some(k) = time_s.windows(2).position(|w| w[1].is_nan() || w[1] <= w[0]) {
+            let (from, to) = (time_s[k], time_s[k + 1]);
+            return Err(format!(
+                "row {}: the time goes from {from} to {to}: it must grow",
+                k + 2
+            ));
+        }
+        if let Some(speed) = table.get(SPEED_COLUMN) {
+            let rate = slopes(speed, dt_s);
+            two_points(&mut table, dt_s);
+            table.insert("speed_rate".into(), rate);
+        }
+        let causes = self.causes(&time_s, &table, how.manual);
+        let is_free: Vec<bool> = causes.iter().map(Option::is_none).collect();
+        self.slopes_agree(&table, &is_free)?;
+        let findings = counted(&causes, dt_s);
+        let used_s = dt_s * is_free.iter().filter(|free| **free).count() as f64;
+        if used_s < LEAST_S {
+            let list: Vec<String> = findings.iter().map(|f| format!("{} {}", f[0], f[1])).collect();
+            return Err(format!(
+                "{used_s:.1} s of {seconds:.1} s are left, less than {LEAST_S} s; left out: {}",
+                list.join(", ")
+            ));
+        }
+        let channels = NAMES.iter().zip(UNITS).skip(1).filter_map(|(name, unit)| {
+            let mut values = table.remove(*name)?;
+            for (value, free) in values.iter_mut().zip(&is_free) {
+                if !free {
+                    *value = f64::NAN;
+                }
+            }
+            Some(Series {
+                name: (*name).into(),
+                unit: unit.into(),
+                source: self.name.clone(),
+                values,
+            })
+        });
+        let group = Group {
+            name: String::new(),
+            channels: channels.collect(),
+            time_s,
+        };
+        let (mut log, mut notes) = of_channels(&Recording { groups: vec![group] }, &[], how)?;
+        log.findings.extend(findings);
+        notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));
+        notes.extend(self.note.clone());
+        if self.tried_on.is_none() {
+            notes.push(format!("Layout {} is untested: no file could be had", self.name));
+        }
+        Ok((log, notes))
+    }
+
+    /// The time and the columns, those mapped by the caller in place of the layout's.
+    fn table(
+        &self,
+        bytes: &[u8],
+        format: Option<Format>,
+        maps: &[Mapping],
+    ) -> Result<(Vec<f64>, Table), String> {
+        let mut columns = self.columns.clone();
+        for map in maps {
+            if let Some(why) = self.never.get(&map.channel) {
+                return Err(format!("channel {}: {why}", map.channel));
+            }
+            let scale = map.scale.unwrap_or(1.0);
+            columns.insert(NAMES[map.column].into(), format!("{}*{scale}", map.channel));
+        }
+        let Some((time, scale)) = columns.remove("time_s").and_then(|text| term(&text)) else {
+            return Err(format!(
+                "layout {}: time_s is not given; --map time_s=CHANNEL*SCALE",
+                self.name
+            ));
+        };
+        let time = TimeColumn {
+            name: time,
+            scale: Some(scale),
+        };
+        let mut whole = self.headings.join(",").into_bytes();
+        if !whole.is_empty() {
+            whole.push(b'\n');
+        }
+        whole.extend_from_slice(bytes);
+        let contents = formats::read_bytes(whole, format.unwrap_or(Format::Csv), Some(&time));
+        let Contents::Channels(recording) = contents.map_err(|e| e.to_string())? else {
+            return Err("a table is wanted, this is a recording of the bus".into());
+        };
+        let mut table = Table::new();
+        for (name, text) in columns {
+            let mut sum = Vec::new();
+            for part in text.split(" + ") {
+                let (channel, scale) = term(part)
+                    .ok_or_else(|| format!("layout {}: {name} = {text:?} is no CHANNEL*SCALE", self.name))?;
+                let (_, series) = recording.find(&channel).map_err(|e| e.to_string())?;
+                sum.resize(series.values.len(), 0.0);
+                for (sum, value) in sum.iter_mut().zip(&series.values) {
+                    *sum += scale * value;
+                }
+            }
+            table.insert(name, sum);
+        }
+        let group = recording.groups.into_iter().next().unwrap_or_default();
+        Ok((group.time_s, table))
+    }
+}
+
+/// `CHANNEL` or `CHANNEL*SCALE`.
+fn term(text: &str) -> Option<(String, f64)> {
+    let (channel, scale) = match text.rsplit_once('*') {
+        Some((channel, scale)) => (channel, scale.trim().parse().ok()?),
+        None => (text, 1.0),
+    };
+    Some((channel.trim().to_owned(), scale)).filter(|(channel, _)| !channel.is_empty())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,328 @@
+//! Recordings of real people: which are read, what is identified in them, and how well a driver that was fitted to one half of a
+//! drive predicts the torque in the other, beside a plain linear regression.
+//!
+//! The variance accounted for is 1 - var(T_d - prediction)/var(T_d): the mean of the half is free, for sensors have offsets. Our
+//! driver's prediction is the simulated torque, without the disturbance model.
+
+use std::path::{Path, PathBuf};
+
+use haptic_analysis::identify::{
+    DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
+};
+use haptic_log::formats::{self, Format};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Circular shifts of the guidance torque that K_hg is held against.
+const SHIFTS: usize = 99;
+/// Regressors of the plain linear driver: angle, its rate and acceleration, lateral error, its rate, guidance, a constant.
+const REGRESSORS: usize = 7;
+/// Fewest rows of a half that is judged: 4 s at 10 Hz.
+const LEAST_ROWS: usize = 40;
+
+/// All recordings below a directory.
+#[derive(Debug, Clone, Serialize)]
+pub struct RealDrives {
+    /// The layouts that were met.
+    pub sources: Vec<Source>,
+    /// Every recording, by hand and shared, or once if it was refused as a whole.
+    pub drives: Vec<RealDrive>,
+}
+
+/// Where recordings come from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Source {
+    /// Its layout.
+    pub layout: String,
+    /// Where it can be had.
+    pub source: String,
+    /// The commit that the layout was tried on.
+    pub commit: Option<String>,
+    /// Its licence.
+    pub licence: String,
+}
+
+/// A recording, or the part of it that is driven by hand or shared.
+#[derive(Debug, Clone, Serialize)]
+pub struct RealDrive {
+    /// Path below the directory.
+    pub file: String,
+    /// Its layout; empty if none fits.
+    pub layout: String,
+    /// By hand, or shared with an automation.
+    pub by_hand: bool,
+    /// Why nothing was identified.
+    pub refused: Option<String>,
+    /// What was found, if it was not refused.
+    pub found: Option<Found>,
+}
+
+/// What was found in a drive.
+#[derive(Debug, Clone, Serialize)]
+pub struct Found {
+    /// Seconds that the fit rests on.
+    pub used_s: f64,
+    /// Assumptions that are refuted.
+    pub refuted: Vec<&'static str>,
+    /// Parameters that are identified.
+    pub identified: Vec<&'static str>,
+    /// Whether the residuals are white.
+    pub white: bool,
+    /// Their standard deviation, N.m.
+    pub residual_nm: f64,
+    /// The driver's weight on the guidance; none by hand.
+    pub k_hg: Option<Parameter>,
+    /// The share of circular shifts of the guidance torque that give at least this K_hg.
+    pub k_hg_p: Option<f64>,
+    /// Fitted on the first half and judged on the second, and the other way.
+    pub halves: Vec<Half>,
+}
+
+/// Variance accounted for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Half {
+    /// Whether no assumption was refuted on the half that was fitted.
+    pub accepted: bool,
+    /// Our driver on the half that was fitted.
+    pub own: f64,
+    /// Our driver on the other half.
+    pub ours: f64,
+    /// The linear regression on the other half.
+    pub linear: f64,
+}
+
+/// Reads and judges every recording below `directory`.
+///
+/// # Errors
+/// The directory cannot be read, or holds no recording.
+pub fn real_drives(directory: &Path) -> Result<RealDrives, String> {
+    let layouts = Layout::built_in().map_err(|e| e.to_string())?;
+    let mut files = Vec::new();
+    collect(directory, &mut files).map_err(|e| format!("{}: {e}", directory.display()))?;
+    files.sort();
+    if files.is_empty() {
+        return Err(format!(
+            "{}: there is no .csv, .mat, .mf4 or .parquet file below it",
+            directory.display()
+        ));
+    }
+    let found: Vec<(Option<&Layout>, Vec<RealDrive>)> = files
+        .par_iter()
+        .map(|path| of_file(directory, path, &layouts))
+        .collect();
+    let mut sources: Vec<Source> = Vec::new();
+    for layout in found.iter().filter_map(|(layout, _)| *layout) {
+        let source = Source {
+            layout: layout.name.clone(),
+            source: layout.source.clone(),
+            commit: layout.tried_on.clone(),
+            licence: layout.licence.clone(),
+        };
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
+    }
+    Ok(RealDrives {
+        sources,
+        drives: found.into_iter().flat_map(|(_, drives)| drives).collect(),
+    })
+}
+
+fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(directory)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            collect(&path, files)?;
+        } else if Format::of(&path).is_ok_and(|format| !format.holds_frames()) {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> (Option<&'a Layout>, Vec<RealDrive>) {
+    let drive = |layout: &str, by_hand, found: Result<Found, String>| {
+        let (refused, found) = found.map_or_else(|why| (Some(why), None), |found| (None, Some(found)));
+        RealDrive {
+            file: path.strip_prefix(directory).unwrap_or(path).display().to_string(),
+            layout: layout.into(),
+            by_hand,
+            refused,
+            found,
+        }
+    };
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => return (None, vec![drive("", true, Err(error.to_string()))]),
+    };
+    let format = Format::of(path).ok();
+    let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format)) else {
+        // A file that is broken says where; of a whole one only the time is missed.
+        let why = match formats::read_bytes(bytes, format.unwrap_or(Format::Csv), None) {
+            Err(error) if !error.to_string().contains("there is no channel time_s") => error.to_string(),
+            _ => "it has the channels of no layout that needs no --map".to_owned(),
+        };
+        return (None, vec![drive("", true, Err(why))]);
+    };
+    let judged = |by_hand| {
+        let how = Recording {
+            manual: by_hand,
+            layout: Some(layout),
+            ..Recording::default()
+        };
+        let log = open_mapped(path, &[], &how).map_err(|e| {
+            let why = e.to_string();
+            let place = format!("{}: ", path.display());
+            why.strip_prefix(&place).map_or(why.clone(), str::to_owned)
+        })?;
+        judge(&log.0, by_hand)
+    };
+    let parts = [true, false].map(|by_hand| drive(&layout.name, by_hand, judged(by_hand)));
+    let [hand, shared] = &parts;
+    // What is wrong with the file as a whole is said once.
+    let same = hand.refused.is_some() && hand.refused == shared.refused;
+    let parts = parts.into_iter().take(if same { 1 } else { 2 }).collect();
+    (Some(layout), parts)
+}
+
+fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, String> {
+    let options = Options {
+        manual: by_hand,
+        ..Options::default()
+    };
+    let fit = identify_with_noise_model(log, &options);
+    let used_s = fit.preflight.as_ref().map_or(0.0, |p| p.used_s);
+    let time_s = &fit.traces.time_s;
+    let Some(&middle_s) = time_s.get(time_s.len() / 2) else {
+        return Err("no row is left after hands off, pauses and lane changes".into());
+    };
+    let halves = half_against_half(log, &options, middle_s);
+    let list = fit.parameters.list();
+    let identified = list.iter().filter(|(.., p)| p.identified).map(|(name, ..)| *name);
+    Ok(Found {
+        used_s,
+        refuted: fit.refuted.iter().map(|r| r.assumption).collect(),
+        identified: identified.collect(),
+        white: fit.whiteness.white,
+        residual_nm: fit.remnant.as_ref().map_or(f64::NAN, |r| r.innovation_sd_nm),
+        k_hg: (!by_hand).then(|| fit.parameters.k_hg.clone()),
+        k_hg_p: (!by_hand).then(|| by_chance(log, &options, &fit)).flatten(),
+        halves,
+    })
+}
+
+/// Fitted before the middle and judged behind it, and the other way; nothing if a half is too short.
+fn half_against_half(log: &DriveLog, options: &Options, middle_s: f64) -> Vec<Half> {
+    let within = [(f64::NEG_INFINITY, middle_s), (middle_s, f64::INFINITY)].map(|half| Options {
+        stretches: vec![half],
+        ..options.clone()
+    });
+    let fits = within
+        .each_ref()
+        .map(|options| identify_with_noise_model(log, options));
+    let rows = fits.each_ref().map(|fit| -> Vec<usize> {
+        let row = |t: &f64| ((t - log.start_s) / log.dt_s).round() as usize;
+        fit.traces.time_s.iter().map(row).collect()
+    });
+    if rows.iter().any(|rows| rows.len() < LEAST_ROWS) {
+        return Vec::new();
+    }
+    let simulated = |fit: &Identification| accounted(&fit.traces.measured_nm, &fit.traces.simulated_nm);
+    let judged = [0, 1].map(|own| {
+        let other = 1 - own;
+        let ours =
+            fixed(&fits[own], within[other].clone()).map(|fixed| identify_with_noise_model(log, &fixed));
+        Half {
+            accepted: fits[own].refuted.is_empty(),
+            own: simulated(&fits[own]),
+            ours: ours.as_ref().map_or(f64::NAN, simulated),
+            linear: linear(log, &rows[own], &rows[other]).unwrap_or(f64::NAN),
+        }
+    });
+    judged.into()
+}
+
+/// The fitted driver as known in another stretch; none if the search found none.
+fn fixed(fit: &Identification, options: Options) -> Option<Options> {
+    let p = &fit.parameters;
+    let gain = [&p.gain_1, &p.gain_2, &p.gain_3].map(|gain| gain.optimum);
+    gain.iter().all(Option::is_some).then_some(())?;
+    Some(Options {
+        gain,
+        t_p_s: Some(p.t_p.optimum?),
+        k_hg: if options.manual {
+            None
+        } else {
+            Some(p.k_hg.optimum?)
+        },
+        muscle: fit.muscle(options.muscle),
+        t_nms_known: true,
+        ..options
+    })
+}
+
+fn variance(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    values.map(|v| (v - mean).powi(2)).sum::<f64>() / n
+}
+
+/// The variance accounted for.
+fn accounted(measured: &[f64], predicted: &[f64]) -> f64 {
+    let left = measured.iter().zip(predicted).map(|(m, p)| m - p);
+    1.0 - variance(left) / variance(measured.iter().copied())
+}
+
+/// A row of the regression, and what it is to explain; none beside a gap.
+fn regressors(log: &DriveLog, k: usize) -> Option<([f64; REGRESSORS], f64)> {
+    let (before, after) = (k.checked_sub(1)?, k + 1);
+    (after < log.len()).then_some(())?;
+    let (phi, e_y, dt) = (&log.wheel_angle_rad, &log.e_y_m, log.dt_s);
+    let x = [
+        phi[k],
+        (phi[after] - phi[before]) / (2.0 * dt),
+        (phi[after] - 2.0 * phi[k] + phi[before]) / (dt * dt),
+        e_y[k],
+        (e_y[after] - e_y[before]) / (2.0 * dt),
+        log.guidance_torque_nm[k],
+        1.0,
+    ];
+    let y = log.driver_torque_nm[k];
+    (y + x.iter().sum::<f64>()).is_finite().then_some((x, y))
+}
+
+/// The variance that a linear regression on some rows accounts for on others.
+fn linear(log: &DriveLog, own: &[usize], other: &[usize]) -> Option<f64> {
+    let rows = |rows: &[usize]| -> Vec<_> { rows.iter().filter_map(|k| regressors(log, *k)).collect() };
+    let (own, other) = (rows(own), rows(other));
+    let x = DMatrix::from_fn(own.len(), REGRESSORS, |k, i| own[k].0[i]);
+    let y = DVector::from_iterator(own.len(), own.iter().map(|row| row.1));
+    let weights = x.svd(true, true).solve(&y, 1e-10).ok()?;
+    let (measured, predicted): (Vec<f64>, Vec<f64>) = other
+        .iter()
+        .map(|(x, y)| (*y, x.iter().zip(weights.iter()).map(|(x, w)| x * w).sum::<f64>()))
+        .unzip();
+    Some(accounted(&measured, &predicted))
+}
+
+/// How often the same guidance torque at another time gives at least this K_hg.
+fn by_chance(log: &DriveLog, options: &Options, fit: &Identification) -> Option<f64> {
+    let k_hg = fit.parameters.k_hg.optimum?;
+    let known: Vec<usize> = (0..log.len())
+        .filter(|k| log.guidance_torque_nm[*k].is_finite())
+        .collect();
+    let at_least = (1..=SHIFTS).filter(|shift| {
+        let by = shift * known.len() / (SHIFTS + 1);
+        let mut shifted = log.clone();
+        for (i, &k) in known.iter().enumerate() {
+            shifted.guidance_torque_nm[k] = log.guidance_torque_nm[known[(i + by) % known.len()]];
+        }
+        let found = identify_with_noise_model(&shifted, options)
+            .parameters
+            .k_hg
+            .optimum;
+        found.is_some_and(|found| found >= k_hg)
+    });
+    Some((1 + at_least.count()) as f64 / (1 + SHIFTS) as f64)
+}

@@ -1,0 +1,207 @@
+//! Recordings of real people: what was read and refused, and who predicts the driver's torque best.
+
+use crate::document::{Block, Cell, Report, Section, Table};
+use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives};
+
+/// Parameters that a torque record can carry.
+const PARAMETERS: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
+
+/// The document of recordings.
+pub fn report(found: &RealDrives) -> Report {
+    let sections = [
+        ("Summary", summary(found)),
+        (
+            "Drives",
+            vec![Block::Table(drives(found)), Block::Table(refused(found))],
+        ),
+        ("Sources", vec![Block::Table(sources(found))]),
+    ];
+    Report {
+        title: format!("{} recordings of real people", files(found, |_| true)),
+        summary: "A driver is fitted to one half of each drive and judged on the other. VAF is the variance accounted for: 1 is \
+                  all, 0 is what the mean does."
+            .into(),
+        sections: sections.map(|(heading, blocks)| Section::new(heading, blocks)).into(),
+        ..Report::default()
+    }
+}
+
+fn judged(found: &RealDrives) -> impl Iterator<Item = (&RealDrive, &Found)> {
+    found.drives.iter().filter_map(|d| Some((d, d.found.as_ref()?)))
+}
+
+/// How many files have a part of this kind.
+fn files(found: &RealDrives, of: impl Fn(&RealDrive) -> bool) -> usize {
+    let mut names: Vec<&str> = found
+        .drives
+        .iter()
+        .filter(|d| of(d))
+        .map(|d| d.file.as_str())
+        .collect();
+    names.dedup();
+    names.len()
+}
+
+fn part(drive: &RealDrive) -> &'static str {
+    if drive.by_hand { "by hand" } else { "shared" }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.retain(|v| v.is_finite());
+    values.sort_by(f64::total_cmp);
+    let middle = |k: usize| values.get(k).copied().unwrap_or(f64::NAN);
+    let n = values.len();
+    0.5 * (middle(n / 2) + middle(n.saturating_sub(1) / 2))
+}
+
+fn summary(found: &RealDrives) -> Vec<Block> {
+    let half = |by_hand: Option<bool>, accepted: bool| -> Vec<Half> {
+        judged(found)
+            .filter(|(d, _)| by_hand.is_none_or(|b| b == d.by_hand))
+            .flat_map(|(_, f)| f.halves.iter().copied())
+            .filter(|h| h.accepted || !accepted)
+            .collect()
+    };
+    let row = |(name, by_hand, accepted)| {
+        let halves = half(by_hand, accepted);
+        let of = |value: fn(&Half) -> f64| Cell::number(median(halves.iter().map(value).collect()), 2);
+        let wins = halves.iter().filter(|h| h.ours > h.linear).count();
+        vec![
+            Cell::text(name),
+            Cell::number(halves.len() as f64, 0),
+            of(|h| h.own),
+            of(|h| h.ours),
+            of(|h| h.linear),
+            Cell::number(wins as f64, 0),
+        ]
+    };
+    let models = Table::new(
+        "Medians of the variance accounted for. Accepted: nothing is refuted on the half that was fitted. The linear regression is \
+         that of T_d on wheel angle, its rate and acceleration, e_y, its rate and T_h.",
+        [
+            "Halves",
+            "Number",
+            "Ours, fitted half",
+            "Ours, other half",
+            "Linear, other half",
+            "Ours is better in",
+        ],
+        [
+            ("by hand", Some(true), false),
+            ("by hand, accepted", Some(true), true),
+            ("shared", Some(false), false),
+            ("shared, accepted", Some(false), true),
+            ("all accepted", None, true),
+        ]
+        .map(row),
+    );
+    let seconds = |of: &dyn Fn(&RealDrive, &Found) -> bool| -> f64 {
+        judged(found)
+            .filter(|(d, f)| of(d, f))
+            .map(|(_, f)| f.used_s)
+            .sum()
+    };
+    let share = |name: &str| {
+        let asked = |d: &RealDrive| name != "k_hg" || !d.by_hand;
+        let identified = seconds(&|d, f| asked(d) && f.identified.contains(&name));
+        let all = seconds(&|d, _| asked(d));
+        vec![
+            Cell::text(name),
+            Cell::number(identified, 0),
+            Cell::number(all, 0),
+            Cell::number(identified / all, 2),
+        ]
+    };
+    let shares = Table::new(
+        "Driving time in which a parameter is identified. K_hg is asked of shared driving.",
+        ["Parameter", "Identified, s", "Of, s", "Share"],
+        PARAMETERS.map(share),
+    );
+    let chance = judged(found).filter_map(|(_, f)| f.k_hg_p);
+    let (beats, shifts) = chance.fold((0, 0), |(beats, n), p| (beats + usize::from(p <= 0.05), n + 1));
+    let text = format!(
+        "{} of {} recordings have a drive that is fitted; the others are refused, with their causes below. K_hg beats 95 % of the \
+         circular shifts of the guidance torque in {beats} of {shifts} shared drives.",
+        files(found, |d| d.found.is_some()),
+        files(found, |_| true),
+    );
+    vec![Block::Text(text), Block::Table(models), Block::Table(shares)]
+}
+
+fn drives(found: &RealDrives) -> Table {
+    let row = |(drive, f): (&RealDrive, &Found)| {
+        let interval = f.k_hg.as_ref().and_then(|p| p.interval_95);
+        let mut cells = vec![
+            Cell::text(&drive.file),
+            Cell::text(part(drive)),
+            Cell::number(f.used_s, 1),
+        ];
+        for half in [0, 1] {
+            let half = f.halves.get(half);
+            cells.extend(
+                [half.map(|h| h.own), half.map(|h| h.ours), half.map(|h| h.linear)]
+                    .map(|v| Cell::number(v, 2)),
+            );
+        }
+        cells.push(Cell::number(f.residual_nm, 3));
+        cells.push(Cell::number(f.k_hg.as_ref().and_then(|p| p.estimate), 2));
+        cells.extend([0, 1].map(|end| Cell::number(interval.map(|i| i[end]), 2)));
+        cells.push(Cell::number(f.k_hg_p, 2));
+        cells.push(Cell::text(f.identified.join(" ")));
+        cells.push(Cell::text(f.refuted.join("; ")));
+        cells
+    };
+    Table::new(
+        "VAF of our driver on the half that was fitted and on the other, and of the linear regression on the other: fitted to the \
+         first half, then to the second. A K_hg is shown where it is identified; p is the share of circular shifts with as large a K_hg.",
+        [
+            "Recording",
+            "Driving",
+            "Used, s",
+            "1: own",
+            "other",
+            "linear",
+            "2: own",
+            "other",
+            "linear",
+            "Residual, N.m",
+            "K_hg",
+            "95 % from",
+            "to",
+            "p",
+            "Identified",
+            "Refuted",
+        ],
+        judged(found).map(row),
+    )
+}
+
+fn refused(found: &RealDrives) -> Table {
+    let row = |drive: &RealDrive| {
+        let why = drive.refused.as_ref()?;
+        Some(vec![
+            Cell::text(&drive.file),
+            Cell::text(part(drive)),
+            Cell::text(why),
+        ])
+    };
+    Table::new(
+        "Refused.",
+        ["Recording", "Driving", "Cause"],
+        found.drives.iter().filter_map(row),
+    )
+}
+
+fn sources(found: &RealDrives) -> Table {
+    let row = |s: &haptic_batch::real_drives::Source| {
+        let commit = s.commit.as_deref().unwrap_or("none: untested");
+        [s.layout.as_str(), &s.source, commit, &s.licence]
+            .map(Cell::text)
+            .to_vec()
+    };
+    Table::new(
+        "",
+        ["Layout", "Source", "Tried on commit", "Licence"],
+        found.sources.iter().map(row),
+    )
+}
