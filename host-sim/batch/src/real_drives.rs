@@ -206,7 +206,7 @@ fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, String> {
         identified: identified.collect(),
         white: fit.whiteness.white,
         residual_nm: fit.remnant.as_ref().map_or(f64::NAN, |r| r.innovation_sd_nm),
-        k_hg: (!by_hand).then(|| fit.parameters.k_hg.clone()),
+        k_hg: (!by_hand).then_some(fit.parameters.k_hg),
         k_hg_p: (!by_hand).then(|| by_chance(log, &options, &fit)).flatten(),
         halves,
     })
