@@ -168,7 +168,7 @@ impl PlausibilityState {
     }
 
     /// Takes two speeds that come so long after the last. Whether they agree, and whether they did within
-    /// [`SPEEDS_PATIENCE`].
+    /// `SPEEDS_PATIENCE`.
     #[must_use]
     pub fn speeds_agree(&mut self, [a, b]: [Speed; 2], elapsed: Micros) -> (bool, bool) {
         let agree = speeds_agree(a, b);
@@ -182,7 +182,7 @@ impl PlausibilityState {
     }
 
     /// The yaw rate to use of one that comes so long after the last: in the place of one that no vehicle has the last one, for
-    /// [`YAW_RATE_PATIENCE`].
+    /// `YAW_RATE_PATIENCE`.
     #[must_use]
     pub fn possible_yaw_rate(&mut self, new: TurningRate, passed: Micros) -> TurningRate {
         let m = &mut self.motion;
