@@ -37,20 +37,26 @@ fn the_vehicle_is_judged_against_its_twin() {
 }
 
 /// In a real world every rule of every cycle holds as well, and no handover is worse than a drop; also while the vehicle brakes or
-/// speeds up, and behind a late camera. With the paper's drivers, who wander there, the rules hold.
+/// speeds up, and behind a late camera. With the paper's drivers, who wander there, the rules hold. (`cargo xtask ci --full` runs
+/// 500 seeds of each.)
 #[test]
 fn no_rule_breaks_where_roads_and_cars_are_real_and_no_handover_is_worse_than_a_drop() {
     let here: Vec<&'static FaultCase> = rows().filter(|row| row.place != Place::Target).collect();
-    for name in ["everything", "braking", "camera"] {
+    let failures = |name: &str, drivers: Drivers| {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
-        let campaign = campaign::run(&World::real(world), &here, 1..3, || ());
-        let failed: Vec<_> = campaign.failures().collect();
-        assert!(failed.is_empty(), "{name}: {failed:#?}");
-        let wander = World::real(world).driven_by(Drivers::Paper);
-        let campaign = campaign::run(&wander, &here, 1..2, || ());
-        let failed: Vec<_> = campaign.failures().filter(|f| f.by == FailedBy::Ecu).collect();
+        let world = World::real(world).driven_by(drivers);
+        campaign::run(&world, &here, 1..2, || ())
+            .failures()
+            .cloned()
+            .collect::<Vec<_>>()
+    };
+    for name in ["everything", "braking", "camera"] {
+        let failed = failures(name, Drivers::Population);
         assert!(failed.is_empty(), "{name}: {failed:#?}");
     }
+    let mut failed = failures("everything", Drivers::Paper);
+    failed.retain(|failed| failed.by == FailedBy::Ecu);
+    assert!(failed.is_empty(), "{failed:#?}");
 }
 
 /// Braking and speeding up are no fault: with nothing else wrong the ECU stays, and what is lost is noticed as soon.

@@ -256,9 +256,8 @@ fn braking_in_a_real_world_is_no_fault() {
 fn legs_are_the_same_side_by_side() {
     for name in ["calibrated", "everything", "camera", "slippery"] {
         let world = WORLDS.iter().find(|world| world.name == name).unwrap();
-        let roads = [0, 1, 0].map(|road| &ROADS[road]);
-        let legs: Vec<LegNumber> = (7..10)
-            .zip(roads)
+        let legs: Vec<LegNumber> = (7..9)
+            .zip(&ROADS)
             .map(|(number, road)| LegNumber { world, road, number })
             .collect();
         let mut found = vec![None; legs.len()];
