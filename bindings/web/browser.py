@@ -17,7 +17,7 @@ class Browser:
     """One page of one Chromium."""
 
     def __init__(self, width=1280, height=800):
-        self.profile = tempfile.TemporaryDirectory()
+        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         to_read, to = os.pipe()
         of, to_write = os.pipe()
 

@@ -36,6 +36,8 @@ async function story() {
   check("opens in a bend", now_s > 66 && bend.s[Math.round(200 * now_s)] > 1080, `at ${now_s} s; ${said()}`);
   same("step 1", [["now", record(0.3, "mid")]]);
   await visit("guidance");
+  await slide("c-t_p", 0.2);
+  check("a later driver", said().includes("acts 0.20 s late"), said());
   await slide("c-t_p", 0.5);
   same("step 2", [["alone", record(0.5, "manual")], ["guided", record(0.5, "mid")]], record(0.5, "mid").peak_lateral_error_m);
   await visit("reliance");
@@ -85,7 +87,9 @@ async function compare() {
   const { a, b } = page.results(), by = (b.metrics.peak_lateral_error_m - a.metrics.peak_lateral_error_m).toFixed(3);
   const marks = document.querySelectorAll(".plot").length;
   check("two drives", said().includes(by) && [...document.querySelectorAll(".plot")].every(plot => plot.querySelector(".mark.failure")), `${said()} ${marks} plots with the failure marked`);
-  const link = location.hash, before = said();
+  const link = location.hash, before = said(), told = [];
+  for (const kind of ["link", "svg", "png", "csv", "toml"]) { await page.share(kind); told.push($("shared").textContent); }
+  check("taken along", told[0].includes("link") && told[4].includes("to the bit"), told.join(" | "));
   await visit("loop");
   location.hash = link;
   await settled("compare");

@@ -58,7 +58,7 @@ class Chart {
     }
     for (const x of xs.all) {
       root.append(svg("line", { x1: X(x), x2: X(x), y1: height - bottom, y2: height - bottom + 4, class: "zero" }));
-      root.append(svg("text", { x: X(x), y: height - bottom + 15, class: "tick mid" }, x.toFixed(xs.digits)));
+      root.append(svg("text", { x: X(x), y: height - bottom + 15, class: X(x) > width - 20 ? "tick end" : "tick mid" }, x.toFixed(xs.digits)));
     }
     root.append(svg("text", { x: width - right, y: height - 3, class: "tick end" }, given.xName ?? t("axis_time")));
     const inside = (x, y = 0) => [Math.min(width - right, Math.max(left, X(x))), Math.min(height - bottom, Math.max(top, y))];

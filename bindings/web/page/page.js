@@ -95,7 +95,7 @@ function drawCharts() {
       for (const mark of found.marks) if (!marks.some(other => other.name === mark.name && Math.abs(other.x - mark.x) < 0.1)) marks.push(mark);
       spans.push(...found.spans);
     }
-    charts[i].chart.set({ ...panel, x, lines, marks, spans, bands: panel.lines.map(bandOf).filter(Boolean) });
+    charts[i].chart.set({ ...panel, x: panel.x ?? x, lines, marks, spans, bands: panel.lines.map(bandOf).filter(Boolean) });
   });
 }
 
@@ -217,7 +217,7 @@ function range() {
   const paper = Object.values(view.drives).every(settings => isPaper(settings)) && S.step !== "drive";
   [clock.from, clock.to] = paper && !view.whole ? STORY_S : paper ? [60, Math.max(61, end)] : [0, Math.max(10, end)];
   const key = `${S.step} ${clock.from}`;
-  if (clock.key !== key) { clock.key = key; clock.at = paper ? 67 : clock.from; }
+  if (clock.key !== key) { clock.key = key; clock.at = view.starts ?? (paper && !view.whole ? 67 : clock.from); }
   $("time").min = clock.from;
   $("time").max = clock.to;
 }

@@ -77,7 +77,7 @@ class Scene {
 
   // The lane from above: how far the car is from its middle, and how much room is left.
   #lane({ lateral_error_m }, w) {
-    const pen = this.#pen, width = Math.min(220, 0.5 * w), scale = width / 3.6, x = w / 2, top = 8;
+    const pen = this.#pen, width = Math.min(w > 1000 ? 280 : 220, 0.5 * w), scale = width / 3.6, x = w / 2, top = 8, size = w > 1000 ? 15 : 12;
     pen.fillStyle = "rgba(20,28,38,.82)"; pen.fillRect(x - width / 2 - 8, top, width + 16, 40);
     pen.fillStyle = "#fff"; pen.fillRect(x - width / 2 - 2, top + 20, 3, 17); pen.fillRect(x + width / 2 - 1, top + 20, 3, 17);
     pen.fillStyle = "rgba(255,255,255,.45)"; pen.fillRect(x - 0.5, top + 20, 1, 17);
@@ -85,7 +85,7 @@ class Scene {
     pen.fillStyle = Math.abs(lateral_error_m) > 0.95 ? "#ff7b6e" : "#e8edf2";
     pen.fillRect(car - 0.85 * scale, top + 22, 1.7 * scale, 13);
     const far = Math.abs(lateral_error_m);
-    this.#text(far < 0.005 ? t("lane_middle") : t(lateral_error_m > 0 ? "lane_left" : "lane_right", { far: far.toFixed(2) }), x, top + 15, { align: "center", size: 12 });
+    this.#text(far < 0.005 ? t("lane_middle") : t(lateral_error_m > 0 ? "lane_left" : "lane_right", { far: far.toFixed(2) }), x, top + 16, { align: "center", size });
   }
 
   #wheel(instant, w, h) {
@@ -102,7 +102,7 @@ class Scene {
     this.#arrow(x, y, radius + 12, instant.driver_torque_nm, HANDS.driver);
     this.#arrow(x, y, radius + 25, instant.guidance_torque_nm, HANDS.guidance);
     const side = nm => Math.abs(nm) < 0.005 ? "" : t(nm > 0 ? "to_left" : "to_right");
-    const small = w < 560, size = small ? 12 : 14, foot = h - (small ? 34 : 40);
+    const small = w < 560, size = small ? 12 : w > 1000 ? 19 : 14, foot = h - 2 * size - 12;
     const label = (name, symbol, nm, at, align, color) => {
       this.#text(small ? name : `${name} ${symbol}`, at, foot, { align, color, size, bold: true });
       this.#text(`${Math.abs(nm).toFixed(2)} N.m ${side(nm)}`, at, foot + size + 5, { align, size });

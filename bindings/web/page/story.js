@@ -88,9 +88,9 @@ const STEPS = {
     };
   },
   probe: s => ({
-    drives: { now: { t_p: 0.3, ...onLine(s.k_hg), probe: true, remnant: 0.1, course: "bends" } }, plays: "now", whole: true, rate: 3, needle: s.k_hg,
-    panels: [panel("c_k_hg", "1", [{ truth: s.k_hg, name: t("truth"), kind: "manual" }, { drive: "now", channel: "k_hg", name: t("told"), kind: "now", band: "deviation" }], { y: [-0.1, 1.3] }),
-      panel("c_torque", "N.m", [{ drive: "now", channel: "guidance", name: t("guidance_torque"), kind: "guidance" }, { drive: "now", channel: "driver", name: t("driver_torque"), kind: "driver" }])],
+    drives: { now: { t_p: 0.3, ...onLine(s.k_hg), probe: true, remnant: 0.1, course: "bends" } }, plays: "now", whole: true, starts: 8, rate: 3, needle: s.k_hg,
+    panels: [panel("c_k_hg", "0 to 1", [{ truth: s.k_hg, name: t("truth"), kind: "manual" }, { drive: "now", channel: "k_hg", name: t("told"), kind: "now", band: "deviation" }], { y: [-0.1, 1.3] }),
+      panel("c_tremble", "N.m", [{ drive: "now", channel: "guidance", name: t("guidance_torque"), kind: "guidance" }, { drive: "now", channel: "driver", name: t("driver_torque"), kind: "driver" }], { x: [14, 18] })],
     controls: [{ ...RESISTS, label: "k_hg_true" }],
     says: ({ now }) => Number.isFinite(now.now.k_hg) ? t("said_probe", { told: f2(now.now.k_hg), deviation: f2(now.now.deviation), truth: f2(s.k_hg) }) : t("said_probe_none"),
   }),
@@ -99,9 +99,9 @@ const STEPS = {
     const of = drive => COMPARED.map(control => ({ ...control, of: drive }));
     const probed = ["a", "b"].find(drive => s[drive].probe && s[drive].guided);
     return {
-      drives: { a: s.a, b: s.b }, plays: s.shown, whole: true, needle: probed ? s[probed].k_hg : undefined,
+      drives: { a: s.a, b: s.b }, plays: s.shown, whole: true, starts: s.a.course === "paper-course" ? 66 : 20, needle: probed ? s[probed].k_hg : undefined,
       panels: [panel("c_error", "m", both("error")), panel("c_driver", "N.m", both("driver")), panel("c_guidance", "N.m", both("guidance")), panel("c_wheel", "deg", both("wheel", 180 / Math.PI)),
-        ...(probed ? [panel("c_k_hg", "1", [{ truth: s[probed].k_hg, name: t("truth"), kind: "manual" }, { drive: probed, channel: "k_hg", name: `${probed.toUpperCase()}, ${t("told")}`, kind: probed, band: "deviation" }], { y: [-0.1, 1.3] })] : [])],
+        ...(probed ? [panel("c_k_hg", "0 to 1", [{ truth: s[probed].k_hg, name: t("truth"), kind: "manual" }, { drive: probed, channel: "k_hg", name: `${probed.toUpperCase()}, ${t("told")}`, kind: probed, band: "deviation" }], { y: [-0.1, 1.3] })] : [])],
       controls: [choice("shown", [["a", "A"], ["b", "B"]]), ...of("a"), ...of("b")], numbers: true,
       says: ({ a, b }) => {
         const by = peak(b) - peak(a), effort_by = effort(b) - effort(a), word = x => t(x > 0 ? "more_word" : "less_word");
