@@ -87,6 +87,13 @@ async function compare() {
   const { a, b } = page.results(), by = (b.metrics.peak_lateral_error_m - a.metrics.peak_lateral_error_m).toFixed(3);
   const marks = document.querySelectorAll(".plot").length;
   check("two drives", said().includes(by) && [...document.querySelectorAll(".plot")].every(plot => plot.querySelector(".mark.failure")), `${said()} ${marks} plots with the failure marked`);
+  const driver = $("c-adriver");
+  driver.value = "8";
+  driver.dispatchEvent(new Event("change"));
+  await settled("compare");
+  // Table 6, participant 5.
+  const { a_1, a_3, t_p, k_d, k_hg } = page.state().a;
+  check("a participant", JSON.stringify([a_1, a_3, t_p, k_d, k_hg]) === "[0.06,3.637,0.229,4.056,0.926]" && page.results().a !== a, said());
   const link = location.hash, before = said(), told = [];
   for (const kind of ["link", "svg", "png", "csv", "toml"]) { await page.share(kind); told.push($("shared").textContent); }
   check("taken along", told[0].includes("link") && told[4].includes("to the bit"), told.join(" | "));
@@ -97,6 +104,9 @@ async function compare() {
   location.hash = "#step=compare&a.k_hg=7&b.at=soon&c.x=1&a.fail=fire";
   await pause(100);
   check("a broken link", ["a.k_hg", "b.at", "c.x", "a.fail"].every(name => $("wrong").textContent.includes(name)), $("wrong").textContent);
+  location.hash = "#step=compare&a.law=magic&b.course=nowhere.xodr";
+  await until("a refusal", () => $("wrong").textContent.includes("nowhere.xodr"));
+  check("a link to what is not here", true, $("wrong").textContent);
   location.hash = link;
   await settled("compare");
   const drawn = page.picture(page.charts().map(({ host }) => host), "A and B");
@@ -201,9 +211,12 @@ async function law() {
     ["loops for ever", "function law(see) {\n  while (true);\n}", ["loop for ever"]],
     ["asks for too much", "function law(see) {\n  return see.time > 66 ? 1e9 : 0;\n}", ["driven"]],
   ];
+  let good = page.results().own;
   for (const [name, text, words] of wrong) {
     const answer = await write(text), limited = Math.max(...page.results().own.channels.guidance);
     check(`a law that ${name}`, words.every(word => answer.includes(word)) && page.results().own.channels.time.length > 0 && limited <= 5, answer);
+    if (answer.includes("last good")) check(`after a law that ${name}`, page.results().own === good, "the last good drive is there");
+    else good = page.results().own;
   }
   $("lawreset").click();
   await pause(100);

@@ -108,5 +108,6 @@ fn browser(script: &str) -> Result<std::process::Command> {
 /// What the ECU in WebAssembly sends on a bus.
 pub(crate) fn replayed(bus: &Path, built: Built) -> Result<String> {
     pack(built)?;
-    output(browser("bindings/web/agree.js")?.arg(bus))
+    let sent = output(browser("bindings/web/agree.js")?.arg(bus))?;
+    Ok(sent.trim_end().to_owned())
 }

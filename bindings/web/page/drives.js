@@ -1,6 +1,7 @@
 // A drive's settings, as a scenario for the loop and the command line; and the drives that were made of them, in workers.
 
-const PLAIN = { t_p: 0.3, k_hg: 0.5, k_d: 3, speed: 60, guided: true, k_1: 0.25, law: "shipping", fail: "none", at: 70, probe: false,
+const EYES = { a_1: 0.1, a_2: 0.05, a_3: 3.7 };
+const PLAIN = { driver: "own", ...EYES, t_p: 0.3, k_hg: 0.5, k_d: 3, speed: 60, guided: true, k_1: 0.25, law: "shipping", fail: "none", at: 70, probe: false,
   remnant: 0, course: "paper-course" };
 // Roads of the page's own: the first bend within 8 s at 60 km/h.
 const ramp = (length, from, to) => `{length = ${length}, curvature_start = ${from}, curvature_end = ${to}}`;
@@ -24,6 +25,7 @@ function scenario(given, { person = false } = {}) {
   let text = `course = ${course}\nspeed = ${s.speed}\ncondition = "${s.guided ? "mid" : "manual"}"\n`;
   if (!person) {
     text += `[driver]\nt_p = ${s.t_p}\nremnant_sd = ${s.remnant}\n`;
+    for (const [gain, plain] of Object.entries(EYES)) if (s[gain] !== plain) text += `${gain} = ${s[gain]}\n`;
     text += s.guided ? `K_d = ${s.k_d}\nK_hg = ${s.k_hg}\n` : `K_d = 4\n`;
   }
   if (s.guided) {
@@ -100,7 +102,7 @@ class Drives {
 
   job(settings, { law = "", steps = 107000, csv = false } = {}) {
     const toml = scenario(settings), text = settings.law === "own" ? law : "";
-    return { key: JSON.stringify([toml, settings.law ?? "shipping", text, steps, csv]), toml, law: settings.law, text, steps, csv, window: windowOf(settings) };
+    return { key: JSON.stringify([toml, settings.law ?? "shipping", text, steps, csv]), toml, law: settings.law ?? "shipping", text, steps, csv, window: windowOf(settings) };
   }
 
   // These drives are wanted, in this order, and no others any more; those that are there.

@@ -32,6 +32,7 @@ async function engine(bytes, law = () => 0) {
     channel: name => numbers(wasm.channel(CHANNEL[name])),
     metrics: (from_m, to_m) => JSON.parse(ask(wasm.metrics(from_m, to_m))),
     csv: () => ask(wasm.csv()),
+    fourteen: () => JSON.parse(ask(wasm.fourteen())),
     laws: () => JSON.parse(ask(wasm.laws())),
     course(name, text) { give(`${name}\n${text}`); return Number(ask(wasm.keep_course())); },
     identify(csv, manual) { give(csv); return JSON.parse(ask(wasm.identify(+manual))); },

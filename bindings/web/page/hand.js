@@ -108,10 +108,11 @@ class LiveDrive {
 // What an identification found, for whoever drove.
 function foundList(found, guided) {
   const names = { t_p: "found_delay", gain_1: "found_1", gain_2: "found_2", gain_3: "found_3", k_hg: "found_k_hg" };
-  const rows = found.parameters.filter(({ name }) => names[name] && (guided || name !== "k_hg")).map(({ name, unit, found: p, fourteen }) => {
+  const order = Object.keys(names), place = ({ name }) => order.indexOf(name);
+  const rows = [...found.parameters].sort((a, b) => place(a) - place(b)).filter(({ name }) => names[name] && (guided || name !== "k_hg")).map(({ name, unit, found: p, fourteen }) => {
     const digits = name === "gain_3" ? 1 : 2, text = value => value.toFixed(digits);
     const said = p.identified && p.interval_95
-      ? t("found_interval", { value: text(p.estimate), unit: unit === "1" ? "" : unit, low: text(p.interval_95[0]), high: text(p.interval_95[1]) }).replace(" ;", ";")
+      ? t("found_interval", { value: text(p.estimate), unit: unit === "-" ? "" : unit, low: text(p.interval_95[0]), high: text(p.interval_95[1]) }).replace(" ;", ";")
       : t("found_not");
     const beside = t("found_fourteen", { low: text(fourteen[0]), high: text(fourteen.at(-1)), median: text((fourteen[6] + fourteen[7]) / 2) });
     return el("div", {}, el("dt", {}, t(names[name])), el("dd", {}, said, " ", el("small", {}, beside)));

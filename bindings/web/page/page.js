@@ -105,13 +105,17 @@ function chosen(control, value) {
   if (!control.of) { say({ [control.key]: value }); return; }
   const s = S[control.of];
   s[control.key] = value;
-  if (control.key === "driver" && value !== "own") Object.assign(s, { t_p: DELAYS[value - 1] });
+  if (control.key === "driver" && value !== "own") {
+    const { t_p, k_hg, k_d, a_1, a_2, a_3 } = value > 3 ? lab.fourteen()[value - 4] : { ...EYES, ...onLine(s.k_hg), t_p: DELAYS[value - 1] };
+    Object.assign(s, { t_p, k_hg, k_d, a_1, a_2, a_3 });
+  } else if (["t_p", "k_hg", "k_d"].includes(control.key)) s.driver = "own";
   if (control.key === "k_hg") Object.assign(s, onLine(value));
   soon();
 }
 function options(control) {
   if (control.options === "laws") return [["shipping", t("shipping")], ...drives.names.map(name => [name, name]), ["own", t("own")]];
   if (control.options === "courses") return [...Object.keys(COURSES).map(name => [name, t(name.replace("-", "_"))]), ...[...dropped.keys()].map(name => [name, name])];
+  if (control.key === "driver") return [["own", t("driver_own")], ...DELAYS.map((_, i) => [String(i + 1), t(`driver_${i + 1}`)]), ...lab.fourteen().map((_, i) => [String(i + 4), t("driver_of", { number: i + 1 })])];
   return control.options.map(([value, name]) => [value, /^[AB]$/.test(name) ? name : t(name)]);
 }
 function made(control) {
@@ -180,7 +184,7 @@ function render() {
   keys.forEach((key, i) => {
     if (!found[i] && !isLive) missing++;
     if (found[i]?.wrong) wrong(t("wrong_drive", { what: found[i].wrong }));
-    results[key] = found[i]?.channels ? found[i] : before[key];
+    results[key] = found[i]?.channels && !found[i].fault ? found[i] : before[key];
   });
   if (isLive && live.settings) results.now = live.result();
   if (!missing) last[S.step] = { ...results };
@@ -205,8 +209,8 @@ function render() {
   if (isLive) drawLive();
   const all = keys.every(key => results[key]?.metrics), left = keys.filter(key => results[key]?.now?.diverged);
   if (all && !missing && !isLive) $("said").textContent = [view.says(results), ...left.map(name => t("not_finished", { name, time: results[name].now.time_s.toFixed(1) }))].join(" ");
-  else if (isLive) $("said").textContent = "";
-  if (isLive || (all && !missing)) document.body.dataset.done = S.step;
+  else if (isLive || !missing) $("said").textContent = "";
+  if (!missing) document.body.dataset.done = S.step;
   else delete document.body.dataset.done;
 }
 

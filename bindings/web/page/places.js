@@ -85,8 +85,6 @@ function drawLaw(result) {
   $("lawsaid").className = fault || odd ? "bad" : "";
   const numbers = $("lawlines");
   numbers.replaceChildren(...Array.from({ length: lines }, (_, i) => el("span", { class: i + 1 === line ? "wrong" : "" }, `${i + 1}\n`)));
-  // Half a drive is not compared: the last whole one stays.
-  if (fault) results.own = last.law?.own ?? results.own;
 }
 
 async function share(kind) {

@@ -1,7 +1,7 @@
 // What a reader takes along: the state in the address, pictures, series, a scenario file.
 
 const OWN_STATE = { step: "loop", t_p: 0.5, k_hg: 0.5, at: 70, who: 0.5, part: "", shown: "a", course: "bends", guided: "on", speed: 60, law: LAW };
-const LEAST = { t_p: [0.05, 0.8], k_hg: [0, 1], at: [2, 150], who: [0.1, 0.5], k_d: [1, 6], k_1: [0.05, 0.5], speed: [30, 110], remnant: [0, 0.3] };
+const LEAST = { a_1: [0, 0.5], a_2: [0, 0.1], a_3: [0, 8], t_p: [0.05, 0.8], k_hg: [0, 1], at: [2, 150], who: [0.1, 0.5], k_d: [1, 6], k_1: [0.05, 0.5], speed: [30, 110], remnant: [0, 0.3] };
 
 function toAddress(state) {
   const said = new URLSearchParams();

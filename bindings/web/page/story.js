@@ -122,7 +122,7 @@ const STEPS = {
 // A mode that allows less than the law asks for is what was wanted.
 const NO_LIMIT = 6;
 const COMPARED = [
-  { key: "driver", kind: "select", options: [["own", "driver_own"], ["1", "driver_1"], ["2", "driver_2"], ["3", "driver_3"]] },
+  { key: "driver", kind: "select", options: "drivers" },
   slider("t_p", 0.05, 0.8, 0.01, "s"), RESISTS, slider("k_d", 1, 6, 0.1, "N.m/rad"),
   choice("guided", [[true, "on"], [false, "off"]]), slider("k_1", 0.05, 0.5, 0.01, "N.m"),
   { key: "law", kind: "select", options: "laws" },

@@ -25,6 +25,7 @@ function guarded(law) {
 async function run(job) {
   odd = fault = null;
   const names = lab.laws();
+  if (!["shipping", "own", ...names].includes(job.law)) throw new Error(`no law is called ${job.law}`);
   lab.begin(job.toml, { law: job.law === "own" ? names.length : names.indexOf(job.law) });
   for (let made = 0; made < job.steps && !fault;) {
     const wanted = Math.min(CHUNK, job.steps - made), did = lab.play(wanted);

@@ -12,6 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use haptic_sim::Action;
 use haptic_sim::action::WorldFaults;
 use haptic_sim::models::road::{Course, LaneChoice};
+use haptic_sim::participants::participants;
 use run::{NOW, Run};
 
 #[derive(Default)]
@@ -101,6 +102,15 @@ pub extern "C" fn laws() -> u32 {
     answer(|_, _| {
         let names: Vec<&str> = haptic_sim::laws::LAWS.iter().map(|law| law.name).collect();
         serde_json::to_string(&names).map_err(|e| e.to_string())
+    })
+}
+
+/// The paper's fourteen participants under guidance, as JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn fourteen() -> u32 {
+    answer(|_, _| {
+        let guided: Vec<_> = participants().into_iter().map(|one| one.guided).collect();
+        serde_json::to_string(&guided).map_err(|e| e.to_string())
     })
 }
 
