@@ -32,10 +32,10 @@ class Chart {
     const small = width < 420, [x_0, x_1] = given.x;
     const names = given.lines.filter(line => line.name);
     // The legend, in as many rows as it takes.
-    const rows = [[]];
+    const rows = [[]], letter = innerWidth >= 1700 ? 7.8 : 6.6;
     let used = 0;
     for (const line of names) {
-      const needs = 30 + 6.6 * line.name.length;
+      const needs = 30 + letter * line.name.length;
       if (used + needs > width - 20 && used) { rows.push([]); used = 0; }
       rows.at(-1).push({ line, at: used });
       used += needs;
@@ -91,7 +91,7 @@ class Chart {
   // Instants, named in a row above them as far as there is room; the words of the picture name them all.
   #marks(root, marks, X, top, foot, width) {
     const row = svg("text", { x: 6, y: top - 6, class: "note" }), { x_0, x_1 } = this.#place;
-    let free = (width - 12) / 5.9;
+    let free = (width - 12) / (innerWidth >= 1700 ? 7.4 : 6);
     for (const { x, name, kind } of [...marks].sort((a, b) => a.x - b.x)) {
       if (x < x_0 || x > x_1) continue;
       root.append(svg("line", { x1: X(x), x2: X(x), y1: top - 3, y2: foot, class: `mark ${kind}` }));

@@ -267,6 +267,6 @@ function paint(now, road, settings) {
   if (view.needle !== undefined) needle.set(now.of("k_hg"), now.of("deviation"), view.needle);
   if (document.activeElement !== $("time")) $("time").value = clock.at;
   $("time").setAttribute("aria-valuetext", `${now.time_s.toFixed(1)} s`);
-  $("at").textContent = `${now.time_s.toFixed(1)} s${(view.rate ?? 1) === 1 ? "" : `, ${view.rate}${t("rate")}`}`;
+  $("at").textContent = `${now.time_s.toFixed(1)} s${(view.rate ?? 1) === 1 ? "" : ` (${view.rate}${t("rate")})`}`;
   $("play").textContent = t(clock.playing ? "pause" : "play");
 }
