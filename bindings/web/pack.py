@@ -1,7 +1,4 @@
-"""Puts page, script, chart and WebAssembly into one file: pack.py WASM OUT [TEST_SCRIPT EXPECTED_CSV]
-
-With a test script the page runs it when it is ready, and has the CSV file to compare with.
-"""
+"""Puts the page's parts and the WebAssembly into one file: pack.py WASM OUT"""
 
 import base64
 import gzip
@@ -11,7 +8,12 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-CHART = HERE / "../../host-sim/report/assets/uplot"
+# In order: each uses what stands before it.
+SCRIPTS = ["strings", "engine", "chart", "drives", "scene", "loop", "story", "hand", "share", "page", "places"]
+
+
+def part(name):
+    return (HERE / "page" / name).read_text()
 
 
 def names(signal):
@@ -20,23 +22,20 @@ def names(signal):
     return dict((number, name) for number, name in re.findall(r'(\d+) "([^"]*)"', line.group(1)))
 
 
-def main(wasm, out, test=None, expected=None):
+def main(wasm, out):
     parts = {
-        "/*UPLOT_CSS*/": (CHART / "uPlot.min.css").read_text(),
-        "/*UPLOT_JS*/": (CHART / "uPlot.iife.min.js").read_text(),
+        "/*CHART_CSS*/": part("chart.css"),
+        "/*PAGE_CSS*/": part("page.css"),
         "/*WASM*/": base64.b64encode(gzip.compress(Path(wasm).read_bytes(), 9, mtime=0)).decode(),
         "/*MODES*/": json.dumps(names("Guidance_Mode")),
         "/*LIMITS*/": json.dumps(names("Guidance_Limit")),
-        "/*LAB_JS*/": (HERE / "lab.js").read_text(),
+        "/*WORKER*/": json.dumps(part("engine.js") + part("worker.js")),
+        "/*PAGE_JS*/": "\n".join(part(f"{name}.js") for name in SCRIPTS),
     }
-    page = (HERE / "page.html").read_text()
+    page = part("page.html")
     for mark, text in parts.items():
         assert page.count(mark) == 1, mark
         page = page.replace(mark, text)
-    if test:
-        data = json.dumps(Path(expected).read_text())
-        script = f"const EXPECTED = {data};\n{Path(test).read_text()}"
-        page = page.replace("</body>", f"<pre id=report></pre><script>{script}</script></body>")
     Path(out).write_text(page)
     print(f"{out}: {len(page.encode()) / 1000:.0f} kB")
 

@@ -1,33 +1,43 @@
 //! The lab in the browser: WebAssembly and page in one file, tried in a headless Chromium.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use anyhow::{Context, Result, bail};
 
+use crate::python;
 use crate::tool::{Built, cargo, command, ensure, exists, output, root, run};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 const LARGEST_BYTES: u64 = 1_000_000;
+const PAGE: &str = "target/dist/haptic-lab.html";
 /// What the page's test drives too.
-const SCENARIO: &str = "speed = 60\ncondition = \"mid\"\n[driver]\nt_p = 0.3\n";
-/// Milliseconds of the page's own clock: the machine's speed does not matter.
-const BUDGET_MS: u32 = 60_000;
+const SCENARIO: &str = "bindings/web/probe.toml";
+/// It carries axe-core, which finds what keeps people out of a page; its own dependencies drive browsers.
+const AXE: [&str; 2] = ["--no-deps", "axe-playwright-python==0.1.8"];
 
 /// Builds `target/dist/haptic-lab.html`, and tries it.
 pub(crate) fn check(built: Built) -> Result<()> {
+    let bytes = pack(built)?;
+    if built == Built::ToShip && bytes > LARGEST_BYTES {
+        bail!("the page has {bytes} bytes, more than {LARGEST_BYTES}");
+    }
+    try_it(built)
+}
+
+/// The page in one file; its size.
+fn pack(built: Built) -> Result<u64> {
     let wasm = build(built)?;
-    let page = root().join("target/dist/haptic-lab.html");
+    let page = root().join(PAGE);
     std::fs::create_dir_all(root().join("target/dist"))?;
     run(command("python3")
         .arg("bindings/web/pack.py")
         .arg(&wasm)
-        .arg(&page))?;
+        .arg(&page)
+        .stdout(Stdio::null()))?;
     let bytes = std::fs::metadata(&page)?.len();
-    if built == Built::ToShip && bytes > LARGEST_BYTES {
-        bail!("the page has {bytes} bytes, more than {LARGEST_BYTES}");
-    }
-    try_it(&wasm, built)
+    println!("{}: {bytes} bytes", page.display());
+    Ok(bytes)
 }
 
 fn build(built: Built) -> Result<PathBuf> {
@@ -52,79 +62,52 @@ fn build(built: Built) -> Result<PathBuf> {
         .join("haptic_web.wasm"))
 }
 
-/// The page with its test in it: what the test writes into the page, and a picture of it.
-fn try_it(wasm: &Path, built: Built) -> Result<()> {
+/// The page under its test, beside the command line; and every step of it before axe-core, with a picture.
+fn try_it(built: Built) -> Result<()> {
     let place = root().join("target/web");
-    std::fs::create_dir_all(&place)?;
-    let scenario = place.join("scenario.toml");
-    std::fs::write(&scenario, SCENARIO)?;
-    run(command(&built.host_sim()?.to_string_lossy())
-        .arg("run")
-        .arg(&scenario)
-        .arg("--out")
-        .arg(place.join("run"))
-        .stdout(Stdio::null()))?;
-    let page = place.join("test.html");
-    let report = report(wasm, &page, "bindings/web/test.js", &place.join("run/run.csv"))?;
+    let host_sim = built.host_sim()?;
+    for (arguments, out) in [
+        (["run", SCENARIO].as_slice(), "run"),
+        (&["evaluate"], "evaluation"),
+    ] {
+        run(command(&host_sim.to_string_lossy())
+            .args(arguments)
+            .arg("--out")
+            .arg(place.join(out))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null()))?;
+    }
+    let python = python::environment_of(&root().join("target/python/page"), &AXE)?;
+    let find = "import axe_playwright_python as a; print(a.__path__[0] + '/axe.min.js')";
+    let axe = output(command(&python.to_string_lossy()).args(["-c", find]))?;
+    let data = ["run/run.csv", "run/results.json", "evaluation/results.json"].map(|file| place.join(file));
+    let report = output(
+        browser("bindings/web/test.js")?
+            .arg(SCENARIO)
+            .args(data)
+            .args(["--axe", axe.trim()])
+            .arg(place.join("pictures")),
+    )?;
     println!("{}", report.trim_end());
-    let picture = place.join("lab.png");
-    run(chromium()?
-        .arg(format!("--screenshot={}", picture.display()))
-        .arg(&page))?;
-    println!("{}", picture.display());
-    if report.contains("FAILED") || report.matches("ok ").count() < 5 {
+    if report.contains("FAILED") || report.matches("ok ").count() < 50 {
         bail!("the page's test did not pass");
     }
     Ok(())
 }
 
-/// A headless Chromium with the page's own clock.
-fn chromium() -> Result<Command> {
+/// A headless Chromium that runs a script in the page and prints what it returns.
+fn browser(script: &str) -> Result<std::process::Command> {
     if !exists("chromium") {
         ensure(&[("chromium", "chromium")])?;
     }
-    let mut chromium = command("chromium");
-    chromium
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--window-size=1200,1500",
-        ])
-        .arg(format!("--virtual-time-budget={BUDGET_MS}"))
-        .stderr(Stdio::null());
-    Ok(chromium)
-}
-
-/// What a script in the page reports; `expected` is a text that it is given.
-fn report(wasm: &Path, page: &Path, script: &str, expected: &Path) -> Result<String> {
-    run(command("python3")
-        .args([
-            Path::new("bindings/web/pack.py"),
-            wasm,
-            page,
-            Path::new(script),
-            expected,
-        ])
-        .stdout(Stdio::null()))?;
-    let dom = output(chromium()?.arg("--dump-dom").arg(page))?;
-    let report = dom
-        .split_once("<pre id=\"report\"")
-        .and_then(|(_, rest)| rest.split_once("</pre>")?.0.split_once('>'));
-    match report.and_then(|(_, report)| report.strip_suffix("end")) {
-        Some(report) => Ok(report.to_owned()),
-        None => bail!("{script} did not come to its end in the page"),
-    }
+    let mut browser = command("python3");
+    browser.args(["bindings/web/browser.py", PAGE, script]);
+    Ok(browser)
 }
 
 /// What the ECU in WebAssembly sends on a bus.
 pub(crate) fn replayed(bus: &Path, built: Built) -> Result<String> {
-    let place = root().join("target/web");
-    std::fs::create_dir_all(&place)?;
-    report(
-        &build(built)?,
-        &place.join("agree.html"),
-        "bindings/web/agree.js",
-        bus,
-    )
+    pack(built)?;
+    let sent = output(browser("bindings/web/agree.js")?.arg(bus))?;
+    Ok(sent.trim_end().to_owned())
 }

@@ -1,41 +1,27 @@
-//! The closed loop for a page: a scenario in, steps under a hand, samples, an identification and a log out.
+//! The closed loop for a page: a scenario in, steps under a hand, samples, metrics, an identification and a log out.
 //!
 //! Plain functions of WebAssembly, without a bundler or generated glue. Text goes through one buffer each way: the page writes
 //! UTF-8 where [`take`] says and reads the answer at [`text`]. There is one run at a time. No model and no maths is here.
 
 mod replay;
+mod run;
 mod words;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use haptic_analysis::identify::{DriveLog, Options, identify_with_noise_model};
-use haptic_core::bus::e2e::ReceiverState;
-use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
-use haptic_log::trace::{CHANNELS, Sample, Trace};
+use haptic_sim::Action;
 use haptic_sim::action::WorldFaults;
-use haptic_sim::input::InputError;
-use haptic_sim::simulation::{Ending, SAMPLE_RATE_HZ};
-use haptic_sim::{Action, Scenario, Simulation};
-use serde_json::{Value, json};
-
-/// Numbers of [`now`], by their places: time, arc length, lateral error, heading error, wheel angle, driver torque, applied
-/// torque, mode, limit, warning, e_y and e_theta at the driver's points, speed, wheel rate, steps, diverged.
-const NOW: usize = 16;
-
-struct Run {
-    scenario: Scenario,
-    simulation: Simulation,
-    /// The actuator's ear: how the page knows mode and limit.
-    receiver: ReceiverState,
-    trace: Trace,
-    now: [f64; NOW],
-}
+use haptic_sim::models::road::{Course, LaneChoice};
+use haptic_sim::participants::participants;
+use run::{NOW, Run};
 
 #[derive(Default)]
 struct Lab {
     input: Vec<u8>,
     output: String,
     numbers: Vec<f64>,
+    /// Roads of files, by name.
+    courses: Vec<(String, Course)>,
     run: Option<Run>,
 }
 
@@ -43,6 +29,7 @@ static LAB: Mutex<Lab> = Mutex::new(Lab {
     input: Vec::new(),
     output: String::new(),
     numbers: Vec::new(),
+    courses: Vec::new(),
     run: None,
 });
 
@@ -50,97 +37,23 @@ fn lab() -> MutexGuard<'static, Lab> {
     LAB.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Lab {
-    /// Puts an answer, or what is wrong, where the page reads it.
-    fn answer(&mut self, result: Result<String, String>) -> u32 {
-        let good = result.is_ok();
-        self.output = result.unwrap_or_else(|wrong| wrong);
-        good.into()
-    }
-
-    fn begin(&mut self) -> Result<String, String> {
-        let text = std::str::from_utf8(&self.input).map_err(|e| e.to_string())?;
-        let scenario = Scenario::from_toml("this page", text, |course, _| {
-            Err(InputError::new(course, "a page has the built-in course alone"))
-        })
-        .map_err(|e| e.to_string())?;
-        scenario.check_times()?;
-        self.run = Some(Run {
-            simulation: Simulation::new(&scenario),
-            receiver: ReceiverState::TRUSTED,
-            trace: Trace {
-                sample_rate_hz: f64::from(SAMPLE_RATE_HZ),
-                samples: Vec::new(),
-            },
-            now: [0.0; NOW],
-            scenario,
-        });
-        Ok(String::new())
-    }
+/// Does what it says with the text that was written; puts the answer, or what is wrong, where the page reads it.
+fn answer(of: impl FnOnce(&mut Lab, &str) -> Result<String, String>) -> u32 {
+    let mut lab = lab();
+    let input = std::mem::take(&mut lab.input);
+    let result = String::from_utf8(input)
+        .map_err(|e| e.to_string())
+        .and_then(|text| of(&mut lab, &text));
+    let good = result.is_ok();
+    lab.output = result.unwrap_or_else(|wrong| wrong);
+    good.into()
 }
 
-impl Run {
-    /// One step; whether there was one.
-    fn step(&mut self, action: &Action) -> bool {
-        let Some(outcome) = self.simulation.step(action) else {
-            self.now[15] = f64::from(u8::from(matches!(
-                self.simulation.ending(),
-                Some(Ending::Diverged { .. })
-            )));
-            return false;
-        };
-        if let Some(Ok(said)) = outcome
-            .frames_out
-            .first()
-            .map(|frame| GuidanceMessage::decode(&mut self.receiver, frame))
-        {
-            self.now[7] = f64::from(said.mode as u8);
-            self.now[8] = f64::from(said.limit as u8);
-            self.now[9] = f64::from(u8::from(said.warning));
-        }
-        if let Some(Sample {
-            s_m,
-            lateral_error_m,
-            heading_error_rad,
-            wheel_rate_rad_per_s,
-            ..
-        }) = outcome.sample
-        {
-            (self.now[1], self.now[2], self.now[3]) = (s_m, lateral_error_m, heading_error_rad);
-            self.now[13] = wheel_rate_rad_per_s;
-        }
-        let seen = outcome.observation;
-        self.now[0] = outcome.time_s();
-        self.now[4] = seen.wheel_angle_rad;
-        self.now[5] = seen.driver_torque_nm;
-        self.now[6] = outcome.applied_torque_nm;
-        (self.now[10], self.now[11]) = (outcome.preview.e_y_m, outcome.preview.e_theta_rad);
-        self.now[12] = seen.speed_m_per_s;
-        self.now[14] = f64::from(seen.step);
-        self.trace.samples.extend(outcome.sample);
-        true
-    }
-
-    fn csv(&self) -> Result<String, String> {
-        let mut csv = Vec::new();
-        self.trace.write_csv(&mut csv).map_err(|e| e.to_string())?;
-        String::from_utf8(csv).map_err(|e| e.to_string())
-    }
-
-    fn identified(&self, manual: bool) -> Result<String, String> {
-        let log = DriveLog::read(self.csv()?.as_bytes(), manual);
-        let log = log.map_err(|why| words::refusal(&why.to_string(), &self.trace))?;
-        let options = Options::given(manual, &[]).map_err(|e| e.to_string())?;
-        let found = identify_with_noise_model(&log, &options);
-        let parameters: Vec<Value> = found
-            .parameters
-            .list()
-            .into_iter()
-            .map(|(name, unit, parameter)| json!({"name": name, "unit": unit, "found": parameter}))
-            .collect();
-        let notes = words::notes(&found, manual);
-        Ok(json!({"fit_percent": found.fit_percent, "parameters": parameters, "notes": notes}).to_string())
-    }
+/// Puts numbers where the page reads them.
+fn numbers(of: impl FnOnce(&Run) -> Vec<f64>) -> *const f64 {
+    let mut lab = lab();
+    lab.numbers = lab.run.as_ref().map(of).unwrap_or_default();
+    lab.numbers.as_ptr()
 }
 
 /// Where the page may write so many bytes.
@@ -163,12 +76,53 @@ pub extern "C" fn text_length() -> usize {
     lab().output.len()
 }
 
-/// Begins the scenario that was written; 0 and a sentence if it cannot be.
+/// How many numbers stand where they were last put.
 #[unsafe(no_mangle)]
-pub extern "C" fn begin() -> u32 {
-    let mut lab = lab();
-    let result = lab.begin();
-    lab.answer(result)
+pub extern "C" fn count() -> usize {
+    lab().numbers.len()
+}
+
+/// Keeps the road of a file that was written, its name in the first line; 0 and a sentence if it is none. Otherwise its length in
+/// metres.
+#[unsafe(no_mangle)]
+pub extern "C" fn keep_course() -> u32 {
+    answer(|lab, text| {
+        let (name, text) = text.split_once('\n').ok_or("a road has a name and a text")?;
+        let course = Course::from_text(name, text, &LaneChoice::default()).map_err(|e| e.to_string())?;
+        let length_m = course.length_m().to_string();
+        lab.courses.retain(|(known, _)| known != name);
+        lab.courses.push((name.to_owned(), course));
+        Ok(length_m)
+    })
+}
+
+/// The names of the library's laws, in their order, as JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn laws() -> u32 {
+    answer(|_, _| {
+        let names: Vec<&str> = haptic_sim::laws::LAWS.iter().map(|law| law.name).collect();
+        serde_json::to_string(&names).map_err(|e| e.to_string())
+    })
+}
+
+/// The paper's fourteen participants under guidance, as JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn fourteen() -> u32 {
+    answer(|_, _| {
+        let guided: Vec<_> = participants().into_iter().map(|one| one.guided).collect();
+        serde_json::to_string(&guided).map_err(|e| e.to_string())
+    })
+}
+
+/// Begins the scenario that was written; 0 and a sentence if it cannot be. `law` is the place of a law of the library, the number
+/// behind the last one the page's own, a negative one the shipping law.
+#[unsafe(no_mangle)]
+pub extern "C" fn begin(law: i32, person: u32) -> u32 {
+    answer(|lab, toml| {
+        let law = usize::try_from(law).ok();
+        lab.run = Some(Run::begin(toml, &lab.courses, law, person != 0)?);
+        Ok(String::new())
+    })
 }
 
 /// So many steps of 1 ms under a hand's torque; how many there were.
@@ -181,10 +135,6 @@ pub extern "C" fn step(
     torque_lost: u32,
     lane_lost: u32,
 ) -> u32 {
-    let mut lab = lab();
-    let Some(run) = &mut lab.run else {
-        return 0;
-    };
     let action = Action {
         engage: Some(engage != 0),
         authority: Some(authority),
@@ -195,98 +145,76 @@ pub extern "C" fn step(
         },
         ..Action::default()
     };
-    (0..steps).take_while(|_| run.step(&action)).count() as u32
+    drive(steps, &action)
 }
 
 /// So many steps as the scenario has them, without a hand; how many there were.
 #[unsafe(no_mangle)]
 pub extern "C" fn play(steps: u32) -> u32 {
+    drive(steps, &Action::default())
+}
+
+fn drive(steps: u32, action: &Action) -> u32 {
     let mut lab = lab();
-    let Some(run) = &mut lab.run else {
-        return 0;
-    };
-    (0..steps).take_while(|_| run.step(&Action::default())).count() as u32
+    let run = &mut lab.run;
+    run.as_mut().map_or(0, |run| {
+        (0..steps).take_while(|_| run.step(action)).count() as u32
+    })
 }
 
 /// Where the numbers of this instant stand.
 #[unsafe(no_mangle)]
 pub extern "C" fn now() -> *const f64 {
     let mut lab = lab();
-    let now = lab.run.as_ref().map_or([0.0; NOW], |run| run.now);
+    let now = lab.run.as_ref().map_or([0.0; NOW], |run| run.record.now);
     lab.numbers = now.to_vec();
     lab.numbers.as_ptr()
 }
 
-/// The centre of the road from the vehicle on, every `every_m`: x forward and y left of the direction of movement, in turn.
+/// The centre of the road, every `every_m` from its start to its end: x, y, heading, curvature, in turn.
 #[unsafe(no_mangle)]
-pub extern "C" fn road(every_m: f64, count: u32) -> *const f64 {
-    let mut lab = lab();
-    let mut points = Vec::new();
-    if let Some(run) = &lab.run {
+pub extern "C" fn road(every_m: f64) -> *const f64 {
+    numbers(|run| {
         let course = run.scenario.course().centreline();
-        let (here, ..) = course.at(run.now[1]);
-        let [offset, turned] = [run.now[2], here.heading_rad + run.now[3]];
-        let place = [
-            here.x_m - offset * here.heading_rad.sin(),
-            here.y_m + offset * here.heading_rad.cos(),
-        ];
-        for k in 0..count {
-            let s_m = (run.now[1] + f64::from(k) * every_m).min(course.length_m());
-            let (ahead, ..) = course.at(s_m);
-            let [dx, dy] = [ahead.x_m - place[0], ahead.y_m - place[1]];
-            points.push(dx * turned.cos() + dy * turned.sin());
-            points.push(dy * turned.cos() - dx * turned.sin());
-        }
-    }
-    lab.numbers = points;
-    lab.numbers.as_ptr()
+        let count = (course.length_m() / every_m) as u32;
+        (0..=count)
+            .flat_map(|k| {
+                let (at, curvature, _) = course.at(f64::from(k) * every_m);
+                [at.x_m, at.y_m, at.heading_rad, curvature]
+            })
+            .collect()
+    })
 }
 
-/// How many samples were recorded.
-#[unsafe(no_mangle)]
-pub extern "C" fn samples() -> usize {
-    lab().run.as_ref().map_or(0, |run| run.trace.samples.len())
-}
-
-/// The samples of a channel, by its place among the columns of the log.
+/// The samples of a channel: by its place among the columns of the log, or behind them.
 #[unsafe(no_mangle)]
 pub extern "C" fn channel(place: usize) -> *const f64 {
-    let mut lab = lab();
-    let values = match (CHANNELS.get(place), &lab.run) {
-        (Some(channel), Some(run)) => run.trace.samples.iter().map(channel.value).collect(),
-        _ => Vec::new(),
-    };
-    lab.numbers = values;
-    lab.numbers.as_ptr()
+    numbers(|run| run.record.channel(place))
 }
 
 /// The log so far, as the command line writes it.
 #[unsafe(no_mangle)]
 pub extern "C" fn csv() -> u32 {
-    let mut lab = lab();
-    let result = lab
-        .run
-        .as_ref()
-        .ok_or_else(|| "there is no run".to_owned())
-        .and_then(Run::csv);
-    lab.answer(result)
+    answer(|lab, _| lab.run.as_ref().ok_or("there is no run")?.record.csv())
 }
 
-/// Who drove: the parameters of the log so far as JSON; 0 and a sentence if it tells nothing.
+/// What the command line judges a run by, over a stretch of road, as JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn metrics(from_m: f64, to_m: f64) -> u32 {
+    answer(|lab, _| {
+        let run = lab.run.as_ref().ok_or("there is no run")?;
+        serde_json::to_string(&run.metrics(from_m, to_m)).map_err(|e| e.to_string())
+    })
+}
+
+/// Who drove: the parameters of the log that was written as JSON; 0 and a sentence if it tells nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn identify(manual: u32) -> u32 {
-    let mut lab = lab();
-    let run = lab.run.as_ref().ok_or_else(|| "there is no run".to_owned());
-    let result = run.and_then(|run| run.identified(manual != 0));
-    lab.answer(result)
+    answer(|_, csv| words::identified(csv, manual != 0))
 }
 
 /// What the shipping ECU sends on the bus that was written; 0 and a sentence if it cannot be read.
 #[unsafe(no_mangle)]
 pub extern "C" fn replay() -> u32 {
-    let mut lab = lab();
-    let result = std::str::from_utf8(&lab.input)
-        .map_err(|e| e.to_string())
-        .and_then(replay::replay);
-    lab.answer(result)
+    answer(|_, bus| replay::replay(bus))
 }

@@ -1,8 +1,9 @@
 //! What an identification says of a drive, for whoever drove it in the page: no option of a command line, no line of a
 //! file.
 
-use haptic_analysis::identify::{Identification, Reason};
-use haptic_log::trace::Trace;
+use haptic_analysis::identify::{DriveLog, Identification, Options, Reason, identify_with_noise_model};
+use haptic_sim::participants::{PublishedDriver, participants};
+use serde_json::{Value, json};
 
 /// What the columns of a log are to a driver.
 const COLUMNS: [(&str, &str); 5] = [
@@ -13,12 +14,55 @@ const COLUMNS: [(&str, &str); 5] = [
     ("driver_torque_nm", "your torque"),
 ];
 
+/// Who drove a log: fit, parameters with their intervals and the paper's fourteen beside them, notes.
+pub(crate) fn identified(csv: &str, manual: bool) -> Result<String, String> {
+    let log = DriveLog::read(csv.as_bytes(), manual).map_err(|why| refusal(&why.to_string(), csv))?;
+    let options = Options::given(manual, &[]).map_err(|e| e.to_string())?;
+    let found = identify_with_noise_model(&log, &options);
+    let parameters: Vec<Value> = found
+        .parameters
+        .list()
+        .into_iter()
+        .map(|(name, unit, parameter)| {
+            json!({"name": name, "unit": unit, "found": parameter, "fourteen": fourteen(name, manual)})
+        })
+        .collect();
+    let notes = notes(&found, manual);
+    Ok(json!({"fit_percent": found.fit_percent, "parameters": parameters, "notes": notes}).to_string())
+}
+
+/// A parameter of the paper's fourteen participants, smallest first; none that it did not identify.
+fn fourteen(name: &str, manual: bool) -> Vec<f64> {
+    let of = |driver: &PublishedDriver| {
+        let arm = driver.k_d + driver.parameters().k_nms;
+        match name {
+            "t_p" => Some(driver.t_p),
+            "gain_1" => Some(arm * driver.a_1),
+            "gain_2" => Some(arm * driver.a_2),
+            "gain_3" => Some(arm * driver.a_3),
+            "k_hg" => driver.k_hg,
+            _ => None,
+        }
+    };
+    let drivers = participants().into_iter();
+    let drivers = drivers.map(|participant| {
+        if manual {
+            participant.manual
+        } else {
+            participant.guided
+        }
+    });
+    let mut values: Vec<f64> = drivers.filter_map(|driver| of(&driver)).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
 /// Why a drive cannot be looked at. A log's reader names the line, of which the first is the columns' names.
-pub(crate) fn refusal(why: &str, trace: &Trace) -> String {
+fn refusal(why: &str, csv: &str) -> String {
     let at = why.strip_prefix("line ").and_then(|rest| {
         let (line, what) = rest.split_once(": ")?;
-        let sample = trace.samples.get(line.parse::<usize>().ok()?.checked_sub(2)?)?;
-        Some((sample.time_s, what))
+        let row = csv.lines().nth(line.parse::<usize>().ok()?.checked_sub(1)?)?;
+        Some((row.split(',').next()?.parse::<f64>().ok()?, what))
     });
     let Some((time_s, what)) = at else {
         let plain = why
@@ -36,7 +80,7 @@ pub(crate) fn refusal(why: &str, trace: &Trace) -> String {
 }
 
 /// What a driver has to know of what was found.
-pub(crate) fn notes(found: &Identification, manual: bool) -> Vec<String> {
+fn notes(found: &Identification, manual: bool) -> Vec<String> {
     let mut notes = Vec::new();
     for left_out in found.preflight.iter().flat_map(|looked| &looked.left_out) {
         let what = match left_out.reason {
