@@ -56,7 +56,7 @@ fn times(column: &str, factor: f64) -> impl Fn(&[String], usize, &mut Vec<String
 }
 
 #[test]
-fn what_is_shared_and_by_hand_is_told_apart_and_the_known_driver_is_in_the_intervals() {
+fn what_is_shared_and_by_hand_is_told_apart_and_nothing_is_claimed_at_ten_hertz() {
     let path = recording("openlka.csv");
     let (shared, notes) = read(&path, "openlka", false, &[]).unwrap();
     assert!(
@@ -79,28 +79,21 @@ fn what_is_shared_and_by_hand_is_told_apart_and_the_known_driver_is_in_the_inter
         "{:?}",
         shared.findings
     );
-    // gain_3 is (K_d + K_nms)*a_3 = (3 + 1)*3.7.
-    let told = |log: &DriveLog, manual: bool| {
-        let options = Options {
-            manual,
-            ..Options::default()
-        };
-        let fit = identify_with_noise_model(log, &options);
-        let p = &fit.parameters;
-        for (p, truth) in [(&p.k_hg, 0.3), (&p.t_p, 0.2), (&p.gain_3, 14.8)] {
-            let [low, high] = p.interval_95.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-            assert!(
-                !p.identified || (low <= truth && truth <= high),
-                "{truth}: {low} to {high}"
-            );
-        }
-        assert!(fit.refuted.is_empty(), "{:?}", fit.refuted);
-        (p.k_hg.identified, p.gain_3.identified)
-    };
-    assert_eq!(told(&shared, false), (true, true));
+    // Ten rows a second tell nothing for certain; the optimum is the driver's all the same.
+    let fit = identify_with_noise_model(&shared, &Options::default());
+    assert!(fit.refuted.is_empty(), "{:?}", fit.refuted);
+    assert!(fit.parameters.list().iter().all(|(.., p)| !p.identified));
+    assert!(
+        fit.assumed
+            .iter()
+            .any(|a| a.contains("0.100 s apart, so nothing is called identified")),
+        "{:?}",
+        fit.assumed
+    );
+    let k_hg = fit.parameters.k_hg.optimum.unwrap();
+    assert!((k_hg - 0.3).abs() < 0.1, "{k_hg}");
     let (by_hand, _) = read(&path, "openlka", true, &[]).unwrap();
     assert!(by_hand.driver_torque_nm[..990].iter().all(|t| t.is_nan()));
-    told(&by_hand, true);
 }
 
 #[test]

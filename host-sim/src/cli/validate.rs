@@ -1,7 +1,9 @@
 //! `host-sim validate`: the estimates of `identify` against drivers whose truth is known.
 
 use clap::{ArgGroup, Args};
-use haptic_batch::experiment::{POPULATION, Plan, changes, corruptions, methods, repeat};
+use haptic_batch::experiment::{
+    CHANNELS, POPULATION, Plan, changes, corruptions, methods, recordings, repeat,
+};
 use haptic_report::studies::validation::Validation;
 
 use super::participants::{Participants, check_probe};
@@ -29,8 +31,12 @@ pub(super) struct Arguments {
     /// smoother, the default, the published method) with the information bound
     #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
     methods: Option<u32>,
+    /// Record N drives of each participant as the cars of others record real people (10 or 100 rows a second, lane lines with noise,
+    /// a torsion bar that feels the wheel), read each as `identify --layout openlka` does, and count as --corruptions does
+    #[arg(long, value_name = "N", group = "question", value_parser = clap::value_parser!(u32).range(1..))]
+    recordings: Option<u32>,
     /// Of --corruptions and --changes: only those whose name holds this
-    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods"])]
+    #[arg(long, value_name = "TEXT", default_value = "", conflicts_with_all = ["coverage", "methods", "recordings"])]
     only: String,
     #[command(flatten)]
     participants: Participants,
@@ -65,8 +71,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         .or(arguments.corruptions)
         .or(arguments.methods)
         .or(arguments.changes)
+        .or(arguments.recordings)
         .unwrap_or(1);
-    let fits = if arguments.corruptions.is_some() { ways } else { 1 };
+    let fits = if arguments.corruptions.is_some() {
+        ways
+    } else if arguments.recordings.is_some() {
+        CHANNELS.len() as u64
+    } else {
+        1
+    };
     let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
     let result = progress::over(drives, "drives", |done| -> Result<_, String> {
         Ok(if arguments.coverage.is_some() {
@@ -75,6 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
             Validation::Corruptions(Box::new(corruptions(&plan, seeds, &arguments.only, done)?))
         } else if arguments.changes.is_some() {
             Validation::Changes(Box::new(changes(&plan, seeds, &arguments.only, done)?))
+        } else if arguments.recordings.is_some() {
+            Validation::Recordings(Box::new(recordings(&plan, seeds, done)?))
         } else {
             Validation::Methods(methods(&plan, seeds, done)?)
         })

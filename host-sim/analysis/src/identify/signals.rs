@@ -278,6 +278,7 @@ mod tests {
                 .map(|k| if k / 120 % 2 == 0 { 0.2 } else { -0.2 })
                 .collect(),
             driver_torque_nm: vec![0.0; 4800],
+            approximate_points: false,
             resampling: Vec::new(),
             speeds_m_per_s: None,
             findings: Vec::new(),

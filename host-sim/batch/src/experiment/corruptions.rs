@@ -213,7 +213,7 @@ pub(super) fn tolerance(parameter: &str, truth: f64) -> f64 {
 }
 
 impl CorruptionLine {
-    fn new(name: &'static str, found: &[([Compared; COMPARED], Identification)]) -> Self {
+    pub(super) fn new(name: &'static str, found: &[([Compared; COMPARED], Identification)]) -> Self {
         let values: Vec<&Compared> = found.iter().flat_map(|f| &f.0).collect();
         let known: Vec<&&Compared> = values.iter().filter(|v| v.1.identified).collect();
         let error = |v: &Compared| v.1.optimum.map_or(0.0, |x| x - v.2);
@@ -268,7 +268,7 @@ fn in_words(cause: &str) -> String {
 }
 
 impl Corruptions {
-    fn new(plan: &Plan, seeds: u32, lines: Vec<CorruptionLine>, bound: [f64; COMPARED]) -> Self {
+    pub(super) fn new(plan: &Plan, seeds: u32, lines: Vec<CorruptionLine>, bound: [f64; COMPARED]) -> Self {
         let identified: usize = lines.iter().map(|l| l.identified).sum();
         let false_identifications: usize = lines.iter().map(|l| l.false_identifications).sum();
         let mut broken = Vec::new();

@@ -20,6 +20,7 @@ mod drives;
 mod kinds;
 mod methods;
 mod recorder;
+mod recordings;
 mod repetitions;
 
 use rayon::prelude::*;
@@ -32,6 +33,7 @@ pub use corruptions::{CorruptionLine, Corruptions, Held, corruptions};
 pub use kinds::{KINDS, Kind};
 pub use methods::{METHODS, MethodLine, Methods, methods};
 pub use recorder::Recorder;
+pub use recordings::{CHANNELS, Channel, recordings};
 pub use repetitions::{Repeated, Repetitions, repeat};
 
 use haptic_analysis::identify::{

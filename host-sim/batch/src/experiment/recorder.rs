@@ -31,6 +31,7 @@ impl Recorder {
             wheel_angle_rad: Vec::new(),
             guidance_torque_nm: Vec::new(),
             driver_torque_nm: Vec::new(),
+            approximate_points: false,
             resampling: Vec::new(),
             speeds_m_per_s: None,
             findings: Vec::new(),

@@ -130,7 +130,8 @@ fn summary(found: &RealDrives) -> Vec<Block> {
 
 fn drives(found: &RealDrives) -> Table {
     let row = |(drive, f): (&RealDrive, &Found)| {
-        let interval = f.k_hg.as_ref().and_then(|p| p.interval_95);
+        let k_hg = f.k_hg.as_ref().filter(|p| p.identified);
+        let interval = k_hg.and_then(|p| p.interval_95);
         let mut cells = vec![
             Cell::text(&drive.file),
             Cell::text(part(drive)),
@@ -144,7 +145,7 @@ fn drives(found: &RealDrives) -> Table {
             );
         }
         cells.push(Cell::number(f.residual_nm, 3));
-        cells.push(Cell::number(f.k_hg.as_ref().and_then(|p| p.estimate), 2));
+        cells.push(Cell::number(k_hg.and_then(|p| p.estimate), 2));
         cells.extend([0, 1].map(|end| Cell::number(interval.map(|i| i[end]), 2)));
         cells.push(Cell::number(f.k_hg_p, 2));
         cells.push(Cell::text(f.identified.join(" ")));

@@ -9,7 +9,7 @@ use haptic_batch::experiment::{
     Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Repeated, Repetitions,
 };
 
-/// One of the four questions that the validation asks, answered.
+/// One of the five questions that the validation asks, answered.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Validation {
@@ -21,6 +21,9 @@ pub enum Validation {
     Changes(Box<Changes>),
     /// What is each way to treat camera noise worth?
     Methods(Methods),
+    /// What is identified from recordings like those of real people, and is anything of it wrong? Its corruptions are the
+    /// ways of recording.
+    Recordings(Box<Corruptions>),
 }
 
 impl Validation {
@@ -28,7 +31,7 @@ impl Validation {
     pub fn broken(&self) -> Vec<String> {
         match self {
             Self::Coverage(result) => off_coverage(result),
-            Self::Corruptions(result) => result.broken.clone(),
+            Self::Corruptions(result) | Self::Recordings(result) => result.broken.clone(),
             Self::Changes(result) => result.broken.clone(),
             Self::Methods(_) => Vec::new(),
         }
@@ -63,6 +66,13 @@ impl Validation {
                 changes::summary(r)
             ),
             Self::Methods(r) => format!("{}.", rests_on(r.seeds, &r.participants, r.probe_nm, r.seed)),
+            Self::Recordings(r) => format!(
+                "{}. {} of {} identified values are false. Steps of 0.01 N.m and 1/16 deg; torsion bar: a wheel of 0.04 kg.m2 lies \
+                 between it and the hands; each lane line has noise of 2 cm where nothing else is said.",
+                rests_on(r.seeds, &r.participants, r.probe_nm, r.seed),
+                r.false_identifications,
+                r.identified,
+            ),
         }
     }
 
@@ -70,7 +80,9 @@ impl Validation {
     fn tables(&self) -> Vec<Table> {
         match self {
             Self::Coverage(result) => vec![repetitions_table(result)],
-            Self::Corruptions(result) => vec![corruptions_table(result), held_table(result)],
+            Self::Corruptions(result) | Self::Recordings(result) => {
+                vec![corruptions_table(result), held_table(result)]
+            }
             Self::Changes(result) => vec![changes::table(result)],
             Self::Methods(result) => vec![methods_table(&result.lines)],
         }
@@ -89,6 +101,12 @@ impl Validation {
                 "corruptions",
                 "What is identified from corrupted logs?",
                 "By corruption: how many of the values are called identified, and how many of their 95 % intervals hold the \
+                 truth.",
+            ),
+            Self::Recordings(_) => (
+                "recordings",
+                "What is identified from recordings like those of real people?",
+                "By way of recording: how many of the values are called identified, and how many of their 95 % intervals hold the \
                  truth.",
             ),
             Self::Changes(_) => (
@@ -120,7 +138,7 @@ impl Validation {
     fn figure(&self) -> Figure {
         match self {
             Self::Coverage(result) => coverage_figure(result),
-            Self::Corruptions(result) => corruptions_figure(result),
+            Self::Corruptions(result) | Self::Recordings(result) => corruptions_figure(result),
             Self::Changes(result) => changes::figure(result),
             Self::Methods(result) => methods_figure(&result.lines),
         }

@@ -70,6 +70,8 @@ pub struct DriveLog {
     pub guidance_torque_nm: Vec<f64>,
     /// Driver torque T_d as measured, N.m.
     pub driver_torque_nm: Vec<f64>,
+    /// Whether e_y and e_theta were made of two lane lines and a curvature: too rough for anything but K_hg.
+    pub approximate_points: bool,
     /// Autocorrelation, from lag 1 on, that white noise has here because the signals were read off between rows; empty
     /// where the rows are as recorded.
     pub resampling: Vec<f64>,
@@ -159,6 +161,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
+            approximate_points: false,
             resampling: Vec::new(),
             speeds_m_per_s: None,
             findings,
@@ -335,6 +338,7 @@ impl DriveLog {
             wheel_angle_rad,
             guidance_torque_nm,
             driver_torque_nm,
+            approximate_points: false,
             resampling: grid.autocorrelation(&time),
             speeds_m_per_s: None,
             findings: grid.finding.into_iter().collect(),

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::identify::diagnostics;
 use crate::identify::options::Options;
-use crate::identify::result::{AtTNms, Identification, Parameter, STANDARD_NORMAL_95};
+use crate::identify::result::{AtTNms, Identification, Parameter, Parameters, STANDARD_NORMAL_95};
 use crate::identify::search::{Bounds, Optimum, covariance, minimise};
 use crate::identify::verdict::{self, Refutation};
 
@@ -29,6 +29,9 @@ const DRAWN: f64 = 3.0;
 const LEAST_GAIN: f64 = 60.0;
 /// Guidance beyond this, N.m, is no offset of a sensor.
 const GUIDED_NM: f64 = 0.03;
+/// Rows that are further apart do not tell the driver's muscle, whose lag is 0.1 s: at 10 Hz K_hg's optimum is off by three times as
+/// much as at 20 Hz (`host-sim validate --recordings`).
+const SLOWEST_S: f64 = 0.055;
 
 /// Where the profile of the delay passes the 95 % level for the first and the last time, or ends below it. Between its points
 /// its root is taken as straight, as it is of a parabola.
@@ -141,6 +144,7 @@ impl Problem<'_> {
         found.refuted = refuted;
         let p = &optimum.point;
         found.assumed = verdict::ASSUMED.iter().map(|&a| a.to_owned()).collect();
+        found.assumed.extend(self.withhold(&mut found.parameters));
         if !self.is_free(T_NMS) {
             let [low, high] = T_NMS_RANGE_S;
             found.assumed.push(if options.t_nms_known {
@@ -155,6 +159,27 @@ impl Problem<'_> {
         if !self.is_free(K_NMS) {
             found.assumed.push(format!("K_nms is {} N.m/rad", p[K_NMS]));
         }
+    }
+
+    /// Calls nothing identified that this kind of record does not tell, and says why.
+    fn withhold(&self, parameters: &mut Parameters) -> Option<String> {
+        let k_hg = parameters.k_hg;
+        if self.log.dt_s > SLOWEST_S {
+            parameters.disown();
+            return Some(format!(
+                "rows are {SLOWEST_S} s apart or less; these are {:.3} s apart, so nothing is called identified",
+                self.log.dt_s
+            ));
+        }
+        if self.log.approximate_points {
+            parameters.disown();
+            parameters.k_hg = k_hg;
+            return Some(
+                "e_y and e_theta are the driver's; these are made of lane lines and a curvature, so only K_hg is called identified"
+                    .to_owned(),
+            );
+        }
+        None
     }
 
     /// Whether freeing an assumption would move a parameter by its standard error and by a share of what counts as right.
@@ -294,6 +319,7 @@ mod tests {
             guidance_torque_nm: none.clone(),
             driver_torque_nm: none,
             speeds_m_per_s: None,
+            approximate_points: false,
             resampling: Vec::new(),
             findings: Vec::new(),
         };

@@ -179,6 +179,7 @@ pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
         wheel_angle_rad: phi.signal,
         guidance_torque_nm: t_h.signal,
         driver_torque_nm: t_d.signal,
+        approximate_points: log.approximate_points,
         resampling: log.resampling.clone(),
         speeds_m_per_s: log.speeds_m_per_s,
         findings: Vec::new(),

@@ -185,6 +185,7 @@ impl Layout {
             time_s,
         };
         let (mut log, mut notes) = of_channels(&Recording { groups: vec![group] }, &[], how)?;
+        log.approximate_points = self.columns.contains_key("curvature_1pm");
         log.findings.extend(findings);
         notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));
         notes.extend(self.note.clone());
