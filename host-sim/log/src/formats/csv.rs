@@ -36,11 +36,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Series>, RecordingError> {
     Ok(kept.map(|(column, _)| column).collect())
 }
 
-/// What Python writes of a flag.
+/// A flag, as Python (`True`) and others (`true`) write it.
 fn truth(field: &str) -> Option<f64> {
-    match field {
-        "True" => Some(1.0),
-        "False" => Some(0.0),
+    match field.to_ascii_lowercase().as_str() {
+        "true" => Some(1.0),
+        "false" => Some(0.0),
         _ => None,
     }
 }
