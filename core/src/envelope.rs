@@ -147,15 +147,18 @@ impl Envelope {
             };
         }
         let mut command = (wanted, LimitReason::None);
-        // +-L: the driver must be able to override the guidance by hand (paper, section 3.2).
-        hold(
-            &mut command,
-            self.absolute.opposite(),
-            self.absolute,
-            LimitReason::Absolute,
-        );
         let window = state.anchor.abs().plus(WINDOW_GROWTH);
-        hold(&mut command, window.opposite(), window, LimitReason::Window);
+        // The usual case first: within both.
+        if wanted.abs() > self.absolute.min(window) {
+            // +-L: the driver must be able to override the guidance by hand (paper, section 3.2).
+            hold(
+                &mut command,
+                self.absolute.opposite(),
+                self.absolute,
+                LimitReason::Absolute,
+            );
+            hold(&mut command, window.opposite(), window, LimitReason::Window);
+        }
         self.hold_rates(&mut command, at);
         // Last, and exempt from the reduction limit: whatever else holds, the driver's hand wins at once.
         // Zero is always inside these bounds, so they can only make the torque smaller.

@@ -203,6 +203,7 @@ impl Law {
     }
 
     /// The torque now, from the sample taken last.
+    #[inline(always)]
     pub(crate) fn asked(&self, state: &LawState, now: Instant, since: Option<&Since>) -> Torque {
         let age = now.since(state.last.at);
         match since {

@@ -147,12 +147,15 @@ impl Outputs {
         self.ring[self.newest.wrapping_sub(back) % RING]
     }
 
+    /// Takes an output if it is so long after the last; whether it did.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
-    fn push(&mut self, now: Instant, torque: Torque, every: Micros) {
-        if now.since(self.output(0).0) >= every {
+    fn push(&mut self, now: Instant, torque: Torque, every: Micros) -> bool {
+        let is_due = now.since(self.output(0).0) >= every;
+        if is_due {
             self.newest = self.newest.wrapping_add(1);
             self.ring[self.newest % RING] = (now, torque);
         }
+        is_due
     }
 
     /// The last output before `suspect` time ago; zero if that is longer ago than the ring reaches.
@@ -173,10 +176,11 @@ impl History {
         }
     }
 
-    /// Remembers an output.
+    /// Remembers an output. The coarse ring is asked only where the fine one took it.
     pub fn push(&mut self, now: Instant, torque: Torque) {
-        self.fine.push(now, torque, FINE);
-        self.coarse.push(now, torque, COARSE);
+        if self.fine.push(now, torque, FINE) {
+            self.coarse.push(now, torque, COARSE);
+        }
     }
 
     /// The last output before `suspect` time ago; zero if there was none, or if that is longer ago than 2.5 s.

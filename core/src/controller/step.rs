@@ -320,6 +320,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// How its motion since then differs from going on as it did, if that was so.
+    #[inline(always)]
     fn since(&self, v: &Memory, sample: LaneSample) -> Option<Since> {
         let age = self.now.since(sample.at);
         if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
