@@ -88,6 +88,8 @@ pub struct Half {
     pub own: f64,
     /// Our driver on the other half.
     pub ours: f64,
+    /// The same without a delay, which is the two-point driver with a bias (Salvucci and Gray 2004), on the other half.
+    pub two_point: f64,
     /// The linear regression on the other half.
     pub linear: f64,
 }
@@ -229,14 +231,22 @@ fn half_against_half(log: &DriveLog, options: &Options, middle_s: f64) -> Vec<Ha
         return Vec::new();
     }
     let simulated = |fit: &Identification| accounted(&fit.traces.measured_nm, &fit.traces.simulated_nm);
+    let elsewhere = |fit: &Identification, other: &Options| {
+        let known = fixed(fit, other.clone());
+        let there = known.map(|known| identify_with_noise_model(log, &known));
+        there.as_ref().map_or(f64::NAN, simulated)
+    };
     let judged = [0, 1].map(|own| {
         let other = 1 - own;
-        let ours =
-            fixed(&fits[own], within[other].clone()).map(|fixed| identify_with_noise_model(log, &fixed));
+        let at_once = Options {
+            t_p_s: Some(0.0),
+            ..within[own].clone()
+        };
         Half {
             accepted: fits[own].refuted.is_empty(),
             own: simulated(&fits[own]),
-            ours: ours.as_ref().map_or(f64::NAN, simulated),
+            ours: elsewhere(&fits[own], &within[other]),
+            two_point: elsewhere(&identify_with_noise_model(log, &at_once), &within[other]),
             linear: linear(log, &rows[own], &rows[other]).unwrap_or(f64::NAN),
         }
     });

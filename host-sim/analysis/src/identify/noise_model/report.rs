@@ -302,7 +302,7 @@ impl Problem<'_> {
         } else if !options.manual && !found.k_hg.identified && !trim.contradicted[K_HG] {
             notes.push(
                 "k_hg is not identified: the standard error is too large a share of its range 0 to 1. A probe \
-                 torque makes it readable."
+                 torque makes it readable; beside a probe, a longer drive or a stronger one does."
                     .to_owned(),
             );
         }
