@@ -1,6 +1,7 @@
 //! Recordings of real people: what was read and refused, and who predicts the driver's torque best.
 
 use crate::document::{Block, Cell, Report, Section, Table};
+use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives};
 
 /// Parameters that a torque record can carry.
@@ -12,7 +13,16 @@ pub fn report(found: &RealDrives) -> Report {
         ("Summary", summary(found)),
         (
             "Drives",
-            vec![Block::Table(drives(found)), Block::Table(refused(found))],
+            vec![
+                Block::figure(
+                    "predictions",
+                    predictions(found),
+                    "Every half that was predicted, the best first: the variance of T_d that a driver, or a regression, fitted to the \
+                     other half of its drive accounts for. What is below -1 lies at -1: it is worse than that.",
+                ),
+                Block::Table(drives(found)),
+                Block::Table(refused(found)),
+            ],
         ),
         ("Sources", vec![Block::Table(sources(found))]),
     ];
@@ -166,6 +176,39 @@ fn summary(found: &RealDrives) -> Vec<Block> {
         files(found, |_| true),
     );
     vec![Block::Text(text), Block::Table(models), Block::Table(shares)]
+}
+
+/// What each predicts of the other half, sorted: who lies higher predicts more, wherever it is on the line.
+fn predictions(found: &RealDrives) -> Figure {
+    let panel = |by_hand: bool| {
+        let sorted = |label: &str, style, value: fn(&Half) -> f64| {
+            let drives = judged(found).filter(|(d, _)| d.by_hand == by_hand);
+            let mut values: Vec<f64> = drives.flat_map(|(_, f)| f.halves.iter().map(value)).collect();
+            values.retain(|v| !v.is_nan());
+            values.sort_by(|a, b| b.total_cmp(a));
+            let count = values.len() as f64;
+            let point = |(k, v): (usize, &f64)| (100.0 * (k as f64 + 0.5) / count, v.max(-1.0));
+            Series::line(label, style, values.iter().enumerate().map(point).collect())
+        };
+        Panel {
+            title: if by_hand { "by hand" } else { "shared" }.into(),
+            y: Axis {
+                limits: Some((-1.05, 1.0)),
+                ..Axis::of("variance accounted for", "-")
+            },
+            series: vec![
+                sorted("ours", 1, |h| h.ours),
+                sorted("two-point", 2, |h| h.two_point),
+                sorted("linear", 3, |h| h.linear),
+            ],
+        }
+    };
+    Figure {
+        x: Axis::of("halves, best first", "%"),
+        same_y: true,
+        panels: [true, false].map(panel).into(),
+        ..Figure::default()
+    }
 }
 
 fn drives(found: &RealDrives) -> Table {
