@@ -13,11 +13,12 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::Plan;
 use super::changing::{Changed, driver_at};
 use super::corruptions::{Held, tolerance};
+use super::drives::guided;
 use super::kinds::{ASSUMED_NOT_TO, Drawn, KINDS};
 use super::repetitions::{COMPARED, compared};
-use super::{Plan, PublishedDriver, chosen};
 
 /// What was made of one kind of change.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -76,10 +77,7 @@ pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> 
         let names = KINDS.map(|k| k.0).join("; ");
         return Err(format!("--only {only:?}: none of {names}"));
     }
-    let jobs: Vec<(u32, PublishedDriver, u64)> = chosen(&plan.participants)?
-        .iter()
-        .flat_map(|p| (0..u64::from(drives)).map(move |s| (p.number, p.guided, s)))
-        .collect();
+    let jobs = guided(plan, drives)?;
     let found = jobs
         .into_par_iter()
         .map(|(number, published, drive)| {

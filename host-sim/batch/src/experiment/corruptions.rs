@@ -9,11 +9,11 @@ use haptic_analysis::identify::{DriveLog, Identification, Options, Traces, ident
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::Plan;
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
-use super::drives::driven_by;
+use super::drives::{driven_by, guided};
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
-use super::{Plan, PublishedDriver, chosen};
 
 /// How many 95 % intervals of identified values hold the truth.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -124,10 +124,7 @@ pub fn corruptions(
         .filter(|(name, _)| name.contains(only))
         .copied()
         .collect();
-    let jobs: Vec<(u32, PublishedDriver, u64)> = chosen(&plan.participants)?
-        .iter()
-        .flat_map(|p| (0..u64::from(seeds)).map(move |s| (p.number, p.guided, s)))
-        .collect();
+    let jobs = guided(plan, seeds)?;
     // What is driven differs by the driver's muscle alone: each muscle drives once, and its log is corrupted in all ways.
     let found = jobs
         .into_par_iter()

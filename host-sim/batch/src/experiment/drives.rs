@@ -3,12 +3,12 @@
 use haptic_analysis::identify::DriveLog;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::Course;
-use haptic_sim::participants::PublishedDriver;
+use haptic_sim::participants::{Participant, PublishedDriver};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario};
 use haptic_sim::simulation;
 use haptic_vectorised::{Event, Options};
 
-use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, path_of};
+use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, chosen, path_of};
 use crate::Away;
 use crate::vectorised::{Checked, Group, in_groups};
 
@@ -18,6 +18,16 @@ pub(crate) struct Driven {
     pub(crate) log: DriveLog,
     pub(super) path: Vec<(f64, f64)>,
     pub(crate) away: Away,
+}
+
+/// The guided drives of a plan, each participant so often: number, driver, and what counts on from the plan's seed.
+pub(super) fn guided(plan: &Plan, drives: u32) -> Result<Vec<(u32, PublishedDriver, u64)>, String> {
+    let chosen = chosen(&plan.participants)?;
+    let of = |p: &Participant| {
+        let (number, driver) = (p.number, p.guided);
+        (0..u64::from(drives)).map(move |drive| (number, driver, drive))
+    };
+    Ok(chosen.iter().flat_map(of).collect())
 }
 
 /// Lets a published driver drive alone, with a remnant and the paper's sensors.
@@ -191,7 +201,6 @@ fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scena
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::chosen;
 
     /// Every value of every row: from the steps of vectorised runs as from those of the shipping ECU, with and without guidance
     /// and probe, and where a run is rejected.

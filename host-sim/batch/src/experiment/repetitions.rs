@@ -5,8 +5,8 @@
 
 use serde::Serialize;
 
-use super::drives::{log_each, scenario_of_drive};
-use super::{Plan, PublishedDriver, chosen, truth_of};
+use super::drives::{guided, log_each, scenario_of_drive};
+use super::{Plan, PublishedDriver, truth_of};
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
 };
@@ -62,10 +62,7 @@ pub struct Repeated {
 /// # Errors
 /// As [`super::experiment`].
 pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<Repetitions, String> {
-    let jobs: Vec<(u32, PublishedDriver, u64)> = chosen(&plan.participants)?
-        .into_iter()
-        .flat_map(|p| (0..u64::from(repetitions)).map(move |r| (p.number, p.guided, r)))
-        .collect();
+    let jobs = guided(plan, repetitions)?;
     let found: Vec<Judged> = log_each(
         &jobs,
         plan.seed,
