@@ -13,8 +13,8 @@ const settled = async step => { await pause(60); await until(step, () => documen
 const slide = async (id, value) => { const input = $(id); input.value = value; input.dispatchEvent(new Event("input")); await settled(page.state().step); };
 const said = () => $("said").textContent;
 
-// Every number of the command line's record that the page shows. The sine of a browser and that of a system differ in the last
-// bit of some arguments, so a mean of thousands of samples may differ in its last bits; no digit of a log does.
+// Every number of the command line's record that the page shows. The sines of a browser and of a system may differ in the
+// last bit, and so may a mean of thousands of samples; no digit of a log does.
 const close = (ours, theirs) => Object.is(ours, theirs) || Math.abs(ours - theirs) <= 1e-12 * Math.abs(theirs);
 let compared = 0, exact = 0;
 const differ = (metrics, expected) => SHOWN.filter(key => {

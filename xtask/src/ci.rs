@@ -259,6 +259,10 @@ pub(crate) fn check(options: &Options) -> Result<()> {
         return ended;
     }
     let begin = Instant::now();
+    // A log of an earlier run is none of this one's.
+    for stage in STAGES {
+        let _ = fs::remove_file(log_of(stage.name));
+    }
     let packages = std::thread::spawn(prepare);
     let mut failed: Vec<&str> = Vec::new();
     let (meanwhile, wanted): (Vec<&Stage>, Vec<&Stage>) = wanted
