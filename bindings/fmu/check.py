@@ -109,8 +109,8 @@ def refused(call):
     try:
         with contextlib.redirect_stdout(log):
             call()
-    except Exception:
-        return log.getvalue().strip() or "no reason"
+    except Exception as error:
+        return log.getvalue().strip() or repr(error)
     return ""
 
 
@@ -282,7 +282,8 @@ def written(path, other):
     assert "before the end of the initialization" in refused(lambda: fresh.step(0))
     # Nothing but what such a unit wrote; the unit stays as it was.
     before = again.outputs()
-    assert "no state" in refused(lambda: Unit(other).fmu.deserializeFMUState(kept))
+    stranger = Unit(other)
+    assert "no state" in refused(lambda: stranger.fmu.deserializeFMUState(kept))
     for wrong in (b"", kept[:50], kept[:-1], kept[: len(kept) // 2], kept + b"\0"):
         assert refused(lambda: again.fmu.deserializeFMUState(wrong))
     for place in range(0, len(kept), max(1, len(kept) // 200)):
@@ -291,7 +292,7 @@ def written(path, other):
         # Refused or not: another state, no crash.
         refused(lambda: again.fmu.deserializeFMUState(bytes(bytes_)))
     assert again.outputs() == before
-    for each in (unit, again, fresh):
+    for each in (unit, again, fresh, stranger):
         each.end()
     return len(kept)
 

@@ -72,8 +72,10 @@ pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
     let mut fmus = Vec::new();
     for model in models.lines() {
         for (standard, version, ending) in [(0, "2", "fmu"), (1, "3", "fmi3.fmu")] {
-            let stage = root().join("target/fmu").join(format!("{model}-{version}"));
-            let _ = std::fs::remove_dir_all(&stage);
+            // Other stages build and read the same units meanwhile: each has its folder, and a unit appears whole.
+            let stage = root()
+                .join("target/fmu")
+                .join(format!("{model}-{version}-{}", std::process::id()));
             for (binary, places, extension) in &binaries {
                 let place = stage.join("binaries").join(places[standard]);
                 std::fs::create_dir_all(&place).with_context(|| place.display().to_string())?;
@@ -83,7 +85,10 @@ pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
             let description = output(command(&describe).args([model, version]))?;
             std::fs::write(stage.join("modelDescription.xml"), description)?;
             let fmu = dist.join(format!("{model}.{ending}"));
-            archive(&stage, &fmu)?;
+            let whole = stage.join("unit.zip");
+            archive(&stage, &whole)?;
+            std::fs::rename(&whole, &fmu).with_context(|| fmu.display().to_string())?;
+            std::fs::remove_dir_all(&stage)?;
             fmus.push(fmu);
         }
     }
@@ -92,7 +97,6 @@ pub(crate) fn build(built: Built) -> Result<Vec<PathBuf>> {
 
 /// An FMU is a zip archive; Python, which checks it, can write one.
 fn archive(stage: &Path, fmu: &Path) -> Result<()> {
-    let _ = std::fs::remove_file(fmu);
     run(command("python3")
         .current_dir(stage)
         .args(["-m", "zipfile", "-c"])

@@ -66,6 +66,13 @@ pub(crate) fn environment_of(place: &Path, packages: &[&str]) -> Result<PathBuf>
     Ok(python)
 }
 
+/// Copies a file so that another stage, which imports the package meanwhile, finds the old one or the new one, whole.
+fn put(from: &Path, to: &Path) -> Result<()> {
+    let beside = to.with_extension(format!("new-{}", std::process::id()));
+    std::fs::copy(from, &beside).with_context(|| from.display().to_string())?;
+    std::fs::rename(&beside, to).with_context(|| to.display().to_string())
+}
+
 /// An interpreter that finds the package: that of the other tests' build beside its sources, or the installed wheel.
 pub(crate) fn with_package(built: Built) -> Result<Command> {
     if built == Built::ToShip {
@@ -74,16 +81,14 @@ pub(crate) fn with_package(built: Built) -> Result<Command> {
     let library = built.package("haptic-python")?.join("lib_native.so");
     let place = root().join("target/python/package");
     let package = place.join("haptic_guidance");
-    let _ = std::fs::remove_dir_all(&package);
     std::fs::create_dir_all(&package)?;
     for entry in std::fs::read_dir(root().join("bindings/python/python/haptic_guidance"))? {
         let file = entry?.path();
         if let (true, Some(name)) = (file.is_file(), file.file_name()) {
-            std::fs::copy(&file, package.join(name))?;
+            put(&file, &package.join(name))?;
         }
     }
-    std::fs::copy(&library, package.join("_native.abi3.so"))
-        .with_context(|| library.display().to_string())?;
+    put(&library, &package.join("_native.abi3.so"))?;
     let mut python = command(&environment()?.to_string_lossy());
     python.env("PYTHONPATH", place);
     Ok(python)
