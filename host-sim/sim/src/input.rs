@@ -33,7 +33,8 @@ impl std::error::Error for InputError {}
 /// What a TOML text says.
 ///
 /// # Errors
-/// Line, column and what is wrong there: syntax, an unknown field, a value of the wrong kind.
+/// Line, column and what is wrong there: syntax, an unknown field, a value of the wrong kind; that the file is one of another
+/// kind, where it is.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         // The parser speaks of Rust's types; whoever wrote the file need not know them.
@@ -42,8 +43,31 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
             .replace("expected f64", "expected a number")
             .replace("expected u64", "expected a whole number, 0 or more")
             .replace("expected path string", "expected a string");
-        InputError::new(name, message)
+        match other_kind::<T>(text) {
+            Some(hint) => InputError::new(name, hint),
+            None => InputError::new(name, message),
+        }
     })
+}
+
+/// A field that files of one kind alone have, and what those files are for.
+const KINDS: [(&str, &str); 5] = [
+    ("segment", "a course: a scenario names it with `course = \"FILE\"`"),
+    ("law", "a comparison of laws, for `host-sim compare`"),
+    ("participant", "a study, for `host-sim study`"),
+    ("vary", "a sweep, for `host-sim sweep`"),
+    ("course", "a scenario, for `host-sim run`"),
+];
+
+/// What a file is for that has a field which files of this kind do not have.
+fn other_kind<T: DeserializeOwned>(text: &str) -> Option<String> {
+    let fields: toml::Table = toml::from_str(text).ok()?;
+    let (field, kind) = KINDS.iter().find(|(field, _)| fields.contains_key(*field))?;
+    let refusal = toml::from_str::<T>(&format!("{field} = 0")).err()?;
+    refusal
+        .message()
+        .starts_with(&format!("unknown field `{field}`"))
+        .then(|| format!("this is {kind} (it has `{field}`)"))
 }
 
 /// A value outside its range, or NaN.

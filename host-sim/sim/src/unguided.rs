@@ -193,9 +193,9 @@ pub struct Unguided {
     pub asked_for: bool,
 }
 
-/// Without the last bits of a difference of two instants.
-fn to_us(span_s: f64) -> f64 {
-    (span_s * 1e6).round() / 1e6
+/// Without the last bits of a multiple of the sample time: 30.025, not 30.025000000000002.
+fn to_us(time_s: f64) -> f64 {
+    (time_s * 1e6).round() / 1e6
 }
 
 /// The stretches of a run without guidance, in order, to the time between two samples. `None` for a record that does not
@@ -215,8 +215,8 @@ pub fn stretches(trace: &Trace) -> Option<Vec<Unguided>> {
         let back = parts.peek().and_then(|next| next.first());
         let to = back.unwrap_or(last);
         found.extend(Cause::from_code(first.unguided_cause).map(|why| Unguided {
-            from_s: first.time_s,
-            until_s: back.map(|sample| sample.time_s),
+            from_s: to_us(first.time_s),
+            until_s: back.map(|sample| to_us(sample.time_s)),
             lasts_s: to_us(to.time_s - first.time_s),
             from_m: first.s_m,
             to_m: to.s_m,

@@ -20,13 +20,7 @@ pub(super) fn parse(
     text: &str,
     course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
 ) -> Result<ScenarioBuilder, InputError> {
-    let file: ScenarioFile = parse_toml(name, text).map_err(|error| {
-        if Course::from_toml(name, text).is_ok() {
-            let hint = "this is a course, not a scenario: a scenario names it with `course = \"FILE\"`";
-            return InputError::new(name, hint);
-        }
-        error
-    })?;
+    let file: ScenarioFile = parse_toml(name, text)?;
     let choice = LaneChoice {
         road: file.road.clone(),
         lane: file.lane,
