@@ -30,6 +30,8 @@ pub(crate) struct DriverView {
     guidance_torque_nm: f64,
     /// Whether the ECU's warning lamp is on.
     warning: bool,
+    /// Whether the ECU guides and asks for a hand on the wheel, which it does not feel.
+    asks_for_hands: bool,
 }
 
 impl From<parts::DriverView> for DriverView {
@@ -47,6 +49,7 @@ impl From<parts::DriverView> for DriverView {
             yaw_rate_rad_per_s: view.yaw_rate_rad_per_s,
             guidance_torque_nm: view.guidance_torque_nm,
             warning: view.warning,
+            asks_for_hands: view.asks_for_hands,
         }
     }
 }

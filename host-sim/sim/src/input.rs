@@ -52,7 +52,10 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
 
 /// A field that files of one kind alone have, and what those files are for.
 const KINDS: [(&str, &str); 5] = [
-    ("segment", "a course: a scenario names it with `course = \"FILE\"`"),
+    (
+        "segment",
+        "a course: a scenario names it with `course = \"FILE\"`",
+    ),
     ("law", "a comparison of laws, for `host-sim compare`"),
     ("participant", "a study, for `host-sim study`"),
     ("vary", "a sweep, for `host-sim sweep`"),

@@ -154,8 +154,16 @@ fn behind_a_braking_the_vehicle_turns_as_the_textbook_says() {
         "[[segment]]\nlength = 300\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.005\n\
          [[segment]]\nlength = 1500\ncurvature = 0.005",
     );
+    // A driver who moves the wheel because the ECU asks for a hand is not at rest.
+    let driver = DriverParameters {
+        answers_hands_off_after_s: f64::INFINITY,
+        ..DriverParameters::default()
+    };
     for condition in [Condition::Manual, Condition::Mid] {
-        let scenario = Scenario::builder().course(course.clone()).condition(condition);
+        let scenario = Scenario::builder()
+            .course(course.clone())
+            .condition(condition)
+            .driver(driver);
         let run = simulate(&scenario.speed(speed.clone()).build().unwrap());
         let last = run.trace.samples.last().unwrap();
         let radius_m = 200.0 - last.lateral_error_m;

@@ -83,6 +83,29 @@ fn a_run_says_what_the_bus_says() {
     }
 }
 
+/// A driver who relies on the guidance and holds still in a long gentle curve is taken for nobody, unless the warning is
+/// answered: then guidance goes on, and the vehicle stays on its line.
+#[test]
+fn who_answers_the_warning_keeps_the_guidance() {
+    for sensors in [Sensors::Paper, Sensors::Exact] {
+        let driven = |after_s| {
+            let driver = DriverParameters {
+                answers_hands_off_after_s: after_s,
+                ..DriverParameters::default()
+            };
+            let scenario = Scenario::builder()
+                .course(held_curve())
+                .condition(Condition::High)
+                .sensors(sensors)
+                .driver(driver);
+            simulate(&scenario.build().unwrap()).trace
+        };
+        let never = stretches(&driven(f64::INFINITY)).unwrap();
+        assert_eq!(never[0].why, Cause::Faults(HANDS_OFF));
+        assert_eq!(stretches(&driven(14.0)), Some(vec![]));
+    }
+}
+
 /// Nobody holds the wheel: after 30 s in which the guidance acts it ends, whatever the sensors are.
 #[test]
 fn without_hands_it_ends_and_says_so() {
@@ -91,6 +114,7 @@ fn without_hands_it_ends_and_says_so() {
         a_2: 0.0,
         a_3: 0.0,
         k_nms: 0.0,
+        answers_hands_off_after_s: f64::INFINITY,
         ..DriverParameters::default()
     };
     for sensors in [Sensors::Paper, Sensors::Exact] {

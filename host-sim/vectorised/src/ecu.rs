@@ -39,6 +39,8 @@ const HELD: i32 = bits(hands::HELD.nm());
 const ACTS: i32 = bits(hands::ACTS.nm());
 /// A bit less than core's patience.
 const HANDS_MS: i32 = ms(hands::END) as i32 - 10;
+/// From here on the driver is asked for a hand.
+const ASKED_MS: i32 = ms(hands::WARN) as i32 - 10;
 /// Far inside what a column frame carries, N.m.
 const LARGEST_DRIVER_NM: f64 = 10.0;
 /// Between a loss of the lane preview and its time-out, ms; then the handover.
@@ -78,6 +80,9 @@ pub(super) struct Ecus<const N: usize> {
     pub(super) driver: [i32; N],
     felt: [i32; N],
     without_ms: [i32; N],
+    /// For how long the driver has been asked for a hand, and when an answer comes.
+    asked_ms: [i32; N],
+    answer_ms: [i32; N],
     mode: [i32; N],
     /// -1 where what the ECU does matters: it guides, and its torque is applied.
     matters: [i32; N],
@@ -142,6 +147,8 @@ impl<const N: usize> Ecus<N> {
             driver: zero(),
             felt: zero(),
             without_ms: zero(),
+            asked_ms: zero(),
+            answer_ms: zero(),
             mode: [OFF; N],
             matters: zero(),
             hears: zero(),
@@ -173,6 +180,8 @@ impl<const N: usize> Ecus<N> {
         self.fall_in_a_step[lane] = (fall - TORQUE_LSB).max(0);
         self.mode[lane] = if guided { GUIDED } else { OFF };
         (self.matters[lane], self.hears[lane]) = (flag(guided), flag(guided));
+        // Where it never comes, the largest number.
+        self.answer_ms[lane] = (1e3 * scenario.driver().answers_hands_off_after_s) as i32;
         self.first[lane] = -1;
         for state in [
             &mut self.growth,
@@ -189,6 +198,7 @@ impl<const N: usize> Ecus<N> {
             &mut self.driver,
             &mut self.felt,
             &mut self.without_ms,
+            &mut self.asked_ms,
             &mut self.suspect,
             &mut self.ramp_from,
             &mut self.ramp_done,
@@ -357,8 +367,14 @@ impl<const N: usize> Ecus<N> {
             let guidance = self.applied[l].wrapping_sub(self.probes.applied[l]);
             let acts = (guidance.wrapping_abs() >= ACTS) & (self.mode[l] == GUIDED);
             self.without_ms[l] = self.without_ms[l].wrapping_add(if acts { 1 } else { 0 });
-            self.suspect[l] |=
-                flag(self.without_ms[l] >= HANDS_MS) & self.matters[l] & Reason::HandsOff.bit();
+            let is_asked = self.without_ms[l] >= ASKED_MS;
+            self.asked_ms[l] = if is_asked {
+                self.asked_ms[l].wrapping_add(1)
+            } else {
+                0
+            };
+            let is_over = (self.without_ms[l] >= HANDS_MS) | (self.asked_ms[l] > self.answer_ms[l]);
+            self.suspect[l] |= flag(is_over) & self.matters[l] & Reason::HandsOff.bit();
         }
         if is_window_due {
             for l in 0..N {

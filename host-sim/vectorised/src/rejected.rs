@@ -282,6 +282,7 @@ fn supported_driver(driver: &DriverParameters, gains: ArmGains, change: Option<D
         k_nms: _,
         remnant_sd_nm: _,
         remnant_corner_hz: _,
+        answers_hands_off_after_s: _,
     } = driver;
     let ArmGains { k_d: _, k_hg: _ } = gains;
     if let Some(change) = change {

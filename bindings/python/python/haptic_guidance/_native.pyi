@@ -44,6 +44,7 @@ class DriverTable(TypedDict, total=False):
     manual_K_d: float
     remnant_sd: float
     remnant_corner: float
+    answers_hands_off_after: float
 
 class VehicleTable(TypedDict, total=False):
     m: float
@@ -276,6 +277,8 @@ class DriverView:
     def guidance_torque_nm(self) -> float: ...
     @property
     def warning(self) -> bool: ...
+    @property
+    def asks_for_hands(self) -> bool: ...
 
 @final
 class Simulation:

@@ -23,6 +23,7 @@ fn view(step: u32) -> DriverView {
         yaw_rate_rad_per_s: 0.0,
         guidance_torque_nm: 0.5 * (0.7 * t + 0.3).sin(),
         warning: false,
+        asks_for_hands: false,
         is_lost: (4000..6000).contains(&step),
     }
 }

@@ -18,7 +18,7 @@ mod own_law;
 
 use haptic_core::bus::Frame;
 use haptic_core::envelope::LimitReason;
-use haptic_core::faults::FaultSet;
+use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::modes::Mode;
 use haptic_core::quantity::Instant;
 
@@ -99,6 +99,12 @@ impl Status {
         warning: false,
         k_hg: None,
     };
+
+    /// Whether it guides, feels no hand on the wheel and asks for one.
+    #[must_use]
+    pub fn asks_for_hands(&self) -> bool {
+        self.mode == Mode::Active && self.faults.contains(Fault::HandsOff)
+    }
 }
 
 /// A mode that allows less torque than the law asks for is no limit: a fade or a handover is what was asked.

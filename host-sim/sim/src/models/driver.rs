@@ -35,6 +35,9 @@ pub struct DriverParameters {
     pub remnant_sd_nm: f64,
     /// Corner of the first-order low-pass that colours the remnant, Hz.
     pub remnant_corner_hz: f64,
+    /// For how long the ECU asks for a hand before the driver moves the wheel, s; infinite: never. Our own choice: so late
+    /// that nothing differs from the paper's drives but where guidance would end.
+    pub answers_hands_off_after_s: f64,
 }
 
 /// How the arm weighs vision against the guidance torque.
@@ -65,6 +68,7 @@ impl Default for DriverParameters {
             k_nms: 1.0,
             remnant_sd_nm: 0.0,
             remnant_corner_hz: 0.5,
+            answers_hands_off_after_s: 14.0,
         }
     }
 }
@@ -84,7 +88,13 @@ impl DriverParameters {
         in_range("t_nms", self.t_nms, 0.01..=2.0, "s")?;
         in_range("K_nms", self.k_nms, 0.0..=100.0, "N.m/rad")?;
         in_range("remnant_sd", self.remnant_sd_nm, 0.0..=5.0, "N.m")?;
-        in_range("remnant_corner", self.remnant_corner_hz, 0.01..=100.0, "Hz")
+        in_range("remnant_corner", self.remnant_corner_hz, 0.01..=100.0, "Hz")?;
+        in_range(
+            "answers_hands_off_after",
+            self.answers_hands_off_after_s,
+            0.0..=f64::INFINITY,
+            "s",
+        )
     }
 }
 

@@ -7,6 +7,7 @@
 pub mod arm;
 pub mod disturbances;
 pub mod driver;
+pub mod hands_answer;
 pub mod plant;
 pub mod real;
 pub mod road;

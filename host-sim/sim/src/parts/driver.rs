@@ -5,6 +5,7 @@ use crate::guidance::LaneErrors;
 use crate::models::STEP_S;
 use crate::models::arm::Arm;
 use crate::models::driver::{ArmGains, Remnant, Vision};
+use crate::models::hands_answer::HandsAnswer;
 use crate::scenario::Scenario;
 use crate::seeds::Stream;
 
@@ -29,6 +30,8 @@ pub struct DriverView {
     pub guidance_torque_nm: f64,
     /// Whether the ECU's warning lamp is on.
     pub warning: bool,
+    /// Whether the ECU guides and asks for a hand on the wheel, which it does not feel; the lamp is on then too.
+    pub asks_for_hands: bool,
     /// Whether the scenario or an action takes torque or lane preview away. The paper's driver knows it a second later; one
     /// who has only eyes and hands leaves it unread.
     pub is_lost: bool,
@@ -78,6 +81,7 @@ pub struct PaperDriver {
     torque_nm: f64,
     gains: ByReliance<ArmGains>,
     notices: Notices,
+    answer: HandsAnswer,
 }
 
 impl PaperDriver {
@@ -92,6 +96,7 @@ impl PaperDriver {
             torque_nm: 0.0,
             gains: ByReliance::new(scenario, |gains| gains),
             notices: Notices::default(),
+            answer: HandsAnswer::new(driver),
         }
     }
 }
@@ -104,7 +109,7 @@ impl Driver for PaperDriver {
     fn step(&mut self, view: &DriverView) -> f64 {
         self.notices.step(view.is_lost);
         self.arm.gains = *self.gains.at(view.step, self.notices.is_manual());
-        let now_nm = self.torque_nm + self.remnant.step();
+        let now_nm = self.torque_nm + self.remnant.step() + self.answer.step(view.asks_for_hands);
         let target_rad = self.vision.step(view.lane.e_y_m, view.lane.e_theta_rad);
         self.torque_nm = self
             .arm

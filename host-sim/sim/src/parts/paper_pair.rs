@@ -2,6 +2,7 @@
 
 use super::{Acting, DriverVehicle, DriverView, Motion};
 use crate::models::driver::{ArmGains, DriverParameters, Remnant, Vision};
+use crate::models::hands_answer::HandsAnswer;
 use crate::models::plant::{Plant, PlantInput, Transition};
 use crate::models::real::RealPlant;
 use crate::models::step_of;
@@ -20,6 +21,7 @@ pub struct PaperPair {
     /// How arm, column and vehicle move.
     pub arm: ByReliance<Transition>,
     notices: Notices,
+    answer: HandsAnswer,
     takes_over: bool,
     step: u32,
     /// phi_target at the start and at the end of the step, rad.
@@ -47,6 +49,7 @@ impl PaperPair {
             a_3: 0.0,
             k_nms: 0.0,
             remnant_sd_nm: 0.0,
+            answers_hands_off_after_s: f64::INFINITY,
             ..*scenario.driver()
         };
         let slack = ArmGains { k_d: 0.0, k_hg: 0.0 };
@@ -65,6 +68,7 @@ impl PaperPair {
             remnant: Remnant::new(driver, Stream::Remnant.seed(scenario.seed())),
             arm,
             notices: Notices::default(),
+            answer: HandsAnswer::new(driver),
             takes_over: false,
             step: 0,
             target_rad: [0.0; 2],
@@ -108,7 +112,7 @@ impl DriverVehicle for PaperPair {
         self.step = view.step;
         self.notices.step(view.is_lost);
         self.target_rad[1] = self.vision.step(view.lane.e_y_m, view.lane.e_theta_rad);
-        self.held_nm = self.remnant.step() + hand_torque_nm;
+        self.held_nm = self.remnant.step() + hand_torque_nm + self.answer.step(view.asks_for_hands);
         self.plant.arm_torque_nm() + self.held_nm
     }
 

@@ -68,6 +68,7 @@ pub(super) fn parse(
             k_nms,
             remnant_sd_nm: file.driver.remnant_sd,
             remnant_corner_hz: file.driver.remnant_corner,
+            answers_hands_off_after_s: file.driver.answers_hands_off_after,
         })
         .gains(gains)
         .manual_k_d(file.driver.manual_k_d)
@@ -134,6 +135,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
             manual_k_d: *manual_k_d,
             remnant_sd: d.remnant_sd_nm,
             remnant_corner: d.remnant_corner_hz,
+            answers_hands_off_after: d.answers_hands_off_after_s,
         },
         vehicle: *vehicle,
         guidance: GuidanceFile(*guidance),
@@ -317,6 +319,7 @@ struct DriverFile {
     manual_k_d: f64,
     remnant_sd: f64,
     remnant_corner: f64,
+    answers_hands_off_after: f64,
 }
 
 impl Default for DriverFile {
@@ -332,6 +335,7 @@ impl Default for DriverFile {
             k_nms,
             remnant_sd_nm,
             remnant_corner_hz,
+            answers_hands_off_after_s,
         } = DriverParameters::default();
         Self {
             a_1,
@@ -347,6 +351,7 @@ impl Default for DriverFile {
             manual_k_d: ArmGains::MANUAL.k_d,
             remnant_sd: remnant_sd_nm,
             remnant_corner: remnant_corner_hz,
+            answers_hands_off_after: answers_hands_off_after_s,
         }
     }
 }

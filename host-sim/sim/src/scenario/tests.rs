@@ -80,7 +80,10 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ("speed = 'fast'", "line 1"),
         ("speed = 'fast'", "expected a number"),
         ("seed = -1", "expected a whole number, 0 or more"),
-        ("[[segment]]\nlength = 500", "this is a course: a scenario names it"),
+        (
+            "[[segment]]\nlength = 500",
+            "this is a course: a scenario names it",
+        ),
         (
             "[[law]]\nkind = 'fdca'\n[scenario]\nspeed = 60",
             "this is a comparison of laws, for `host-sim compare`",

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use haptic_log::trace::Sample;
 
 use crate::action::{Action, WorldFaults};
-use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation};
+use crate::guidance::{Actuation, AnyGuidance, Guidance, LaneErrors, Observation, Status};
 use crate::models::STEP_S;
 use crate::models::road::{Centreline, Tracker};
 use crate::parts::{Acting, Driver, DriverVehicle, DriverView, Motion, PaperPair, Parts, Vehicle};
@@ -61,7 +61,7 @@ pub struct Simulation<G = AnyGuidance, S = PaperPair> {
     /// The run ends when the driver's far point gets there.
     end_m: f64,
     watch: Watch,
-    warning: bool,
+    told: Status,
     last_s_m: f64,
     lateral_error_m: Option<f64>,
     step: u32,
@@ -111,7 +111,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             camera: PreviewPoints::new(&road, camera_s, v),
             body: road.tracker(0.0),
             watch: Watch::default(),
-            warning: false,
+            told: Status::GUIDES,
             last_s_m: 0.0,
             lateral_error_m: None,
             step: 0,
@@ -146,7 +146,8 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             speed_m_per_s: self.speed_m_per_s,
             yaw_rate_rad_per_s: motion.yaw_rate_rad_per_s,
             guidance_torque_nm: self.driver_vehicle.motor_torque_nm(),
-            warning: self.warning,
+            warning: self.told.warning,
+            asks_for_hands: self.told.asks_for_hands(),
             is_lost: lost.any(),
         }
     }
@@ -200,7 +201,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         if let Some(status) = &status {
             self.watch
                 .step(status, self.circumstances(action, faults, seen.speed_m_per_s));
-            self.warning = status.warning;
+            self.told = *status;
             self.request.see(view.is_lost, status.mode);
         }
         let applied = if faults.torque_lost {
