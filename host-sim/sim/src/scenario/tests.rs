@@ -67,6 +67,32 @@ fn every_field_can_be_set() {
     );
 }
 
+/// Each text is refused with the file's name and the words beside it.
+fn each_is_refused(cases: &[(&str, &str)]) {
+    for (text, expected) in cases {
+        let error = parse(text).unwrap_err().to_string();
+        assert!(error.starts_with("s.toml: "), "{error}");
+        assert!(
+            error.contains(expected),
+            "{text:?} gave {error:?}, not {expected:?}"
+        );
+    }
+}
+
+#[test]
+fn a_file_of_another_kind_is_named() {
+    each_is_refused(&[
+        (
+            "[[segment]]\nlength = 500",
+            "this is a course: a scenario names it",
+        ),
+        (
+            "[[law]]\nkind = 'fdca'\n[scenario]\nspeed = 60",
+            "this is a comparison of laws, for `host-sim compare`",
+        ),
+    ]);
+}
+
 #[test]
 fn every_bad_field_is_named_with_its_value_and_range() {
     let cases = [
@@ -80,14 +106,6 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ("speed = 'fast'", "line 1"),
         ("speed = 'fast'", "expected a number"),
         ("seed = -1", "expected a whole number, 0 or more"),
-        (
-            "[[segment]]\nlength = 500",
-            "this is a course: a scenario names it",
-        ),
-        (
-            "[[law]]\nkind = 'fdca'\n[scenario]\nspeed = 60",
-            "this is a comparison of laws, for `host-sim compare`",
-        ),
         ("condition = 'custom'", "custom"),
         ("sensors = 'perfect'", "perfect"),
         ("[failure]\nkind = 'brakes'", "brakes"),
@@ -138,14 +156,7 @@ fn every_bad_field_is_named_with_its_value_and_range() {
             "guidance.t_f = 5.5 s is outside 0.1 to 3 s",
         ),
     ];
-    for (text, expected) in cases {
-        let error = parse(text).unwrap_err().to_string();
-        assert!(error.starts_with("s.toml: "), "{error}");
-        assert!(
-            error.contains(expected),
-            "{text:?} gave {error:?}, not {expected:?}"
-        );
-    }
+    each_is_refused(&cases);
     assert!(
         parse("course = 'nowhere.toml'")
             .unwrap_err()
