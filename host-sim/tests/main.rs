@@ -3,6 +3,7 @@
 mod cli;
 mod compare;
 mod course;
+mod design_guidance;
 mod documents;
 mod file_fields;
 mod recordings;

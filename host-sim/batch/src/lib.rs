@@ -13,6 +13,7 @@
 //! - [`study`]: participants and conditions in their order, recorded session by session.
 //! - [`sweep`]: many drives with varied fields.
 //! - [`compare`]: every law against every driver.
+//! - [`design_guidance`]: the law's gains designed for a population of drivers.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
@@ -41,6 +42,7 @@ pub mod claims;
 pub mod compare;
 pub mod course;
 pub mod design;
+pub mod design_guidance;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;

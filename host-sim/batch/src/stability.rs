@@ -182,7 +182,7 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
 }
 
 /// Growth of a scenario's loop on a straight, 1/s, with a law or by hand.
-fn growth(scenario: &Scenario, law: Option<&Params>) -> f64 {
+pub(crate) fn growth(scenario: &Scenario, law: Option<&Params>) -> f64 {
     let t_n = scenario.guidance().t_n;
     growth_per_s(
         scenario.speed_m_per_s(),

@@ -12,6 +12,7 @@ mod compare;
 mod convert;
 mod course;
 mod design;
+mod design_guidance;
 mod drivers;
 mod ecu;
 mod evaluate;
@@ -77,6 +78,8 @@ enum Command {
     Sweep(sweep::Arguments),
     /// Every law against every driver, each law tuned first: roads, speeds, seeds, failures
     Compare(compare::Arguments),
+    /// Gains of the guidance for a population of drivers, judged on held-out drives
+    DesignGuidance(design_guidance::Arguments),
     /// A road from a file: its lane, length and picture, its centre every metre
     Course(course::Arguments),
     /// A map over speed and delay: where a driver keeps the lane, alone and guided
@@ -179,6 +182,7 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Run(arguments) => run::run(arguments),
         Command::Sweep(arguments) => sweep::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
+        Command::DesignGuidance(arguments) => design_guidance::run(arguments),
         Command::Course(arguments) => course::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),
         Command::Lab(arguments) => lab::run(arguments),

@@ -10,7 +10,15 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("The paper", &["evaluate", "experiment"]),
     (
         "Drive",
-        &["run", "sweep", "compare", "course", "stability", "lab"],
+        &[
+            "run",
+            "sweep",
+            "compare",
+            "design-guidance",
+            "course",
+            "stability",
+            "lab",
+        ],
     ),
     (
         "People",
@@ -61,7 +69,7 @@ pub(super) fn grouped(program: clap::Command) -> clap::Command {
         let _ = writeln!(help, "\n{header}{title}:{header:#}");
         for command in names.iter().filter_map(|name| program.find_subcommand(name)) {
             let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-            let _ = writeln!(help, "  {literal}{:<14}{literal:#}{about}", command.get_name());
+            let _ = writeln!(help, "  {literal}{:<13} {literal:#}{about}", command.get_name());
         }
     }
     let _ = write!(help, "\n{header}Options:{header:#}\n{{options}}{{after-help}}");

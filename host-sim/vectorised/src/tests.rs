@@ -236,14 +236,14 @@ fn the_papers_drives_are_the_same_side_by_side() {
     }
     let driver = DriverParameters {
         remnant_sd_nm: 0.1,
+        line_m: 0.3,
         ..DriverParameters::default()
     };
     scenarios.push(Scenario::builder().driver(driver).build().unwrap());
     // Who weaves is on the road for longer than the course takes.
     let weaving = haptic_sim::participants::participants()[12].guided;
-    let custom = Scenario::builder().condition(Condition::Custom);
-    let weaving = custom.driver(weaving.parameters()).gains(weaving.gains());
-    scenarios.push(weaving.build().unwrap());
+    let builder = Scenario::builder().driver(weaving.parameters());
+    scenarios.push(builder.gains(weaving.gains()).build().unwrap());
     assert_eq!(compare(&scenarios, Width::Widest), 0, "they are nominal");
 }
 

@@ -33,6 +33,8 @@ pub(super) struct Worlds<const N: usize> {
     distance: [f64; N],
     columns: [[[f64; N]; STATES]; COLUMNS],
     a: [[f64; N]; 3],
+    /// The driver's line, m right of the middle.
+    right: [f64; N],
     integral: [f64; N],
     last_e_y: [f64; N],
     fraction: [f64; N],
@@ -65,6 +67,7 @@ impl<const N: usize> Worlds<N> {
             distance: [0.0; N],
             columns: [[[0.0; N]; STATES]; COLUMNS],
             a: [[0.0; N]; 3],
+            right: [0.0; N],
             integral: [0.0; N],
             last_e_y: [0.0; N],
             fraction: [0.0; N],
@@ -103,6 +106,7 @@ impl<const N: usize> Worlds<N> {
         (self.direction[0][lane], self.direction[1][lane]) = (1.0, 0.0);
         let (driver, guidance) = (scenario.driver(), scenario.guidance());
         [self.a[0][lane], self.a[1][lane], self.a[2][lane]] = [driver.a_1, driver.a_2, driver.a_3];
+        self.right[lane] = driver.right_m();
         (self.whole[lane], self.fraction[lane]) = delay_steps(driver.t_p);
         for row in &mut self.delayed {
             row[lane] = 0.0;
@@ -240,7 +244,7 @@ impl<const N: usize> Worlds<N> {
         let mask = self.delayed.len() - 1;
         let mut row = [0.0; N];
         for l in 0..N {
-            let (e_y, e_theta) = (self.driver.e_y[l], self.driver.e_theta[l]);
+            let (e_y, e_theta) = (self.driver.e_y[l] - self.right[l], self.driver.e_theta[l]);
             self.integral[l] += 0.5 * STEP_S * (e_y + self.last_e_y[l]);
             self.last_e_y[l] = e_y;
             row[l] = self.a[0][l] * e_y + self.a[1][l] * self.integral[l] + self.a[2][l] * e_theta;

@@ -45,6 +45,7 @@ class DriverTable(TypedDict, total=False):
     remnant_sd: float
     remnant_corner: float
     answers_hands_off_after: float
+    line: float
 
 class VehicleTable(TypedDict, total=False):
     m: float

@@ -100,27 +100,34 @@ pub(super) fn drive(
         samples,
     };
     let off_road = trunk.ending() != Some(Ending::CourseEnd);
-    let guidance = scenario.guidance();
-    let metrics = measure(
-        &trace,
-        &Circumstances {
-            speed_m_s: scenario.speed_m_per_s(),
-            lane_width_m: scenario.course().lane_width_m(),
-            window: None,
-            failure: None,
-            probe_hz: guidance.probe.then_some(guidance.controller.probe_frequency_hz),
-        },
-    );
     Driven {
-        values: values(&metrics, off_road, &peaks),
+        values: measured(scenario, &trace, off_road, &peaks),
         off_road,
         left_by_itself: Away::new(scenario, &trace).is_by_itself(),
         failed_off_road,
     }
 }
 
+/// What is measured of a drive; `peaks` are those after its losses and its silences.
+pub(crate) fn measured(
+    scenario: &Scenario,
+    trace: &Trace,
+    off_road: bool,
+    peaks: &[Vec<f64>; 2],
+) -> [Option<f64>; METRICS.len()] {
+    let guidance = scenario.guidance();
+    let circumstances = Circumstances {
+        speed_m_s: scenario.speed_m_per_s(),
+        lane_width_m: scenario.course().lane_width_m(),
+        window: None,
+        failure: None,
+        probe_hz: guidance.probe.then_some(guidance.controller.probe_frequency_hz),
+    };
+    values(&measure(trace, &circumstances), off_road, peaks)
+}
+
 /// The failures with their steps, in time: evenly over what of the drive leaves time to go on.
-fn failures(scenario: &Scenario, faults: Faults) -> Vec<(u32, Failure)> {
+pub(crate) fn failures(scenario: &Scenario, faults: Faults) -> Vec<(u32, Failure)> {
     let span_s = (scenario.duration_s() - faults.lasts_s).max(0.0);
     let of_kind = |kind, count: u32| {
         (0..count).map(move |place| {

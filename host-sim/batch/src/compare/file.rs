@@ -177,7 +177,7 @@ fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning
 }
 
 /// The places of drives: a scenario for each road and speed.
-fn drives(
+pub(crate) fn drives(
     source: &Source,
     table: &str,
     fields: &Table,
@@ -194,7 +194,7 @@ fn drives(
     for field in ["seed", "course", "speed", "failure", "driver_change"] {
         if fields.contains_key(field) {
             return Err(source.bad(format!(
-                "scenario.{field}: the comparison has its own seeds, roads, speeds, faults and drivers"
+                "scenario.{field}: this file has its own seeds, roads, speeds, faults and drivers"
             )));
         }
     }

@@ -28,6 +28,9 @@ use haptic_sim::seeds::named;
 use rayon::prelude::*;
 
 pub use drive::{Driven, METRICS, Metric};
+pub(crate) use drive::{failures, measured};
+pub(crate) use file::drives;
+pub(crate) use parts::{Source, unknown};
 pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean};
 
 /// The laws, drivers and habits that a file may name.
@@ -211,12 +214,8 @@ impl<'k> Compare<'k> {
     ) -> Result<Vec<Driven>, ScenarioError> {
         let drive = |job: &Job| {
             let (road, speed_kmh, scenario) = &drives.places[job.place];
-            let seed = named(
-                named(self.seed, stream),
-                &format!("{road} {speed_kmh} {}", job.seed),
-            );
-            // 53 bits, which every reader of a number takes whole.
-            let scenario = scenario.to_builder().seed(seed >> 11).build()?;
+            let seed = seed_of(self.seed, stream, road, *speed_kmh, job.seed);
+            let scenario = scenario.to_builder().seed(seed).build()?;
             let law = self.laws[job.law].make(&scenario, &sets[job.law][job.set])?;
             let driver = &self.drivers[job.driver];
             let driver = driver.make(&scenario, &driver.untuned())?;
@@ -226,6 +225,12 @@ impl<'k> Compare<'k> {
         };
         jobs.par_iter().map(drive).collect()
     }
+}
+
+/// The seed of a drive: drives of another stream share none.
+pub(crate) fn seed_of(root: u64, stream: &str, road: &str, speed_kmh: f64, number: u32) -> u64 {
+    // 53 bits, which every reader of a number takes whole.
+    named(named(root, stream), &format!("{road} {speed_kmh} {number}")) >> 11
 }
 
 /// Does some work on so many threads; none: one a core.

@@ -10,17 +10,17 @@ use super::Chosen;
 use crate::study::check_names;
 
 /// Where a file is, for its errors and its courses.
-pub(super) struct Source<'a> {
-    pub(super) name: String,
-    pub(super) folder: &'a Path,
+pub(crate) struct Source<'a> {
+    pub(crate) name: String,
+    pub(crate) folder: &'a Path,
 }
 
 impl Source<'_> {
-    pub(super) fn bad(&self, message: impl std::fmt::Display) -> InputError {
+    pub(crate) fn bad(&self, message: impl std::fmt::Display) -> InputError {
         InputError::new(&self.name, message)
     }
 
-    pub(super) fn within(
+    pub(crate) fn within(
         &self,
         field: &str,
         value: f64,
@@ -31,7 +31,7 @@ impl Source<'_> {
         in_range(field, value, low..=high, unit).map_err(|e| self.bad(e))
     }
 
-    pub(super) fn count(&self, field: &str, value: u64, low: f64, high: f64) -> Result<u32, InputError> {
+    pub(crate) fn count(&self, field: &str, value: u64, low: f64, high: f64) -> Result<u32, InputError> {
         self.within(field, value as f64, low, high, "")?;
         Ok(value as u32)
     }
@@ -141,7 +141,7 @@ fn values<P: ?Sized>(
 }
 
 /// What is said of a name that is not known.
-pub(super) fn unknown(field: &str, name: &str, known: impl Iterator<Item = &'static str>) -> String {
+pub(crate) fn unknown(field: &str, name: &str, known: impl Iterator<Item = &'static str>) -> String {
     format!(
         "{field}: there is no {name:?}, only {}",
         known.collect::<Vec<_>>().join(", ")

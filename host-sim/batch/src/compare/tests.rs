@@ -263,7 +263,7 @@ const WRONG: [(&str, &str, &str); 24] = [
     (
         "[scenario]\n",
         "[scenario]\nseed = 4\n",
-        "scenario.seed: the comparison has its own seeds",
+        "scenario.seed: this file has its own seeds",
     ),
     (
         "[scenario]\n",

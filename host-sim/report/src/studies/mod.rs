@@ -7,6 +7,7 @@ pub mod compare;
 pub mod course;
 mod curves;
 pub mod design;
+pub mod design_guidance;
 pub mod drivers;
 pub mod evaluation;
 pub mod experiment;

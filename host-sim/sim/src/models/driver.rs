@@ -38,6 +38,8 @@ pub struct DriverParameters {
     /// For how long the ECU asks for a hand before the driver moves the wheel, s; infinite: never. Our own choice: so late
     /// that nothing differs from the paper's drives but where guidance would end.
     pub answers_hands_off_after_s: f64,
+    /// The driver's own line, m left of the lane's middle.
+    pub line_m: f64,
 }
 
 /// How the arm weighs vision against the guidance torque.
@@ -69,6 +71,7 @@ impl Default for DriverParameters {
             remnant_sd_nm: 0.0,
             remnant_corner_hz: 0.5,
             answers_hands_off_after_s: 14.0,
+            line_m: 0.0,
         }
     }
 }
@@ -94,7 +97,13 @@ impl DriverParameters {
             self.answers_hands_off_after_s,
             0.0..=f64::INFINITY,
             "s",
-        )
+        )?;
+        in_range("line", self.line_m, -2.0..=2.0, "m")
+    }
+
+    /// The line, m right of the middle: what is taken off e_y, which leaves it as it is to the sign of a zero where there is none.
+    pub fn right_m(&self) -> f64 {
+        0.0 - self.line_m
     }
 }
 
@@ -104,6 +113,7 @@ pub struct Vision {
     a_1: f64,
     a_2: f64,
     a_3: f64,
+    right_m: f64,
     integral: f64,
     last_e_y_m: f64,
     delay: Delay,
@@ -116,21 +126,24 @@ impl Vision {
             a_1: parameters.a_1,
             a_2: parameters.a_2,
             a_3: parameters.a_3,
+            right_m: parameters.right_m(),
             integral: 0.0,
             last_e_y_m: 0.0,
             delay: Delay::new(parameters.t_p),
         }
     }
 
-    /// From here on with the weights and the delay of other parameters; what was seen stays seen.
+    /// From here on with the weights, the line and the delay of other parameters; what was seen stays seen.
     pub fn change(&mut self, to: &DriverParameters) {
         (self.a_1, self.a_2, self.a_3) = (to.a_1, to.a_2, to.a_3);
+        self.right_m = to.right_m();
         self.delay.change(to.t_p);
     }
 
     /// Takes the errors of this step; returns phi_target at the end of the step, rad.
     #[inline]
     pub fn step(&mut self, e_y_m: f64, e_theta_rad: f64) -> f64 {
+        let e_y_m = e_y_m - self.right_m;
         self.integral += 0.5 * STEP_S * (e_y_m + self.last_e_y_m);
         self.last_e_y_m = e_y_m;
         self.delay
@@ -279,14 +292,15 @@ mod tests {
     fn vision_weighs_error_integral_and_yaw() {
         let parameters = DriverParameters {
             t_p: 0.001,
+            line_m: 0.1,
             ..Default::default()
         };
         let mut vision = Vision::new(&parameters);
         let mut target = 0.0;
         for _ in 0..2001 {
-            target = vision.step(0.4, -0.02);
+            target = vision.step(0.3, -0.02);
         }
-        // 0.1*0.4 + 0.05*(0.4*2 s + the first half step, 0.0002) - 3.7*0.02
+        // e_y to a line 0.1 m further left: 0.1*0.4 + 0.05*(0.4*2 s + the first half step, 0.0002) - 3.7*0.02
         assert!(
             (target - (0.04 + 0.05 * 0.8002 - 0.074)).abs() < 1e-12,
             "{target}"

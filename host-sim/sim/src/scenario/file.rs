@@ -69,6 +69,7 @@ pub(super) fn parse(
             remnant_sd_nm: file.driver.remnant_sd,
             remnant_corner_hz: file.driver.remnant_corner,
             answers_hands_off_after_s: file.driver.answers_hands_off_after,
+            line_m: file.driver.line,
         })
         .gains(gains)
         .manual_k_d(file.driver.manual_k_d)
@@ -136,6 +137,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
             remnant_sd: d.remnant_sd_nm,
             remnant_corner: d.remnant_corner_hz,
             answers_hands_off_after: d.answers_hands_off_after_s,
+            line: d.line_m,
         },
         vehicle: *vehicle,
         guidance: GuidanceFile(*guidance),
@@ -320,6 +322,7 @@ struct DriverFile {
     remnant_sd: f64,
     remnant_corner: f64,
     answers_hands_off_after: f64,
+    line: f64,
 }
 
 impl Default for DriverFile {
@@ -336,6 +339,7 @@ impl Default for DriverFile {
             remnant_sd_nm,
             remnant_corner_hz,
             answers_hands_off_after_s,
+            line_m,
         } = DriverParameters::default();
         Self {
             a_1,
@@ -352,6 +356,7 @@ impl Default for DriverFile {
             remnant_sd: remnant_sd_nm,
             remnant_corner: remnant_corner_hz,
             answers_hands_off_after: answers_hands_off_after_s,
+            line: line_m,
         }
     }
 }

@@ -1,0 +1,74 @@
+//! `host-sim design-guidance FILE.toml`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use haptic_batch::compare::on_threads;
+use haptic_batch::design_guidance::{DesignGuidance, Evaluated};
+use haptic_report::document::{Provenance, write_file};
+use haptic_report::studies::design_guidance::{parameters, report};
+use serde_json::json;
+
+use super::checkpoint::Checkpoint;
+use super::output;
+use super::results::ResultArguments;
+use super::{BadInput, Outcome, progress};
+
+const OUT: &str = "Directory: every set that was driven, report, results and chosen.toml, which `run` and `ecu parameters` take. A search that was interrupted goes on where it was";
+/// The sets that were driven, a line each.
+const SETS: &str = "sets.jsonl";
+
+#[derive(Debug, Args)]
+#[command(mut_arg("out", |out| out.default_value("out/design-guidance").help(OUT)))]
+pub(super) struct Arguments {
+    /// Design file (TOML): drivers, roads, speeds, seeds, bars (docs/how-to/design-guidance.md)
+    #[arg(value_name = "FILE.toml")]
+    file: PathBuf,
+    /// The share of drivers with a line of their own in the search, in place of the file's; the judgement keeps the file's
+    #[arg(long, value_name = "SHARE")]
+    own_line_share: Option<f64>,
+    /// The row of the report whose set chosen.toml has
+    #[arg(long, value_name = "ROW", default_value_t = 1)]
+    choose: u32,
+    /// Threads; default: one a core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    #[command(flatten)]
+    results: ResultArguments,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+    let design = DesignGuidance::load(&arguments.file, arguments.own_line_share)?;
+    let chosen = design.row(arguments.choose)?;
+    let out = arguments.results.directory();
+    output::check(out, "design-guidance", &[SETS])?;
+    let fail = |e: std::io::Error| BadInput(format!("{}: {e}", out.display()));
+    std::fs::create_dir_all(out).map_err(fail)?;
+    let heading = json!({
+        "study": "design-guidance",
+        "design": format!("{:016x}", design.identity()),
+        "provenance": Provenance::of(None),
+    });
+    let (checkpoint, known) =
+        Checkpoint::open::<Evaluated>(&out.join(SETS), &serde_json::to_string(&heading)?)?;
+    output::keeps(format!(
+        "{} keeps every set that was driven; the same command goes on from there.",
+        out.display()
+    ))?;
+    let output = arguments.results.begin_beside("design-guidance", &[SETS])?;
+    let bar = progress::bar(design.sets(), "sets");
+    bar.inc(known.len() as u64);
+    let results = on_threads(arguments.threads, || {
+        design.run(&known, |set| {
+            bar.inc(1);
+            checkpoint.add(set)
+        })
+    })??;
+    bar.finish_and_clear();
+    if let Some(place) = output.place() {
+        let text = parameters(&results, chosen);
+        write_file(&place.join("chosen.toml"), |file| file.write_all(text.as_bytes()))?;
+    }
+    let report = report(&results, chosen);
+    output.show(&report, &report.stamp(&results), true)
+}

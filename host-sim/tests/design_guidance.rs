@@ -1,0 +1,80 @@
+//! `host-sim design-guidance`: the same bytes for any number of threads and after an interrupt; a choice that `run` takes.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const FILE: &str = "
+name = 'short'
+law = 'paper'
+[population]
+participants = [2, 13]
+own_line_share = 0.5
+own_line_m = 0.3
+[search]
+budget = 8
+stretch = [[1, 1]]
+scales = [[0.5, 9], [0.5, 2], [0.5, 2], [0.5, 2]]
+[training]
+seeds = 1
+roads = ['road.toml']
+speeds_kmh = [60]
+losses = 1
+[held_out]
+seeds = 1
+roads = ['road.toml']
+speeds_kmh = [50]
+losses = 1
+";
+
+fn host_sim(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    command.args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn design(folder: &Path, arguments: &[&str]) -> Output {
+    host_sim(folder, &[&["design-guidance", "design.toml"], arguments].concat())
+}
+
+#[test]
+fn a_design_leaves_the_same_bytes_on_any_threads_and_behind_an_interrupt() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let road = "[[segment]]\nlength = 100\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+    fs::write(folder.join("road.toml"), road).unwrap();
+    fs::write(folder.join("design.toml"), FILE).unwrap();
+    let sets = |place: &str| fs::read_to_string(folder.join(place).join("sets.jsonl")).unwrap();
+    for place in ["1", "2", "cut"] {
+        if place == "cut" {
+            // What an interrupt leaves: some sets, and a part of a line.
+            let whole = sets("1");
+            fs::create_dir(folder.join(place)).unwrap();
+            fs::write(folder.join("cut/sets.jsonl"), &whole[..whole.len() / 2]).unwrap();
+        }
+        let threads = if place == "2" { "2" } else { "1" };
+        let output = design(folder, &["--threads", threads, "--out", place]);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{error}");
+        for file in [
+            "sets.jsonl",
+            "results.json",
+            "report.html",
+            "front.svg",
+            "chosen.toml",
+        ] {
+            let [one, other] = ["1", place].map(|place| fs::read(folder.join(place).join(file)).unwrap());
+            assert!(one == other, "{place}: {file}");
+        }
+    }
+    let another = design(folder, &["--own-line-share", "0", "--out", "1"]);
+    assert_eq!(another.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&another.stderr).contains("belongs to another study"));
+    let wrong = design(folder, &["--own-line-share", "1.5", "--out", "wrong"]);
+    assert_eq!(
+        String::from_utf8_lossy(&wrong.stderr).trim_end(),
+        "error: design.toml: population.own_line_share = 1.5 is outside 0 to 1"
+    );
+    assert!(!folder.join("wrong").exists());
+    let run = host_sim(folder, &["run", "1/chosen.toml"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
