@@ -126,7 +126,7 @@ fn the_other_layouts_are_read_or_say_what_their_recordings_lack() {
 fn a_file_that_is_cut_or_lacks_a_column_is_refused() {
     let nothing = |_: &[String], _: usize, _: &mut Vec<String>| {};
     let error = spoiled(nothing, Some(60_000)).unwrap_err();
-    assert!(error.contains("fields where the header has 12"), "{error}");
+    assert!(error.contains("fields where the header has 13"), "{error}");
     let text = std::fs::read_to_string(recording("openlka.csv")).unwrap();
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("lacks.csv");

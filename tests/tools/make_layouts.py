@@ -97,8 +97,10 @@ def main(host_sim):
     signals = openpilot_like(d, random, shared)
     jitter = random.uniform(-0.001, 0.001, 1600)
     time = {"Time": (100 + 0.1 * np.arange(1600) + jitter).round(4)}
+    driven = signals["speed"] * signals["driven"]
+    yaw = {"body_yaw_angle": (0.1 * np.cumsum(driven)).round(5)}
     wrong = {"steer_torque_driver": (20_000 + random.normal(0, 300, 1600)).round(1)}
-    write("openlka.csv", time | {OPENLKA[name]: values for name, values in signals.items()} | wrong)
+    write("openlka.csv", time | {OPENLKA[name]: values for name, values in signals.items()} | wrong | yaw)
 
     d = rows(guided, 20, 15)
     signals = openpilot_like(d, random, np.ones(300))

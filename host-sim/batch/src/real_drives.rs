@@ -4,20 +4,29 @@
 //! The variance accounted for is 1 - var(T_d - prediction)/var(T_d): the mean of the half is free, for sensors have offsets. Our
 //! driver's prediction is the simulated torque, without the disturbance model.
 
+mod fed;
+mod hands;
+mod linear;
+#[cfg(test)]
+mod tests;
+
 use std::path::{Path, PathBuf};
 
 use haptic_analysis::identify::{
     DriveLog, Identification, Layout, Options, Parameter, Recording, identify_with_noise_model, open_mapped,
 };
 use haptic_log::formats::{self, Format};
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use fed::fed;
+pub use fed::{End, Ending, Fed, Feed};
+pub use hands::Hands;
+use hands::{Felt, Rows};
+use linear::linear;
+
 /// Circular shifts of the guidance torque that K_hg is held against.
 const SHIFTS: usize = 99;
-/// Regressors of the plain linear driver: angle, its rate and acceleration, lateral error, its rate, guidance, a constant.
-const REGRESSORS: usize = 7;
 /// Fewest rows of a half that is judged: 4 s at 10 Hz.
 const LEAST_ROWS: usize = 40;
 
@@ -28,6 +37,8 @@ pub struct RealDrives {
     pub sources: Vec<Source>,
     /// Every recording, by hand and shared, or once if it was refused as a whole.
     pub drives: Vec<RealDrive>,
+    /// Hands on the wheel, by the recordings with torque, lane and a sign of who steers; none without any.
+    pub hands: Option<Hands>,
 }
 
 /// Where recordings come from.
@@ -109,12 +120,12 @@ pub fn real_drives(directory: &Path) -> Result<RealDrives, String> {
             directory.display()
         ));
     }
-    let found: Vec<(Option<&Layout>, Vec<RealDrive>)> = files
+    let found: Vec<Judged<'_>> = files
         .par_iter()
         .map(|path| of_file(directory, path, &layouts))
         .collect();
     let mut sources: Vec<Source> = Vec::new();
-    for layout in found.iter().filter_map(|(layout, _)| *layout) {
+    for layout in found.iter().filter_map(|file| file.layout) {
         let source = Source {
             layout: layout.name.clone(),
             source: layout.source.clone(),
@@ -125,10 +136,19 @@ pub fn real_drives(directory: &Path) -> Result<RealDrives, String> {
             sources.push(source);
         }
     }
+    let felt: Vec<&(Felt, Vec<Fed>)> = found.iter().filter_map(|file| file.hands.as_ref()).collect();
     Ok(RealDrives {
         sources,
-        drives: found.into_iter().flat_map(|(_, drives)| drives).collect(),
+        hands: Hands::of(&felt),
+        drives: found.into_iter().flat_map(|file| file.drives).collect(),
     })
+}
+
+/// What a file showed.
+struct Judged<'a> {
+    layout: Option<&'a Layout>,
+    drives: Vec<RealDrive>,
+    hands: Option<(Felt, Vec<Fed>)>,
 }
 
 fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
@@ -143,11 +163,17 @@ fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> (Option<&'a Layout>, Vec<RealDrive>) {
+fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'a> {
+    let refused = |drive| Judged {
+        layout: None,
+        drives: vec![drive],
+        hands: None,
+    };
+    let file = path.strip_prefix(directory).unwrap_or(path).display().to_string();
     let drive = |layout: &str, by_hand, found: Result<Found, String>| {
         let (refused, found) = found.map_or_else(|why| (Some(why), None), |found| (None, Some(found)));
         RealDrive {
-            file: path.strip_prefix(directory).unwrap_or(path).display().to_string(),
+            file: file.clone(),
             layout: layout.into(),
             by_hand,
             refused,
@@ -156,7 +182,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> (Option<
     };
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) => return (None, vec![drive("", true, Err(error.to_string()))]),
+        Err(error) => return refused(drive("", true, Err(error.to_string()))),
     };
     let format = Format::of(path).ok();
     let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format)) else {
@@ -165,8 +191,15 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> (Option<
             Err(error) if !error.to_string().contains("there is no channel time_s") => error.to_string(),
             _ => "it has the channels of no layout that needs no --map".to_owned(),
         };
-        return (None, vec![drive("", true, Err(why))]);
+        return refused(drive("", true, Err(why)));
     };
+    let rows = Rows::of(layout, &bytes, format);
+    let hands = rows.map(|rows| {
+        (
+            Felt::of(&rows),
+            Feed::ALL.map(|feed| fed(&rows, feed, &file)).into(),
+        )
+    });
     let judged = |by_hand| {
         let how = Recording {
             manual: by_hand,
@@ -184,8 +217,12 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> (Option<
     let [hand, shared] = &parts;
     // What is wrong with the file as a whole is said once.
     let same = hand.refused.is_some() && hand.refused == shared.refused;
-    let parts = parts.into_iter().take(if same { 1 } else { 2 }).collect();
-    (Some(layout), parts)
+    let drives = parts.into_iter().take(if same { 1 } else { 2 }).collect();
+    Judged {
+        layout: Some(layout),
+        drives,
+        hands,
+    }
 }
 
 fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, String> {
@@ -282,38 +319,6 @@ fn variance(values: impl Iterator<Item = f64> + Clone) -> f64 {
 fn accounted(measured: &[f64], predicted: &[f64]) -> f64 {
     let left = measured.iter().zip(predicted).map(|(m, p)| m - p);
     1.0 - variance(left) / variance(measured.iter().copied())
-}
-
-/// A row of the regression, and what it is to explain; none beside a gap.
-fn regressors(log: &DriveLog, k: usize) -> Option<([f64; REGRESSORS], f64)> {
-    let (before, after) = (k.checked_sub(1)?, k + 1);
-    (after < log.len()).then_some(())?;
-    let (phi, e_y, dt) = (&log.wheel_angle_rad, &log.e_y_m, log.dt_s);
-    let x = [
-        phi[k],
-        (phi[after] - phi[before]) / (2.0 * dt),
-        (phi[after] - 2.0 * phi[k] + phi[before]) / (dt * dt),
-        e_y[k],
-        (e_y[after] - e_y[before]) / (2.0 * dt),
-        log.guidance_torque_nm[k],
-        1.0,
-    ];
-    let y = log.driver_torque_nm[k];
-    (y + x.iter().sum::<f64>()).is_finite().then_some((x, y))
-}
-
-/// The variance that a linear regression on some rows accounts for on others.
-fn linear(log: &DriveLog, own: &[usize], other: &[usize]) -> Option<f64> {
-    let rows = |rows: &[usize]| -> Vec<_> { rows.iter().filter_map(|k| regressors(log, *k)).collect() };
-    let (own, other) = (rows(own), rows(other));
-    let x = DMatrix::from_fn(own.len(), REGRESSORS, |k, i| own[k].0[i]);
-    let y = DVector::from_iterator(own.len(), own.iter().map(|row| row.1));
-    let weights = x.svd(true, true).solve(&y, 1e-10).ok()?;
-    let (measured, predicted): (Vec<f64>, Vec<f64>) = other
-        .iter()
-        .map(|(x, y)| (*y, x.iter().zip(weights.iter()).map(|(x, w)| x * w).sum::<f64>()))
-        .unzip();
-    Some(accounted(&measured, &predicted))
 }
 
 /// How often the same guidance torque at another time gives at least this K_hg.

@@ -1,5 +1,6 @@
 //! The drives of legs: with guidance and by hand, side by side where that can be.
 
+use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
 use haptic_core::faults::{Fault, FaultSet};
@@ -23,6 +24,9 @@ const AGAIN_MS: u32 = 5000;
 /// A request that was not granted is taken back for 100 ms in every second.
 const ASKS_EVERY_MS: u32 = 1000;
 const LOW_MS: u32 = 100;
+
+/// In place of faults where the ECU named none.
+pub(crate) const UNNAMED: &str = "none named";
 
 /// Drives legs, side by side where that can be, both with guidance and by hand; `done` gets each with its place, in no order. A run
 /// that is vectorised with guidance is one in which the ECU leaves nothing.
@@ -153,9 +157,11 @@ fn run_of(samples: Vec<Sample>, ending: Option<Ending>, steps: u32) -> Run {
 }
 
 /// Driver, host and listener of a leg.
-struct Watch {
+pub(crate) struct Watch {
     receiver: ReceiverState,
-    reported: Reported,
+    pub(crate) reported: Reported,
+    /// The last frame of the ECU.
+    pub(crate) said: Option<GuidanceMessage>,
     faults: FaultSet,
     /// Steps since guidance left; none while it is there.
     away: Option<u32>,
@@ -165,19 +171,20 @@ struct Watch {
 }
 
 /// What the ECU did in a leg.
-pub(super) struct Reported {
+pub(crate) struct Reported {
     /// At its end.
-    pub(super) mode: Mode,
+    pub(crate) mode: Mode,
     /// Steps with guidance.
-    pub(super) active: u32,
+    pub(crate) active: u32,
     /// What took guidance away.
-    pub(super) declarations: Vec<Declaration>,
+    pub(crate) declarations: Vec<Declaration>,
 }
 
 impl Watch {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             receiver: ReceiverState::TRUSTED,
+            said: None,
             reported: Reported {
                 mode: Mode::Active,
                 active: 0,
@@ -192,31 +199,39 @@ impl Watch {
 
     /// What driver and host do next.
     fn action(&self) -> Action {
-        let engage = match self.away {
-            None => true,
-            // A handover goes on while the request stays.
-            Some(_) if self.reported.mode != Mode::Standby => true,
-            Some(away) => away >= AGAIN_MS && away % ASKS_EVERY_MS >= LOW_MS,
-        };
         Action {
-            engage: Some(engage),
+            engage: Some(self.engages()),
             ..Action::default()
         }
     }
 
+    /// Whether guidance is asked for.
+    pub(crate) fn engages(&self) -> bool {
+        match self.away {
+            None => true,
+            // A handover goes on while the request stays.
+            Some(_) if self.reported.mode != Mode::Standby => true,
+            Some(away) => away >= AGAIN_MS && away % ASKS_EVERY_MS >= LOW_MS,
+        }
+    }
+
     fn observe(&mut self, outcome: &Outcome) {
-        self.steps += 1;
         if let Some(sample) = outcome.sample {
             let v = sample.speed_m_per_s;
             self.lateral_m_per_s2 = sample.curvature_1pm * v * v;
         }
-        let frame = outcome.frames_out.first();
+        self.hear(outcome.time_s(), outcome.frames_out.first());
+    }
+
+    /// Takes the guidance frame of a step.
+    pub(crate) fn hear(&mut self, time_s: f64, frame: Option<&Frame>) {
+        self.steps += 1;
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {
             if self.reported.mode == Mode::Active && guidance.mode != Mode::Active {
                 let named = guidance.faults.without(self.faults);
                 self.reported.declarations.push(Declaration {
-                    time_s: outcome.time_s(),
+                    time_s,
                     faults: names(if named == FaultSet::NONE {
                         guidance.faults
                     } else {
@@ -226,6 +241,7 @@ impl Watch {
                 });
             }
             (self.reported.mode, self.faults) = (guidance.mode, guidance.faults);
+            self.said = Some(guidance);
         }
         if self.reported.mode == Mode::Active {
             (self.reported.active, self.away) = (self.reported.active + 1, None);
@@ -242,7 +258,7 @@ fn names(faults: FaultSet) -> String {
         .map(|fault| format!("{fault:?}"))
         .collect();
     if named.is_empty() {
-        return "none named".into();
+        return UNNAMED.into();
     }
     named.join("+")
 }

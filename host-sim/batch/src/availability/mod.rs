@@ -24,6 +24,7 @@ use haptic_sim::worlds::WorldKind;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+pub(crate) use drive::{UNNAMED, Watch};
 pub use leg::{ByHand, Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
 

@@ -1,5 +1,7 @@
 //! Recordings of real people: what was read and refused, and who predicts the driver's torque best.
 
+mod hands;
+
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::real_drives::{Found, Half, RealDrive, RealDrives};
@@ -9,8 +11,10 @@ const PARAMETERS: [&str; 5] = ["gain_1", "gain_2", "gain_3", "t_p", "k_hg"];
 
 /// The document of recordings.
 pub fn report(found: &RealDrives) -> Report {
+    let hands = found.hands.as_ref().map(hands::section);
     let sections = [
         ("Summary", summary(found)),
+        ("Hands and override", hands.unwrap_or_default()),
         (
             "Drives",
             vec![
@@ -31,7 +35,11 @@ pub fn report(found: &RealDrives) -> Report {
         summary: "A driver is fitted to one half of each drive and judged on the other. VAF is the variance accounted for: 1 is \
                   all, 0 is what the mean does."
             .into(),
-        sections: sections.map(|(heading, blocks)| Section::new(heading, blocks)).into(),
+        sections: sections
+            .into_iter()
+            .filter(|(_, blocks)| !blocks.is_empty())
+            .map(|(heading, blocks)| Section::new(heading, blocks))
+            .collect(),
         ..Report::default()
     }
 }

@@ -20,7 +20,7 @@ use haptic_log::units;
 use super::bus_trace;
 use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
 use instants::at_the_torque;
-pub use layout::Layout;
+pub use layout::{Layout, Table};
 pub use mapping::Mapping;
 
 /// What can be mapped: the columns that a log must have, and the speed.

@@ -17,7 +17,9 @@ use serde::Deserialize;
 use super::super::bus_trace;
 use super::{DriveLog, LogError, Mapping, NAMES, SPEED_COLUMN, UNITS, of_channels};
 use checks::counted;
-use points::{Table, slopes, two_points};
+use points::{SLOPE_S, slopes, two_points};
+
+pub use points::Table;
 
 const BUILT_IN: [(&str, &str); 5] = [
     ("openlka", include_str!("../../../../layouts/openlka.toml")),
@@ -130,29 +132,14 @@ impl Layout {
         maps: &[Mapping],
         how: &bus_trace::Recording<'_>,
     ) -> Result<(DriveLog, Vec<String>), String> {
-        let (time_s, mut table) = self.table(bytes, format, maps)?;
-        let rows = time_s.len();
-        let seconds = time_s.last().zip(time_s.first()).map_or(0.0, |(b, a)| b - a);
-        let dt_s = seconds / rows.saturating_sub(1).max(1) as f64;
-        self.within_limits(&table)?;
-        if let Some(missing) = &self.missing {
-            return Err(format!(
-                "{rows} rows of {seconds:.1} s are read, but {} recordings lack {missing}: no driver can be identified",
-                self.name
-            ));
-        }
-        if let Some(k) = time_s.windows(2).position(|w| w[1].is_nan() || w[1] <= w[0]) {
-            let (from, to) = (time_s[k], time_s[k + 1]);
-            return Err(format!(
-                "row {}: the time goes from {from} to {to}: it must grow",
-                k + 2
-            ));
-        }
+        let (time_s, mut table) = self.signals(bytes, format, maps)?;
+        let (dt_s, seconds) = step_of(&time_s);
         if let Some(speed) = table.get(SPEED_COLUMN) {
             let rate = slopes(speed, dt_s);
             two_points(&mut table, dt_s);
             table.insert("speed_rate".into(), rate);
         }
+        let renewed_s = table.get("offset_m").map_or(0.0, |lane| renewed_s(lane, dt_s));
         let causes = self.causes(&time_s, &table, how.manual);
         let is_free: Vec<bool> = causes.iter().map(Option::is_none).collect();
         self.slopes_agree(&table, &is_free)?;
@@ -189,10 +176,45 @@ impl Layout {
         log.findings.extend(findings);
         notes.push(format!("Layout {}; {}, {}", self.name, self.source, self.licence));
         notes.extend(self.note.clone());
+        if renewed_s > SLOPE_S {
+            notes.push(format!(
+                "The lane is new every {renewed_s:.1} s only, and held in between: e_y is as old as that"
+            ));
+        }
         if self.tried_on.is_none() {
             notes.push(format!("Layout {} is untested: no file could be had", self.name));
         }
         Ok((log, notes))
+    }
+
+    /// The time and the columns of a file's bytes, every row, within the limits.
+    ///
+    /// # Errors
+    /// A file that has not these columns, that lacks what the layout says, or whose values or time are out of their range.
+    pub fn signals(
+        &self,
+        bytes: &[u8],
+        format: Option<Format>,
+        maps: &[Mapping],
+    ) -> Result<(Vec<f64>, Table), String> {
+        let (time_s, table) = self.table(bytes, format, maps)?;
+        let (_, seconds) = step_of(&time_s);
+        self.within_limits(&table)?;
+        if let Some(missing) = &self.missing {
+            let rows = time_s.len();
+            return Err(format!(
+                "{rows} rows of {seconds:.1} s are read, but {} recordings lack {missing}: no driver can be identified",
+                self.name
+            ));
+        }
+        if let Some(k) = time_s.windows(2).position(|w| w[1].is_nan() || w[1] <= w[0]) {
+            let (from, to) = (time_s[k], time_s[k + 1]);
+            return Err(format!(
+                "row {}: the time goes from {from} to {to}: it must grow",
+                k + 2
+            ));
+        }
+        Ok((time_s, table))
     }
 
     /// The time and the columns, those mapped by the caller in place of the layout's.
@@ -246,6 +268,18 @@ impl Layout {
         let group = recording.groups.into_iter().next().unwrap_or_default();
         Ok((group.time_s, table))
     }
+}
+
+/// The mean time between two rows, and of all, s.
+fn step_of(time_s: &[f64]) -> (f64, f64) {
+    let seconds = time_s.last().zip(time_s.first()).map_or(0.0, |(b, a)| b - a);
+    (seconds / time_s.len().saturating_sub(1).max(1) as f64, seconds)
+}
+
+/// How long a signal keeps a value, s: the mean.
+fn renewed_s(signal: &[f64], dt_s: f64) -> f64 {
+    let values = signal.chunk_by(|a, b| a == b).count();
+    dt_s * signal.len() as f64 / values.max(1) as f64
 }
 
 /// `CHANNEL` or `CHANNEL*SCALE`.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::SPEED_COLUMN;
 
 /// Columns by their names.
-pub(super) type Table = BTreeMap<String, Vec<f64>>;
+pub type Table = BTreeMap<String, Vec<f64>>;
 
 /// The driver's near and far point ahead, s (table 4).
 const POINTS_S: [f64; 2] = [0.3, 1.0];

@@ -46,3 +46,10 @@ fn a_line_has_the_slope_of_least_squares() {
     let (slope, correlation) = line(&pairs);
     assert!((slope - 1.2).abs() < 1e-12 && (correlation - 12.0 / 160.0_f64.sqrt()).abs() < 1e-12);
 }
+
+#[test]
+fn how_old_a_held_signal_gets_is_the_mean_time_between_two_values() {
+    // Three values in 0.6 s.
+    let held = super::renewed_s(&[1.0, 1.0, 1.0, 2.0, 2.0, 1.0], 0.1);
+    assert!((held - 0.2).abs() < 1e-12, "{held}");
+}

@@ -1,0 +1,155 @@
+//! Hands and override on recordings of real people.
+
+use crate::document::{Block, Cell, Table};
+use crate::plot::{Axis, Figure, Panel, Series};
+use haptic_batch::real_drives::{End, Ending, Fed, Feed, Hands};
+
+/// The section's blocks.
+pub(super) fn section(hands: &Hands) -> Vec<Block> {
+    let [by_hand, shared] = hands.seconds;
+    let [felt_by_hand, felt_shared] = hands.own().felt.map(|share| 100.0 * share);
+    let [low, high] = hands.area_95;
+    let [taps, short, long] = hands.pushes;
+    let text = format!(
+        "{} recordings have a torque in N.m and say who steers: {by_hand} s by hand and {shared} s shared, above 8 m/s. Where the hands \
+         are none says. By hand one is on the wheel; in shared driving it is not known, and the torsion bar feels the motor. By the ECU's \
+         threshold a hand is felt in {felt_by_hand:.1} % of the seconds by hand and in {felt_shared:.1} % of the shared ones; the longest \
+         shared time without is {:.1} s, and the warning comes after 15 s. The area under the curve is {:.2} ({low:.2} to {high:.2}): how well \
+         the torque tells the two ways of driving apart, not hands from none. Nothing says which pushes are a driver's override: of those \
+         above 0.8 N.m against the guidance {taps} last up to 0.2 s, {short} up to 1 s and {long} longer.",
+        hands.recordings, hands.longest_s, hands.area
+    );
+    vec![
+        Block::Text(text),
+        Block::figure(
+            "hands",
+            curve(hands),
+            "Seconds in which a hand is felt, by the threshold: the ECU's own code with 1/8 to 64 times its thresholds of 0.08 N.m (change) \
+             and 0.35 N.m (size). Top right the lowest one.",
+        ),
+        Block::Table(hours(hands)),
+        Block::Table(endings(hands)),
+        Block::Table(ends(hands)),
+    ]
+}
+
+fn curve(hands: &Hands) -> Figure {
+    let point = |felt: [f64; 2]| (100.0 * felt[1], 100.0 * felt[0]);
+    let all = hands.curve.iter().map(|threshold| point(threshold.felt));
+    let all = std::iter::once((100.0, 100.0))
+        .chain(all)
+        .chain([(0.0, 0.0)])
+        .collect();
+    Figure {
+        x: Axis::of("felt in shared driving", "%").within(0.0, 100.0),
+        panels: vec![Panel {
+            title: String::new(),
+            y: Axis::of("felt by hand", "%").within(0.0, 102.0),
+            series: vec![
+                Series::line("no difference", 0, vec![(0.0, 0.0), (100.0, 100.0)]),
+                Series::line("by threshold", 1, all),
+                Series::dots("the ECU's threshold", 2, vec![point(hands.own().felt)]),
+            ],
+        }],
+        ..Figure::default()
+    }
+}
+
+fn between(feed: Feed) -> Cell {
+    Cell::text(match feed {
+        Feed::Line => "on a line",
+        Feed::Held => "held",
+        Feed::Nothing => "nothing sent",
+    })
+}
+
+fn hours(hands: &Hands) -> Table {
+    let row = |fed: &Fed| {
+        let [by_hand, shared] = [0, 1].map(|part| [fed.hours[part], fed.guided_h[part]]);
+        let mut cells = vec![between(fed.feed)];
+        cells.extend([by_hand, shared].concat().into_iter().map(|h| Cell::number(h, 4)));
+        cells.push(Cell::number(3600.0 * fed.overridden_h, 2));
+        cells
+    };
+    Table::new(
+        "The recordings as frames of the ECU's bus at its own rates; between two rows of 0.1 s the values are on a line or held, or nothing is \
+         sent. Guidance is asked for throughout, and again 5 s after each end; the torque is the recorded one.",
+        [
+            "Between rows",
+            "By hand, h",
+            "guided, h",
+            "Shared, h",
+            "guided, h",
+            "Overridden, s",
+        ],
+        hands.feeds.iter().map(row),
+    )
+}
+
+fn endings(hands: &Hands) -> Table {
+    let row = |(fed, end): (&Fed, &Ending)| {
+        let rates = end.rates.iter().flat_map(|rate| {
+            let [low, high] = rate.interval;
+            [
+                Cell::number(rate.count as f64, 0),
+                Cell::number(rate.per_hour, 1),
+                Cell::number(low, 1),
+                Cell::number(high, 1),
+            ]
+        });
+        [between(fed.feed), Cell::text(&end.faults)]
+            .into_iter()
+            .chain(rates)
+            .collect::<Vec<_>>()
+    };
+    let all = hands
+        .feeds
+        .iter()
+        .flat_map(|fed| fed.endings.iter().map(move |end| (fed, end)));
+    Table::new(
+        "What would have ended guidance, in an hour with it, with the 95 % interval of a Poisson rate. The recordings have no lane at a camera's \
+         rate, no second speed and no report of the motor. The lane is the way that the vehicle goes, the speed is sent twice, the motor does \
+         what the ECU says: what checks these cannot act. Slower than 5 m/s is no fault and not counted.",
+        [
+            "Between rows",
+            "Ended by",
+            "By hand",
+            "1/h",
+            "from",
+            "to",
+            "Shared",
+            "1/h",
+            "from",
+            "to",
+        ],
+        all.map(row),
+    )
+}
+
+fn ends(hands: &Hands) -> Table {
+    let row = |end: &End| {
+        vec![
+            Cell::text(&end.file),
+            Cell::text(if end.shared { "shared" } else { "by hand" }),
+            Cell::number(end.time_s, 1),
+            Cell::text(&end.faults),
+            Cell::number(end.driver_nm, 2),
+            Cell::number(end.guidance_nm, 2),
+            Cell::number(end.wheel_deg, 1),
+        ]
+    };
+    let on_a_line = hands.feeds.iter().filter(|fed| fed.feed == Feed::Line);
+    Table::new(
+        "Each end with values on a line: the mean torques of the second before it, and how far the wheel turned in it.",
+        [
+            "Recording",
+            "Driving",
+            "At, s",
+            "Ended by",
+            "T_d, N.m",
+            "T_h, N.m",
+            "Wheel, deg",
+        ],
+        on_a_line.flat_map(|fed| &fed.ends).map(row),
+    )
+}
