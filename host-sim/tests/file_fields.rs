@@ -219,7 +219,7 @@ fn every_range_of_a_scenario_is_the_codes() {
             );
         }
     }
-    assert_eq!(numbers, 93, "fields with a range of numbers");
+    assert_eq!(numbers, 94, "fields with a range of numbers");
 }
 
 #[test]
