@@ -180,7 +180,8 @@ async function drive() {
   check("nobody's hands", /nobody held the wheel|cannot be told|does not fit/.test(nobody) && !command_line.test(nobody), nobody);
   await whole("surprise", synthetic(truth));
   const failed = live.failed_s, torques = live.result().channels;
-  const after = torques.guidance.filter((_, i) => torques.time[i] > failed);
+  // A sample holds the torque of the millisecond before it, which may have begun before the failure.
+  const after = torques.guidance.filter((_, i) => torques.time[i] > failed + 1e-3);
   check("a failure unannounced", failed >= 12 && failed <= 52 && after.every(nm => nm === 0), `at ${failed.toFixed(1)} s`);
 
   // A page in the background, and a machine at a quarter of real time.
