@@ -302,6 +302,12 @@ pub(crate) fn check(options: &Options) -> Result<()> {
     });
     failed.extend(late.into_inner().unwrap_or_default());
     print_count();
+    if options.only.is_empty()
+        && let Err(error) = trace::by_execution(&logs())
+    {
+        println!("{error:#}");
+        failed.push("requirements, by what ran");
+    }
     println!("{} s in all", begin.elapsed().as_secs());
     ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
     Ok(())
@@ -345,12 +351,17 @@ fn in_its_own_process(stage: &Stage, begin: Instant) -> bool {
     true
 }
 
+/// Where each stage leaves its log.
+pub(crate) fn logs() -> std::path::PathBuf {
+    root().join("target/ci")
+}
+
 fn log_of(name: &str) -> std::path::PathBuf {
-    root().join("target/ci").join(format!("{name}.log"))
+    logs().join(format!("{name}.log"))
 }
 
 fn run_logged(name: &str, log: &std::path::Path) -> Result<()> {
-    fs::create_dir_all(root().join("target/ci"))?;
+    fs::create_dir_all(logs())?;
     let file = File::create(log).with_context(|| log.display().to_string())?;
     let this = std::env::current_exe().context("the path of xtask")?;
     run(Command::new(this)
@@ -361,7 +372,7 @@ fn run_logged(name: &str, log: &std::path::Path) -> Result<()> {
 }
 
 /// What a stage says last of itself.
-const PROCESSOR_TIME: &str = "processor time: ";
+pub(crate) const PROCESSOR_TIME: &str = "processor time: ";
 
 /// Of this process and of those that it waited for, where Linux says it: its fields 14 to 17 of `stat`, in hundredths of a
 /// second.

@@ -114,6 +114,9 @@ enum Command {
         /// Write docs/requirements.md.
         #[arg(long)]
         bless: bool,
+        /// Judge every requirement by what ran in the last `cargo xtask ci`; JUnit's XML in target/ci/requirements.xml.
+        #[arg(long)]
+        ran: bool,
     },
     /// Recordings of real people below a directory of the user's: `host-sim real-drives`, built for it.
     RealDrives {
@@ -183,7 +186,8 @@ fn main() -> ExitCode {
             Ok(code) => return code,
             Err(error) => Err(error),
         },
-        Command::Trace { bless } => trace::run(bless),
+        Command::Trace { ran: true, .. } => trace::by_execution(&ci::logs()),
+        Command::Trace { bless, .. } => trace::run(bless),
         Command::RealDrives { directory } => real_drives(&directory),
         Command::Book => book::build(),
         Command::Seal { elf } => seal::seal(&elf).map(|crc| println!("sealed with {crc:#010x}")),

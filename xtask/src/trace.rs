@@ -2,9 +2,10 @@
 //! that the documents list, limits, faults, rows of the campaign, mode transitions and parameters, needs a requirement.
 //! The documents' lists are held to the code by tests of their own.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
@@ -14,8 +15,19 @@ use crate::tool;
 const LIST: &str = "docs/requirements.toml";
 const PAGE: &str = "docs/requirements.md";
 const CLASSES: [&str; 7] = ["A", "B", "C", "D", "L", "R", "design"];
-/// Commands of `cargo xtask` that show something.
-const GATES: [&str; 5] = ["gate", "boards", "bench", "coverage", "mutants"];
+/// Commands of `cargo xtask` that show something, and the stage of `cargo xtask ci` that is each.
+const GATES: [(&str, &str); 5] = [
+    ("gate", "gate"),
+    ("boards", "boards"),
+    ("bench", "instructions"),
+    ("coverage", "coverage"),
+    ("mutants", "mutants"),
+];
+/// The tests that drive every row of the campaign, those on a target apart.
+const CAMPAIGN: [&str; 2] = [
+    "tests/faults.rs::every_fault_with_a_few_seeds_breaks_no_rule_and_no_handover_is_worse_than_a_drop",
+    "tests/faults_in_qemu.rs::*",
+];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -59,6 +71,143 @@ pub(crate) fn run(bless: bool) -> Result<()> {
         items.len()
     );
     Ok(())
+}
+
+/// Judges every requirement by what a run of `cargo xtask ci` left in its logs, and writes that as JUnit's XML beside
+/// them. A requirement is met if all its evidence ran and passed; evidence of `--full` alone that did not run is named.
+pub(crate) fn by_execution(logs: &Path) -> Result<()> {
+    let list: List = toml::from_str(&read(LIST)?).context(LIST)?;
+    let log = |stage: &str| fs::read_to_string(logs.join(format!("{stage}.log"))).ok();
+    let tests = log("tests").context("target/ci/tests.log: no run of cargo xtask ci")?;
+    let tests = outcomes(&tests);
+    let verdicts: Vec<Vec<(&str, Option<bool>)>> = list
+        .requirement
+        .iter()
+        .map(|r| {
+            let judged = |evidence: &'_ String| outcome(evidence, &tests, &log);
+            r.evidence.iter().map(|e| (e.as_str(), judged(e))).collect()
+        })
+        .collect();
+    let path = logs.join("requirements.xml");
+    fs::write(&path, junit(&list.requirement, &verdicts)).with_context(|| path.display().to_string())?;
+    let mut unmet = 0;
+    for (r, verdicts) in list.requirement.iter().zip(&verdicts) {
+        let failed = named(verdicts, Some(false));
+        if !failed.is_empty() {
+            unmet += 1;
+            eprintln!("{}: {failed} failed, or did not run", r.id);
+        }
+    }
+    let open = verdicts.iter().filter(|v| v.iter().any(|(_, ran)| ran.is_none()));
+    println!(
+        "{} requirements: {unmet} not met; {} of the others wait for a stage of --full; {}",
+        list.requirement.len(),
+        open.count(),
+        path.display()
+    );
+    ensure!(unmet == 0, "{unmet} requirements are not met");
+    Ok(())
+}
+
+/// Whether each test that a log of `cargo test` names passed; where a name stands for several, all of them.
+fn outcomes(log: &str) -> BTreeMap<&str, bool> {
+    let mut outcomes = BTreeMap::new();
+    for line in log.lines() {
+        if let Some((name, outcome)) = line
+            .strip_prefix("test ")
+            .and_then(|line| line.split_once(" ... "))
+        {
+            let passed = outcomes.entry(name).or_insert(true);
+            *passed &= outcome.starts_with("ok");
+        }
+    }
+    outcomes
+}
+
+/// Whether a piece of evidence ran and passed; none if its stage is one of `--full` and did not run.
+fn outcome(
+    evidence: &str,
+    tests: &BTreeMap<&str, bool>,
+    log: &dyn Fn(&str) -> Option<String>,
+) -> Option<bool> {
+    match evidence.split_once(' ') {
+        Some(("gate", name)) => {
+            let (_, stage) = GATES.iter().find(|(gate, _)| *gate == name)?;
+            // The last line of a stage that failed is its error.
+            let last = log(stage)?.lines().last().map(str::to_owned)?;
+            Some(last.starts_with(crate::ci::PROCESSOR_TIME))
+        }
+        Some(("test", place)) => Some(passed(place, tests)),
+        _ => Some(CAMPAIGN.iter().all(|place| passed(place, tests))),
+    }
+}
+
+fn passed(place: &str, tests: &BTreeMap<&str, bool>) -> bool {
+    let names = names(place);
+    let is_named = |test: &str| names.iter().flatten().any(|name| matches(name, test));
+    let mut ran = tests.iter().filter(|(test, _)| is_named(test)).peekable();
+    ran.peek().is_some() && ran.all(|(_, passed)| *passed)
+}
+
+/// What `cargo test` calls the test at `PATH::FUNCTION`: by its file's module, in a module `tests` of it, or bare where
+/// the file is a program of its own.
+fn names(place: &str) -> Option<[String; 3]> {
+    let (path, function) = place.split_once("::")?;
+    let (_, file) = path.split_once("/src/").or_else(|| path.split_once("tests/"))?;
+    let module = file
+        .trim_end_matches(".rs")
+        .trim_end_matches("/mod")
+        .replace('/', "::");
+    let inner = format!("{module}::tests::{function}");
+    Some(
+        [format!("{module}::{function}"), inner, function.to_owned()].map(|name| {
+            // Anything of a module is nothing that is bare.
+            if name == "*" { module.clone() } else { name }
+        }),
+    )
+}
+
+fn named(verdicts: &[(&str, Option<bool>)], outcome: Option<bool>) -> String {
+    let those = verdicts.iter().filter(|(_, ran)| *ran == outcome);
+    those
+        .map(|(evidence, _)| *evidence)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn junit(requirements: &[Requirement], verdicts: &[Vec<(&str, Option<bool>)>]) -> String {
+    let escaped = |text: &str| {
+        text.replace('&', "&amp;")
+            .replace('<', "&lt;")
+            .replace('"', "&quot;")
+    };
+    let mut cases = String::new();
+    let (mut failures, mut skipped) = (0, 0);
+    for (r, verdicts) in requirements.iter().zip(verdicts) {
+        let (failed, waits) = (named(verdicts, Some(false)), named(verdicts, None));
+        let inside = if !failed.is_empty() {
+            failures += 1;
+            format!(
+                "<failure message=\"failed, or did not run: {}\"/>",
+                escaped(&failed)
+            )
+        } else if !waits.is_empty() {
+            skipped += 1;
+            format!("<skipped message=\"did not run: {}\"/>", escaped(&waits))
+        } else {
+            String::new()
+        };
+        let (id, text) = (escaped(&r.id), escaped(&r.text));
+        let _ = writeln!(
+            cases,
+            "  <testcase classname=\"{id}\" name=\"{text}\">{inside}</testcase>"
+        );
+    }
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"requirements\" tests=\"{}\" failures=\"{failures}\" \
+         skipped=\"{skipped}\">\n{cases}</testsuite>\n",
+        requirements.len()
+    )
 }
 
 fn read(path: &str) -> Result<String> {
@@ -170,7 +319,7 @@ fn exists(
     match evidence.split_once(' ') {
         Some(("row", _)) if items.contains(evidence) => Ok(()),
         Some(("row", _)) => Err("docs/reference/fault-campaign.md has no such row"),
-        Some(("gate", name)) if GATES.contains(&name) => Ok(()),
+        Some(("gate", name)) if GATES.iter().any(|(gate, _)| *gate == name) => Ok(()),
         Some(("gate", _)) => Err("no such gate"),
         Some(("test", place)) => {
             let (path, function) = place
@@ -206,7 +355,9 @@ fn page(requirements: &[Requirement]) -> String {
     let mut page = String::from(
         "# Requirements\n\nMade of [requirements.toml](requirements.toml) by `cargo xtask trace --bless`; do not edit. `cargo \
          xtask trace` fails on\nevidence that is not there, and on a limit, fault, row of the campaign, mode transition or \
-         parameter that no\nrequirement covers.\n\n| identifier | requirement | class | source | covers | evidence \
+         parameter that no\nrequirement covers. `cargo xtask ci` fails where evidence did not run or did not pass, and leaves a \
+         verdict for each\nrequirement in `target/ci/requirements.xml` (JUnit); `cargo xtask trace --ran` judges the last run \
+         again.\n\n| identifier | requirement | class | source | covers | evidence \
          |\n|---|---|---|---|---|---|\n",
     );
     let list = |items: &[String]| {
@@ -282,6 +433,34 @@ mod tests {
             errors(&["limit wind-up"], &["gate gate"])[0].contains("no requirement covers \"row panic\"")
         );
         assert!(errors(&["limit *", "row *", "fault x"], &["gate gate"])[0].contains("nowhere"));
+    }
+
+    #[test]
+    fn evidence_is_what_ran_and_passed() {
+        let log = "test ecu::a ... ok\ntest ecu::b ... FAILED\ntest hands::tests::c ... ok\ntest d ... ok\n";
+        let tests = outcomes(log);
+        let stage = |name: &str| match name {
+            "gate" => Some("well\nprocessor time: 3 s\n".to_owned()),
+            "boards" => Some("processor time: 3 s\nerror: no board\n".to_owned()),
+            _ => None,
+        };
+        for (evidence, expected) in [
+            ("test core/tests/ecu.rs::a", Some(true)),
+            ("test core/tests/ecu.rs::b", Some(false)),
+            ("test core/tests/ecu.rs::*", Some(false)),
+            ("test core/src/hands.rs::c", Some(true)),
+            ("test firmware/tests/power_loss.rs::d", Some(true)),
+            ("test core/tests/ecu.rs::e", Some(false)),
+            ("row panic", Some(false)),
+            ("gate gate", Some(true)),
+            ("gate boards", Some(false)),
+            ("gate coverage", None),
+        ] {
+            assert_eq!(outcome(evidence, &tests, &stage), expected, "{evidence}");
+        }
+        let campaign = CAMPAIGN[0].replace("tests/faults.rs", "faults");
+        let campaign = format!("test {campaign} ... ok\ntest faults_in_qemu::a ... ok\n");
+        assert_eq!(outcome("row panic", &outcomes(&campaign), &stage), Some(true));
     }
 
     #[test]
