@@ -12,6 +12,7 @@ mod endurance;
 mod envelope;
 mod estimator;
 mod faults;
+mod forgotten;
 mod frame;
 mod fuzz;
 mod law_oracle;
