@@ -416,3 +416,23 @@ fn the_values_in_use_go_round_in_their_order() {
     }
     assert_eq!(value(&SET, 21).map(|told| told.value), Some(0.375));
 }
+
+/// A refusal takes the permission to write with it, whatever it is for.
+#[test]
+fn an_unlock_is_for_one_attempt() {
+    let moving = Conditions {
+        stands: false,
+        ..READY
+    };
+    let unsettled = Conditions {
+        settled: false,
+        ..READY
+    };
+    for refusing in [moving, unsettled, in_mode(Mode::Active)] {
+        let mut download = unlocked();
+        let first = frames(&SET)[0];
+        assert_eq!(download.receive(&first, &refusing), None);
+        assert_eq!(download.receive(&first, &READY), None);
+        assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
+    }
+}

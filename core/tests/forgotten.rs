@@ -257,3 +257,72 @@ fn what_a_blind_guidance_asks_for_stays_near_the_last_picture() {
         assert!(most > 0.1, "{most}");
     }
 }
+
+/// A line that was taken a moment ago, before the 0.4 s after which its course is known, goes on at speed times angle: 0.4 m
+/// in the time without a picture.
+#[test]
+fn a_new_line_goes_on_before_its_course_is_known() {
+    let mut rig = taken(0.0, -0.7, 0.1);
+    for ms in 0..450 {
+        rig.lane.e_y = Metres::from_m(-0.7 + 0.1 * SPEED * f64::from(ms) * 1e-3);
+        rig.silent[LANE] = (150..350).contains(&ms);
+        let step = rig.tick();
+        assert!(!step.command.faults.contains(Fault::LaneStep), "{ms} ms");
+    }
+}
+
+/// A wheel that is turned where the yaw rate says that nobody turns explains 0.3 N.m of what the column lacks, and not 3.
+#[test]
+fn a_wheel_angle_hides_no_driver_torque() {
+    for sign in [1.0, -1.0] {
+        let mut rig = straight(0.0);
+        let mut turned = Rig::paper();
+        turned.curve(3.0 * sign);
+        for ms in 0..1000 {
+            rig.wheel = turned.wheel * f64::from(ms) * 1e-3;
+            let faults = rig.tick().command.faults;
+            assert!(!faults.contains(Fault::ColumnImplausible), "{ms} ms");
+        }
+        rig.driver = Some(1.7 * sign);
+        rig.run_until(1500, |step| {
+            step.command.faults.contains(Fault::ColumnImplausible)
+        });
+    }
+}
+
+/// Both wheels slip for 0.1 s while the vehicle brakes: 12 m/s^2 for so long are 1.2 m/s beyond the step of 1 m/s.
+#[test]
+fn speeds_come_back_from_a_slip_as_much_lower_as_brakes_allow() {
+    let mut rig = straight(0.2);
+    rig.engage = true;
+    rig.run(1500);
+    rig.speeds = [SPEED - 5.0; 2];
+    rig.run(100);
+    rig.speeds = [SPEED - 1.8; 2];
+    for ms in 0..1000 {
+        let step = rig.tick();
+        assert_eq!(
+            (step.command.mode, step.command.faults),
+            (Mode::Active, FaultSet::NONE),
+            "{ms} ms"
+        );
+    }
+}
+
+/// At standstill a hundred messages in a row have to say so, and one that is refused breaks the row.
+#[test]
+fn a_refused_speed_is_no_standstill() {
+    let mut rig = Rig::paper();
+    rig.speeds = [0.0; 2];
+    rig.run(2000);
+    assert!(rig.ecu.stands());
+    let mut damaged = *<&[u8; 8]>::try_from(rig.frame(VEHICLE).data()).unwrap();
+    damaged[3] ^= 1;
+    let id = rig.frame(VEHICLE).id();
+    let frame = haptic_core::bus::Frame::new(id, &damaged).unwrap();
+    assert!(rig.send(&frame).is_err());
+    rig.run(900);
+    assert!(!rig.ecu.stands());
+    rig.run(200);
+    assert!(rig.ecu.stands());
+}
