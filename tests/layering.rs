@@ -33,13 +33,14 @@ const CORE: Arrows = &[
     ("monitor", &["redundant"]),
     ("past", &["quantity"]),
     // A rate of change, the law's input, and where the vehicle and its line were.
-    ("plausibility", &["law", "past", "quantity", "redundant"]),
+    ("plausibility", &["law", "past", "quantity", "redundant", "yaw"]),
     ("probe", &["quantity", "redundant", "sine"]),
     ("quantity", &["redundant"]),
     ("ramp", &["quantity", "redundant"]),
     ("rejections", &["bus"]),
     ("schedule", &["quantity", "redundant"]),
     ("stored", &["config", "params"]),
+    ("yaw", &["quantity", "redundant"]),
 ];
 
 /// Which of our packages each package of the workspace may depend on, without its tests.

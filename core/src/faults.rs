@@ -18,6 +18,8 @@ pub enum Class {
     C,
     /// The ECU must not leave Boot.
     Locked,
+    /// Guidance goes on with one input less.
+    L,
 }
 
 /// Declares the faults: `code Name: class, unseen;`. The code is the fault's bit in the fault word. *Unseen*, in ms, is for
@@ -110,6 +112,8 @@ faults! {
     18 MotorWeak: B, 0;
     /// A: no hand on the wheel for 15 s of guidance; after 30 s the guidance ends.
     19 HandsOff: A, 0;
+    /// L: the yaw rate is impossible, or denied by wheel angle and speed: guidance goes on without it.
+    20 YawRate: L, 0;
 }
 
 // The word has 32 bits, and a fault's code is its place in the list.
@@ -139,7 +143,8 @@ impl FaultSet {
     /// What ends guidance with a fade.
     pub const FADING: Self = Self::of(Class::A);
     /// Every fault that has a name.
-    const NAMED: u32 = Self::FADING.0 | Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0;
+    const NAMED: u32 =
+        Self::FADING.0 | Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0 | Self::of(Class::L).0;
 
     /// Every fault of a class.
     #[must_use]

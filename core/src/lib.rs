@@ -126,3 +126,4 @@ pub mod rejections;
 pub mod schedule;
 mod sine;
 pub mod stored;
+pub mod yaw;

@@ -21,7 +21,7 @@ use core::fmt;
 
 use crate::redundant::Words;
 pub(crate) use arithmetic::{
-    per_second, per_second_times, product, product_below, product_within, quotient, saturate, share_of,
+    leak, per_second, per_second_times, product, product_below, product_within, quotient, saturate, share_of,
     shift_round, signed_quotient, upper_product, wide_product,
 };
 

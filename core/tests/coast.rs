@@ -83,7 +83,7 @@ fn the_line_goes_on_through_a_bend() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::paper();
         let rate = 0.05 * sign;
-        rig.yaw_rate = Some(rate);
+        rig.turn(rate);
         (rig.lane.e_y, rig.lane.e_theta) = (Metres::from_m(0.1), Radians::from_rad(0.7 * rate));
         rig.run(600);
         rig.engage = true;
@@ -112,9 +112,9 @@ fn where_the_vehicle_went_meanwhile_is_known() {
         let mut rig = beside(0.0);
         rig.silent[LANE] = true;
         rig.run(20);
-        rig.yaw_rate = Some(-0.1);
+        rig.turn(-0.1);
         rig.run(500);
-        rig.yaw_rate = Some(0.0);
+        rig.turn(0.0);
         rig.silent[LANE] = false;
         if is_true {
             rig.lane.e_theta = Radians::from_rad(0.05);
@@ -169,7 +169,7 @@ fn a_lane_change_by_hand_is_no_fault() {
     let (mut taken_at, mut was_apart) = (None, false);
     for ms in 0..6000_i32 {
         // 1 m/s to the left, of which the yaw rate tells: half a second of turning to it, and from it.
-        rig.yaw_rate = Some(match ms {
+        rig.turn(match ms {
             0..500 => 2.0 / SPEED,
             3500..4000 => -2.0 / SPEED,
             _ => 0.0,

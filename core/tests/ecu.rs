@@ -205,7 +205,7 @@ fn a_handover_after_an_implausible_lane_starts_from_zero() {
         rig.run(3000);
         // To the side at 0.09 rad without getting there.
         rig.lane.e_theta = Radians::from_rad(rig.lane.e_theta.rad() + sign * 0.09);
-        let (_, step) = rig.run_until(1000, |step| step.command.mode == Mode::Handover);
+        let (_, step) = rig.run_until(2000, |step| step.command.mode == Mode::Handover);
         assert!(step.command.faults.contains(Fault::LaneImplausible));
         let mut last = rig.applied;
         assert!(sign * last > 0.9, "{last}");

@@ -30,16 +30,18 @@ fn sets_follow_from_the_classes() {
         FaultSet::CRITICAL,
         FaultSet::LOCKING,
         FaultSet::FADING,
+        FaultSet::of(Class::L),
     ]
     .map(FaultSet::bits);
-    assert_eq!(bits, [0x7_80FF, 0x1F00, 0x6000, 0x8_0000]);
+    assert_eq!(bits, [0x7_80FF, 0x1F00, 0x6000, 0x8_0000, 0x10_0000]);
     assert_eq!(FaultSet::of(Class::C), FaultSet::CRITICAL);
 }
 
 #[test]
 fn bits_without_a_fault_are_dropped() {
-    assert_eq!(FaultSet::from_bits(u32::MAX).bits(), 0xF_FFFF);
+    assert_eq!(FaultSet::from_bits(u32::MAX).bits(), 0x1F_FFFF);
     assert_eq!(Fault::from_code(17), Some(Fault::OwnIdentifier));
     assert_eq!(Fault::from_code(19), Some(Fault::HandsOff));
-    assert_eq!(Fault::from_code(20), None);
+    assert_eq!(Fault::from_code(20), Some(Fault::YawRate));
+    assert_eq!(Fault::from_code(21), None);
 }

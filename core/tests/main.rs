@@ -32,3 +32,4 @@ mod schedule;
 mod senders;
 mod slcan;
 mod stored;
+mod yaw;

@@ -8,7 +8,7 @@ use haptic_core::config::Config;
 use haptic_core::law::LaneSample;
 use haptic_core::past::Past;
 use haptic_core::plausibility::{
-    Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
+    Moved, Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
 };
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
 
@@ -170,7 +170,7 @@ fn drive_with(
                 e_theta: Radians::from_rad((e_theta * 65536.0).round() / 65536.0),
                 at,
             };
-            if !checks.lane(&mut state, &mut past, sample.at, sample) {
+            if checks.lane(&mut state, &mut past, sample.at, sample) != Moved::AsItMust {
                 drive.lane_declared_s.get_or_insert(t);
             }
             let (lane, column) = Plausibility::used(&state);
@@ -210,7 +210,7 @@ fn honest_driving_is_never_declared() {
                 .into();
             let worst = |get: fn(&Drive) -> f64| drives.iter().map(get).fold(0.0, f64::max);
             let (lane, column) = (worst(|d| d.lane_used_m), worst(|d| d.column_used_nms));
-            println!("{name}, {kmh} km/h: {lane:.3} m of 0.4, {column:.3} N.m.s of 0.6");
+            println!("{name}, {kmh} km/h: {lane:.3} m of 1, {column:.3} N.m.s of 0.6");
             for d in &drives {
                 assert_eq!(
                     (d.lane_declared_s, d.column_declared_s),
@@ -220,9 +220,9 @@ fn honest_driving_is_never_declared() {
             }
             // As docs/explanation/plausibility.md has it.
             let documented = match course {
-                Course::Curve(_) => 0.16,
-                Course::LaneChange => 0.31,
-                Course::Swerve => 0.37,
+                Course::Curve(_) => 0.75,
+                Course::LaneChange => 0.53,
+                Course::Swerve => 0.65,
             };
             assert!(lane <= documented && column <= 0.1, "{lane} m, {column} N.m.s");
         }
@@ -258,10 +258,15 @@ fn a_measured_yaw_rate_knows_swerves_from_lies() {
 
 /// A vehicle that crosses a straight line at 1 m/s to the side, its wheel straight, fed to the check sample by
 /// sample; from 2 s on, with `e_y` = 0 there, `spoil` changes what is sent. When it was declared, s after that.
-fn crossing(speed: f64, side: f64, spoil: impl Fn(f64, f64) -> (f64, f64)) -> f64 {
+fn crossing(
+    speed: f64,
+    side: f64,
+    yaw_rate: Option<TurningRate>,
+    spoil: impl Fn(f64, f64) -> (f64, f64),
+) -> f64 {
     let checks = Config::PAPER.plausibility;
     let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
-    checks.motion(&mut state, Speed::from_m_per_s(speed), None);
+    checks.motion(&mut state, Speed::from_m_per_s(speed), yaw_rate);
     for k in 0..6000 / 8 {
         let t = f64::from(k) * 8e-3 - 2.0;
         let (mut e_y, mut e_theta) = (-t, -1.0 / speed);
@@ -272,7 +277,7 @@ fn crossing(speed: f64, side: f64, spoil: impl Fn(f64, f64) -> (f64, f64)) -> f6
             at: Instant::from_us(u32::MAX - 1_000_000).after(Micros::from_ms(8 * k)),
             ..lane(side * e_y, side * e_theta)
         };
-        if !checks.lane(&mut state, &mut past, sample.at, sample) {
+        if checks.lane(&mut state, &mut past, sample.at, sample) != Moved::AsItMust {
             assert!(t >= 0.0, "declared while it was right");
             return t;
         }
@@ -294,16 +299,18 @@ fn a_wrong_lane_is_declared_when_the_movement_missing_exceeds_the_margin() {
         ),
         // Misses twice the movement: 2*(1 - exp(-t)) = 0.4.
         ("e_y flipped", |y, theta| (-y, theta), 0.223),
-        // Predicts to the right before anything is missing there: 1 - (2 - exp(-2))*exp(-t) = 0.2.
-        ("e_theta flipped", |y, theta| (y, -theta), 0.846),
+        // Shows 0.4 s later, where the near point is then; what is seen goes 2*(1 - exp(-t)) = 0.8 m beyond what is predicted.
+        ("e_theta flipped", |y, theta| (y, -theta), 0.911),
         // Frozen when the movement ends.
         ("e_theta frozen", |_, theta| (0.0, theta), 0.511),
     ];
     for (name, spoil, expected) in cases {
         for kmh in SPEEDS_KMH {
             for side in [1.0, -1.0] {
-                let after = crossing(kmh / 3.6, side, spoil);
-                let close = (after - expected).abs() <= 0.016 || after == expected;
+                let after = crossing(kmh / 3.6, side, Some(TurningRate::ZERO), spoil);
+                // A sixteenth of what is missing is learnt in a second, and so comes to nothing.
+                let learnt = if expected > 0.5 { 0.03 } else { 0.0 };
+                let close = (after - expected).abs() <= 0.016 + learnt || after == expected;
                 assert!(close, "{name}, {kmh} km/h: {after} s, by hand {expected} s");
             }
         }
@@ -313,12 +320,15 @@ fn a_wrong_lane_is_declared_when_the_movement_missing_exceeds_the_margin() {
 #[test]
 fn more_movement_than_predicted_is_no_proof_of_a_fault() {
     for gain in [1.0, 2.0, 2.9] {
-        assert_eq!(crossing(20.0, 1.0, |y, theta| (gain * y, theta)), f64::INFINITY);
+        assert_eq!(
+            crossing(20.0, 1.0, None, |y, theta| (gain * y, theta)),
+            f64::INFINITY
+        );
     }
     // Nothing predicted: a movement of 1 m/s out of nowhere, or a prediction below half the margin.
     for predicted in [0.0, 0.19] {
         let spoil = |y: f64, theta: f64| (-3.0 * y, predicted * theta);
-        let declared = crossing(20.0, 1.0, spoil);
+        let declared = crossing(20.0, 1.0, None, spoil);
         assert!(
             declared == f64::INFINITY || declared < 0.4,
             "{declared}: only while the past predicts"
@@ -339,7 +349,8 @@ fn sliding(by_m: f64, ms: f64, yaw_rate: Option<TurningRate>) -> Option<f64> {
             at: Instant::from_us(u32::MAX - 1_500_000).after(Micros::from_ms(8 * k)),
             ..lane((t * 1e3 / ms).clamp(0.0, 1.0) * by_m, 0.0)
         };
-        (!checks.lane(&mut state, &mut past, sample.at, sample)).then_some(t)
+        let moved = checks.lane(&mut state, &mut past, sample.at, sample);
+        (moved != Moved::AsItMust).then_some(t)
     })
 }
 
@@ -353,7 +364,13 @@ fn a_line_that_slides_away_is_declared_where_the_yaw_rate_is_measured() {
             declared.is_some_and(|t| (0.032..=0.048).contains(&t)),
             "{declared:?}"
         );
-        assert_eq!(sliding(side * 3.5, 140.0, None), None);
+        // By wheel angle and speed it is 2 m.
+        let declared = sliding(side * 3.5, 140.0, None);
+        assert!(
+            declared.is_some_and(|t| (0.080..=0.096).contains(&t)),
+            "{declared:?}"
+        );
+        assert_eq!(sliding(side * 1.9, 80.0, None), None);
         // Just below and above the margin; the memory forgets 1 % in 8 ms.
         assert_eq!(sliding(side * 0.79, 40.0, still), None);
         assert!(sliding(side * 0.85, 40.0, still).is_some());
@@ -363,9 +380,10 @@ fn a_line_that_slides_away_is_declared_where_the_yaw_rate_is_measured() {
 #[test]
 fn what_freezes_on_a_straight_is_declared_when_the_curve_comes() {
     for kmh in SPEEDS_KMH {
-        let d = drive(kmh / 3.6, Course::Curve(0.0), 1.0, 0.0, Sensors::YawFrozen, 1.0);
+        let curve = Course::Curve(0.0);
+        let d = drive_with(kmh / 3.6, curve, 1.0, 0.0, Sensors::YawFrozen, 1.0, Some(0.0));
         println!("{kmh} km/h: {:?}", d.lane_declared_s);
-        // The curve begins at 2 s. With the yaw error at zero, L_f*chi_dot is predicted and does not come.
+        // The curve begins at 2 s. With the yaw error at rest, L_f*psi_dot is predicted and does not come.
         assert!(d.lane_declared_s.is_some_and(|t| (2.0..4.0).contains(&t)));
     }
 }
@@ -405,31 +423,28 @@ fn lane(e_y: f64, e_theta: f64) -> LaneSample {
 #[test]
 fn what_was_lost_is_not_held_against_what_comes() {
     let checks = Config::PAPER.plausibility;
-    let mut state = PlausibilityState::NEW;
-    checks.motion(&mut state, Speed::from_m_per_s(20.0), None);
+    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    checks.motion(&mut state, Speed::from_m_per_s(20.0), Some(TurningRate::ZERO));
     let at = |ms: u32| Instant::from_us(1_000).after(Micros::from_ms(ms));
     let full = |state: &mut PlausibilityState, ms| {
         checks.column(state, at(ms), Torque::from_nm(20.0), Radians::ZERO, Torque::ZERO)
     };
-    let standing = |state: &mut PlausibilityState, ms| {
+    let mut standing = |state: &mut PlausibilityState, ms| {
         let sample = lane(0.0, 0.05);
-        checks.lane(
-            state,
-            &mut Past::new(),
-            at(ms),
-            LaneSample { at: at(ms), ..sample },
-        )
+        let sample = LaneSample { at: at(ms), ..sample };
+        checks.lane(state, &mut past, at(ms), sample) == Moved::AsItMust
     };
-    // 1 m/s to the side that does not come, and 20 N.m that turn nothing: one sample before each margin.
-    assert!((0..=496).step_by(8).all(|ms| standing(&mut state, ms)));
+    // 1 m/s to the side that does not come, from where the line is known for 0.4 s, and 20 N.m that turn nothing: one sample
+    // before each margin.
+    assert!((0..=896).step_by(8).all(|ms| standing(&mut state, ms)));
     assert!((0..=28).step_by(2).all(|ms| full(&mut state, ms)));
     let used = |state: &PlausibilityState| {
         let (lane, column) = Plausibility::used(state);
         [lane.m(), column.nm_s()]
     };
-    // 1 - exp(-t) metres after 0.496 s; 20 N.m less 0.5 for 28 ms, less what 1 s of memory forgets.
+    // 1 - exp(-t) metres after 0.496 s, less what is learnt of it, (t - 1 + exp(-t))/16; 20 N.m less 0.5 for 28 ms, less what 1 s of memory forgets.
     let [seen, summed] = used(&state);
-    assert!((seen - 0.391).abs() < 2e-3, "{seen}");
+    assert!((seen - 0.384).abs() < 2e-3, "{seen}");
     assert!((summed - 0.538).abs() < 2e-3, "{summed}");
     let mut lost = state;
     lost.forget_lane();

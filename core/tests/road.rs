@@ -251,7 +251,7 @@ fn what_a_late_camera_did_not_see_yet_is_made_up_for() {
     rig.engage = true;
     rig.run(1000);
     assert_eq!((mode(&rig), rig.applied), (Mode::Active, 0.0));
-    rig.yaw_rate = Some(0.1);
+    rig.turn(0.1);
     rig.run(100);
     assert_eq!(mode(&rig), Mode::Active);
     // Half of a period of the vehicle's message, 5 ms, is 2.5 % of it.

@@ -11,7 +11,7 @@ use crate::injection::Injection;
 use crate::law::{LaneSample, LawState, Since};
 use crate::modes::{Event, Events, Mode};
 use crate::past::Past;
-use crate::plausibility::lane_step_is_possible;
+use crate::plausibility::{Moved, lane_step_is_possible};
 use crate::probe::ProbeState;
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
@@ -191,8 +191,10 @@ impl<I: Injection> Step<'_, I> {
             } else {
                 v.plausibility.speed()
             };
-            let yaw_rate = motion.yaw_rate();
-            let yaw_rate = yaw_rate.map(|rate| v.plausibility.possible_yaw_rate(rate, passed));
+            let measured = motion.yaw_rate();
+            let yaw_rate = measured.and_then(|rate| v.plausibility.believed(rate, passed));
+            let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
+            kept.set(is_distrusted, Fault::YawRate);
             checks.motion(&mut v.plausibility, speed, yaw_rate);
             v.share = self.config.schedule.share(v.plausibility.speed());
             past.turn(self.now, v.plausibility.turning());
@@ -271,8 +273,13 @@ impl<I: Injection> Step<'_, I> {
                 // No picture, so nothing to compare.
                 v.plausibility.go_on(past, self.now, sample);
             } else {
-                let plausible = checks.lane(&mut v.plausibility, past, self.now, sample);
-                kept.set(!plausible, Fault::LaneImplausible);
+                let moved = checks.lane(&mut v.plausibility, past, self.now, sample);
+                kept.set(moved == Moved::Otherwise, Fault::LaneImplausible);
+                if moved == Moved::AsTheWheelSays {
+                    changed.add(Changed::MOTION);
+                    v.plausibility.distrust_yaw_rate();
+                    kept.insert(Fault::YawRate);
+                }
             }
         }
     }

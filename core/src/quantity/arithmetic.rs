@@ -87,6 +87,12 @@ pub(crate) const fn per_second(bits: i32, span: Micros) -> i32 {
     (wide.wrapping_add(1 << 31) >> 32) as i32
 }
 
+/// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.
+pub(crate) const fn leak(sum: i32, change: i32, dt: Micros) -> i32 {
+    // What leaks is at most half of the sum.
+    sum.wrapping_sub(per_second(sum, dt)).saturating_add(change)
+}
+
 /// The longest span that counts: half a second, less what would make a share of it more than an `i32` holds. So its
 /// product with 32 bits is one instruction of a 32-bit core.
 const LONGEST_US: u32 = 499_996;

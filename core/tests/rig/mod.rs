@@ -125,6 +125,12 @@ impl Rig {
         rig
     }
 
+    /// The vehicle turns at this rate, rad/s, and its wheel stands as the steady state of table 9's has it.
+    pub(crate) fn turn(&mut self, rate: f64) {
+        self.yaw_rate = Some(rate);
+        self.wheel = rate * 17.0 * 2.635 * (1.0 + 0.001_752_9 * SPEED * SPEED) / SPEED;
+    }
+
     pub(crate) fn now(&self) -> Instant {
         Instant::from_us(self.clock_start_us).after(Micros::from_us(self.t_us as u32))
     }

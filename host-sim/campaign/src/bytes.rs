@@ -133,8 +133,6 @@ pub(super) struct Status {
     /// Whether some fault of class B, of class C, of class Locked is present, one bit each.
     pub(super) classes: u64,
     pub(super) reset: u64,
-    /// Bits of the fault word that no fault has.
-    pub(super) spare: u64,
 }
 
 impl Status {
@@ -148,7 +146,6 @@ impl Status {
             faults: unsigned(frame, 37, 21),
             classes: unsigned(frame, 58, 3),
             reset: unsigned(frame, 61, 3),
-            spare: unsigned(frame, 57, 1),
         }
     }
 }

@@ -8,7 +8,8 @@
 //! which in one of six core knows a message later: at 8 m/s2 that is 0.08 m/s, and less than 0.002 m in the sum.
 
 use haptic_core::params::Params;
-use haptic_core::plausibility::{self, ALIGNING_ERROR, BIAS_SHIFT, PUSHED, UNREAL};
+use haptic_core::plausibility::{self, ALIGNING_ERROR, PUSHED, UNREAL};
+use haptic_core::yaw::{self, BIAS_SHIFT};
 
 use super::counts::{ONE, flag, speed_heard};
 use super::rejected::Reason;
@@ -28,12 +29,19 @@ const FRICTION: f64 = plausibility::FRICTION.nm();
 const TOLERANCE: f64 = ALIGNING_ERROR as f64 / (1_u64 << 32) as f64;
 const ASSIST: f64 = plausibility::ASSIST as f64;
 const PUSHED_NM: f64 = PUSHED as f64 / ONE;
+const MOST_ALIGNING_NM: f64 = 16.0;
 /// Far inside what the frames carry, rad and rad/s.
 const LARGEST_WHEEL: f64 = 12.0;
 const LARGEST_YAW_RATE: f64 = 1.9;
 /// A yaw rate's step and the acceleration to the side with it, m/s2, a little less than core's.
-const YAW_RATE_STEP: f64 = plausibility::YAW_RATE_STEP.rad_per_s() - 0.001;
-const LARGEST_SIDEWAYS: f64 = plausibility::MOST_SIDEWAYS as f64 - 0.1;
+const YAW_RATE_STEP: f64 = yaw::STEP.rad_per_s() - 0.001;
+const LARGEST_SIDEWAYS: f64 = yaw::MOST_SIDEWAYS as f64 - 0.1;
+/// What yaw rate and wheel angle may differ by, in a second and in the long run; and with the first frames, which come apart.
+const YAW_MARGIN: f64 = 0.9 * yaw::MARGIN.rad();
+const YAW_BIAS: f64 = yaw::BIAS.rad_per_s();
+/// Up to this core compares them, m/s2, and from this on it doubts the yaw rate.
+const MOST_BY_WHEEL: f64 = yaw::ORDINARY_SIDEWAYS as f64;
+const DOUBTFUL: f64 = 0.25 * yaw::MARGIN.rad();
 /// Counts of a yaw rate on the bus, per rad/s.
 const YAW_RATE_COUNTS: f64 = 4096.0;
 /// Times in s: between frames of the column, and of the vehicle.
@@ -52,6 +60,10 @@ pub(super) struct Checks<const N: usize> {
     /// The aligning torque of a vehicle that turns as its wheel says, N.m/rad.
     per_wheel: [f64; N],
     damping: [f64; N],
+    /// How fast the vehicle turns by its wheel, 1/s; what the yaw rate is more in the long run, and summed.
+    turns: [f64; N],
+    yaw_bias: [f64; N],
+    yaw_sum: [f64; N],
     /// 0 until the first frames came, then 1.
     began: [f64; N],
     yaw_rate: [f64; N],
@@ -60,7 +72,10 @@ pub(super) struct Checks<const N: usize> {
     wheel: [f64; N],
     column_bias: [f64; N],
     column_sum: [f64; N],
+    /// The last picture, and whether it differed from the one before.
     e_y: [f64; N],
+    e_theta: [f64; N],
+    is_alive: [f64; N],
     /// Heading and yaw rate at the last picture.
     heading_then: [f64; N],
     yaw_rate_then: [f64; N],
@@ -85,6 +100,9 @@ impl<const N: usize> Checks<N> {
             aligning_gain: [0.0; N],
             per_wheel: [0.0; N],
             damping: [0.0; N],
+            turns: [0.0; N],
+            yaw_bias: [0.0; N],
+            yaw_sum: [0.0; N],
             began: [0.0; N],
             yaw_rate: [0.0; N],
             aligning: [0.0; N],
@@ -93,6 +111,8 @@ impl<const N: usize> Checks<N> {
             column_bias: [0.0; N],
             column_sum: [0.0; N],
             e_y: [0.0; N],
+            e_theta: [0.0; N],
+            is_alive: [0.0; N],
             heading_then: [0.0; N],
             yaw_rate_then: [0.0; N],
             lane_bias: [0.0; N],
@@ -113,6 +133,8 @@ impl<const N: usize> Checks<N> {
         self.between_us[lane] = (between_s * 1e6 + 0.5) as i32;
         for state in [
             &mut self.began,
+            &mut self.yaw_bias,
+            &mut self.yaw_sum,
             &mut self.yaw_rate,
             &mut self.aligning,
             &mut self.heading,
@@ -120,6 +142,8 @@ impl<const N: usize> Checks<N> {
             &mut self.column_bias,
             &mut self.column_sum,
             &mut self.e_y,
+            &mut self.e_theta,
+            &mut self.is_alive,
             &mut self.heading_then,
             &mut self.yaw_rate_then,
             &mut self.lane_bias,
@@ -137,6 +161,7 @@ impl<const N: usize> Checks<N> {
         self.near_m[lane] = vehicle.near_time_s * speed;
         let turning =
             vehicle.curvature_gain_per_m * speed / (1.0 + vehicle.stability_factor_s2_per_m2 * speed * speed);
+        self.turns[lane] = turning;
         self.per_wheel[lane] = speed * turning * vehicle.aligning_gain_nm_s2_per_m;
     }
 
@@ -152,6 +177,16 @@ impl<const N: usize> Checks<N> {
             self.heading[l] += self.yaw_rate[l] * VEHICLE_S;
             self.yaw_rate[l] = (yaw_rate[l] * YAW_RATE_COUNTS).round() * (1.0 / YAW_RATE_COUNTS);
             self.aligning[l] = self.speed[l] * self.yaw_rate[l] * self.aligning_gain[l];
+            let by_wheel = self.turns[l] * self.wheel[l];
+            let differs = self.yaw_rate[l] - by_wheel - self.yaw_bias[l];
+            let is_ordinary = by_wheel.abs() * self.speed[l] <= MOST_BY_WHEEL;
+            let dt = if is_ordinary { VEHICLE_S } else { 0.0 };
+            let sum = self.yaw_sum[l] * (1.0 - dt) + differs * dt;
+            self.yaw_sum[l] = sum;
+            let bias = self.yaw_bias[l] + differs * (dt * LEARNS);
+            self.yaw_bias[l] = bias.min(YAW_BIAS).max(-YAW_BIAS);
+            let is_believed = sum.abs() <= YAW_MARGIN + 0.22 * self.yaw_rate[l].abs();
+            suspect[l] |= !flag(is_believed) & matters[l] & Reason::YawRate.bit();
         }
     }
 
@@ -178,9 +213,11 @@ impl<const N: usize> Checks<N> {
             let damped = (sensed - self.wheel[l]) * self.damping[l];
             self.wheel[l] = sensed;
             let aligning = self.aligning[l];
+            let is_doubtful = (self.yaw_sum[l].abs() > DOUBTFUL) & (self.is_alive[l] != 0.0);
+            let pushed = if is_doubtful { MOST_ALIGNING_NM } else { PUSHED_NM };
             let by_wheel = (self.per_wheel[l] * sensed)
-                .max(aligning - PUSHED_NM)
-                .min(aligning + PUSHED_NM);
+                .max(aligning - pushed)
+                .min(aligning + pushed);
             let assisted = ASSIST * driver[l];
             let least = (applied[l] + driver[l].min(assisted) - aligning.max(by_wheel)) * dt - damped;
             let most = (applied[l] + driver[l].max(assisted) - aligning.min(by_wheel)) * dt - damped;
@@ -249,10 +286,12 @@ impl<const N: usize> Checks<N> {
             // The sign is beyond doubt where the first rule asks for it, and the second does not.
             let missing = if sum_predicted < 0.0 { -missing } else { missing };
             let is_missing = (missing > LANE_MARGIN) & (sum_predicted.abs() > LANE_MOVED);
+            let is_same = (e_y[l] == self.e_y[l]) & (e_theta[l] == self.e_theta[l]);
+            self.is_alive[l] = if is_same { 0.0 } else { began };
             suspect[l] |=
                 flag(is_missing | (missing.abs() > LANE_UNREAL)) & matters[l] & Reason::LaneCheck.bit();
-            (self.e_y[l], self.heading_then[l], self.yaw_rate_then[l]) =
-                (e_y[l], heading[l], self.yaw_rate[l]);
+            (self.e_y[l], self.e_theta[l]) = (e_y[l], e_theta[l]);
+            (self.heading_then[l], self.yaw_rate_then[l]) = (heading[l], self.yaw_rate[l]);
         }
     }
 

@@ -52,6 +52,8 @@ pub enum Reason {
     ColumnCheck,
     /// The lane check is near its margin.
     LaneCheck,
+    /// The yaw rate is near what wheel angle and speed deny.
+    YawRate,
     /// The motor does not deliver what it is told.
     Motor,
     /// The vehicle leaves the road, or turns wildly.
@@ -62,7 +64,7 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 20] = [
+    pub const ALL: [(Self, &str); 21] = [
         (
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
@@ -86,6 +88,7 @@ impl Reason {
         (Self::MonitorBand, "near the end of the monitor's band"),
         (Self::ColumnCheck, "near the margin of the column check"),
         (Self::LaneCheck, "near the margin of the lane check"),
+        (Self::YawRate, "near the margin of the yaw rate's check"),
         (Self::Motor, "a motor that does not obey"),
         (Self::OffRoad, "off the road"),
         (Self::Detour, "a way longer than the course"),

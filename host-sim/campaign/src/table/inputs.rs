@@ -363,8 +363,29 @@ pub(super) const ROWS: &[FaultCase] = &[
         "yaw-rate-offset-20",
         "yaw rate 20 mrad/s off",
         &[Sensor(YawRate, Plus(0.02))],
+    ),
+    row(
+        "yaw-rate-absent",
+        "yaw rate marked as bad",
+        &[JERK, always(VEHICLE, 58, 1, 0)],
+    ),
+    row(
+        "yaw-rate-stuck-and-blinks",
+        "yaw rate frozen, and lane preview marked invalid for 0.9 s",
+        &[JERK, Sensor(YawRate, Frozen), Invalid],
     )
-    .may_hand_over(),
+    .may_hand_over()
+    .lasts(900),
+    row(
+        "yaw-rate-inverted-and-slip",
+        "yaw rate with the wrong sign, and both speeds 4 m/s low for 60 ms",
+        &[
+            Sensor(YawRate, Times(-1.0)),
+            Sensor(Speed1, Plus(-4.0)),
+            Sensor(Speed2, Plus(-4.0)),
+        ],
+    )
+    .lasts(60),
     row(
         "lateral-error-drifting",
         "e_y' drifts by 0.1 m/s",
