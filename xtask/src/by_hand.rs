@@ -89,7 +89,7 @@ fn test<'a>(copy: &Path, mutant: &'a Mutant) -> Result<(String, &'a str)> {
 /// Core with what its tests read, as a workspace of its own.
 fn copy_sources(copy: &Path) -> Result<()> {
     let _ = fs::remove_dir_all(copy);
-    for place in ["core", "docs", "tests/data"] {
+    for place in ["core", "docs", "tests/data", "bindings/c/include"] {
         copy_all(&tool::root().join(place), &copy.join(place))?;
     }
     fs::copy(tool::root().join("Cargo.lock"), copy.join("Cargo.lock"))?;
