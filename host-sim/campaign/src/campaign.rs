@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::drivers::Drivers;
+use super::drivers::{Drivers, Limits};
 use super::table::{Class, FaultCase, Place};
 use super::trial::{Deviation, MOST_EXCESS_M, TrialOutcome, World};
+use haptic_sim::share::wilson;
 
 /// What a campaign showed.
 #[derive(Debug, Clone, Serialize)]
@@ -20,6 +21,10 @@ pub struct Campaign {
     pub world: Option<&'static str>,
     /// Who drove.
     pub drivers: Drivers,
+    /// How far a fault may move their vehicle.
+    pub limits: Limits,
+    /// The first seed.
+    pub first_seed: u64,
 }
 
 impl Campaign {
@@ -30,12 +35,19 @@ impl Campaign {
             rows,
             world: None,
             drivers: Drivers::Paper,
+            limits: Drivers::Paper.limits(),
+            first_seed: 1,
         }
     }
 
     /// Every run that failed, by a rule or by where the vehicle went.
     pub fn failures(&self) -> impl Iterator<Item = &FailedTrial> {
         self.rows.iter().flat_map(|row| &row.failures)
+    }
+
+    /// Rows whose vehicles leave the lane more often than the drivers' limit allows.
+    pub fn too_often(&self) -> impl Iterator<Item = &CaseResult> {
+        self.rows.iter().filter(|row| row.leaves_too_often)
     }
 }
 
@@ -64,10 +76,18 @@ pub struct CaseResult {
     pub peak_torque_nm: f64,
     /// Whether the row asks the ECU to leave.
     pub asks_to_leave: bool,
+    /// Runs in which the ECU noticed something: it reported a fault after the onset, or left.
+    pub noticed: u64,
+    /// Their share, from and to, 95 %.
+    pub noticed_interval: [f64; 2],
+    /// From the onset until then, ms: the median of those runs, and what 95 % of them keep.
+    pub noticed_after_ms: [Option<u32>; 2],
     /// Runs in which the ECU left: a handover, a fade, a latched fault.
     pub left: u64,
     /// From the onset until it left, ms: the median of those runs and the longest.
     pub left_after_ms: Option<[u32; 2]>,
+    /// Deviation from the fault-free run that 95 % of all runs keep, m.
+    pub deviation_95_m: f64,
     /// Largest deviation from the fault-free run, m.
     pub deviation_m: f64,
     /// The same had the torque been dropped in the step in which the ECU left; of the runs in which it left.
@@ -76,6 +96,10 @@ pub struct CaseResult {
     pub excess_m: Option<f64>,
     /// Runs in which the vehicle left its lane and the fault-free one did not.
     pub left_lane: u64,
+    /// Their share, from and to, 95 %.
+    pub left_lane_interval: [f64; 2],
+    /// Whether more of them leave it than the drivers' limit allows: the interval begins above it.
+    pub leaves_too_often: bool,
     /// Runs in which it went more than a lane's width aside with the torque dropped as well, or was there without the fault
     /// too when the ECU left; these are not judged by it.
     pub off_road: u64,
@@ -134,17 +158,24 @@ pub fn run(
     let rows: Vec<CaseResult> = rows
         .iter()
         .zip(outcomes.chunks(per_row))
-        .map(|(row, outcomes)| result(row, outcomes, &again))
+        .map(|(row, outcomes)| result(row, outcomes, world.drivers().limits(), &again))
         .collect();
     Campaign {
         world: world.kind().map(|kind| kind.name),
         drivers: world.drivers(),
+        limits: world.drivers().limits(),
+        first_seed: seeds.start,
         ..Campaign::of(rows)
     }
 }
 
 /// What a row's runs showed; `again` is what its command needs beside row and seed.
-pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: &str) -> CaseResult {
+pub(super) fn result(
+    row: &'static FaultCase,
+    outcomes: &[TrialOutcome],
+    limits: Limits,
+    again: &str,
+) -> CaseResult {
     let failed = |outcome: &TrialOutcome, by, cycle, what| FailedTrial {
         row: row.name,
         seed: outcome.seed,
@@ -164,14 +195,29 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
             violation.what.clone(),
         )),
         None => {
-            let left_ms = outcome.onset_ms + outcome.left_after_ms?;
-            let what = too_far(&outcome.deviation).filter(|_| row.obeys())?;
-            Some(failed(outcome, FailedBy::Vehicle, left_ms, what))
+            let at_ms = outcome.onset_ms + outcome.left_after_ms.unwrap_or_default();
+            let further = too_far(&outcome.deviation).filter(|_| row.obeys());
+            let beyond = || beyond(&outcome.deviation, limits).filter(|_| row.is_limited());
+            Some(failed(
+                outcome,
+                FailedBy::Vehicle,
+                at_ms,
+                further.or_else(beyond)?,
+            ))
         }
     });
     let most = |of: fn(&TrialOutcome) -> Option<f64>| outcomes.iter().filter_map(of).reduce(f64::max);
-    let mut left_after_ms: Vec<u32> = outcomes.iter().filter_map(|o| o.left_after_ms).collect();
-    left_after_ms.sort_unstable();
+    let sorted_ms = |of: fn(&TrialOutcome) -> Option<u32>| {
+        let mut times: Vec<u32> = outcomes.iter().filter_map(of).collect();
+        times.sort_unstable();
+        times
+    };
+    let left_after_ms = sorted_ms(|o| o.left_after_ms);
+    let noticed_after_ms = sorted_ms(|o| o.noticed_after_ms);
+    let mut deviations_m: Vec<f64> = outcomes.iter().map(|o| o.deviation.faulted_m).collect();
+    deviations_m.sort_unstable_by(f64::total_cmp);
+    let share = |count: usize| wilson(count as f64 / outcomes.len() as f64, outcomes.len() as f64);
+    let left_lane = outcomes.iter().filter(|o| o.deviation.leaves_lane).count();
     CaseResult {
         name: row.name,
         class: row.class,
@@ -184,17 +230,39 @@ pub(super) fn result(row: &'static FaultCase, outcomes: &[TrialOutcome], again: 
         torque_bound_nm: row.torque_nm,
         peak_torque_nm: outcomes.iter().map(|o| o.peak_nm).fold(0.0, f64::max),
         asks_to_leave: row.asks_to_leave(),
+        noticed: noticed_after_ms.len() as u64,
+        noticed_interval: share(noticed_after_ms.len()),
+        noticed_after_ms: [50, 95].map(|percent| quantile(&noticed_after_ms, percent)),
         left: left_after_ms.len() as u64,
         left_after_ms: left_after_ms
             .last()
             .map(|last| [left_after_ms[left_after_ms.len() / 2], *last]),
+        deviation_95_m: quantile(&deviations_m, 95).unwrap_or_default(),
         deviation_m: most(|o| Some(o.deviation.faulted_m)).unwrap_or_default(),
         dropped_m: most(|o| o.deviation.dropped_m),
         excess_m: most(|o| o.deviation.excess_m()),
-        left_lane: outcomes.iter().filter(|o| o.deviation.leaves_lane).count() as u64,
+        left_lane: left_lane as u64,
+        left_lane_interval: share(left_lane),
+        leaves_too_often: row.is_limited() && limits.left_lane.is_some_and(|most| share(left_lane)[0] > most),
         off_road: outcomes.iter().filter(|o| o.deviation.is_off_road()).count() as u64,
         failures: failures.collect(),
     }
+}
+
+/// What so many percent of sorted values do not exceed; `None` of nothing.
+fn quantile<T: Copy>(sorted: &[T], percent: usize) -> Option<T> {
+    let rank = (sorted.len() * percent).div_ceil(100);
+    sorted.get(rank.saturating_sub(1)).copied()
+}
+
+/// What is wrong with a deviation by itself.
+fn beyond(deviation: &Deviation, limits: Limits) -> Option<String> {
+    (deviation.faulted_m > limits.deviation_m && !deviation.is_off_road()).then(|| {
+        format!(
+            "the vehicle went {:.2} m aside, {:.2} m are allowed with these drivers",
+            deviation.faulted_m, limits.deviation_m
+        )
+    })
 }
 
 /// What is wrong with where a vehicle went, if anything is.

@@ -1,5 +1,7 @@
-//! Who drives in the campaign: the paper's drivers, or those who keep the lane in a real car.
+//! Who drives in the campaign: the paper's drivers, those who keep the lane in a real car, or those of them who rely on the
+//! guidance. And how far a fault may move the vehicle of each.
 
+use super::trial::{LANE_EDGE_M, OFF_ROAD_M};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::participants::participants;
 use haptic_sim::population::LaneKeeper;
@@ -20,17 +22,45 @@ pub enum Drivers {
     Paper,
     /// Those of `host-sim availability`, for a real one.
     Population,
+    /// The same with a reliance of 0.8 to 1 and without a remnant: nothing they do shows that the guidance is wrong.
+    Relying,
+}
+
+/// How far a fault may move the vehicle, whatever dropping the torque would do.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Limits {
+    /// Largest deviation of a run, m.
+    pub deviation_m: f64,
+    /// Largest share of a row's runs that leave the lane where the fault-free vehicle does not; `None` if it is stated only.
+    pub left_lane: Option<f64>,
 }
 
 impl Drivers {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::Population];
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Population, Self::Relying];
 
     /// By which a person asks for them.
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
             Self::Population => "population",
+            Self::Relying => "relying",
+        }
+    }
+
+    /// The absolute limits. Who keeps the lane in a real car stays in it if the middle of the lane is where the fault finds the
+    /// vehicle. The paper's drivers hold the wheel so loosely that a plain loss takes them out of the lane: for them the limit
+    /// is the width of a lane, and the share that leaves it is stated only.
+    pub fn limits(self) -> Limits {
+        match self {
+            Self::Paper => Limits {
+                deviation_m: OFF_ROAD_M,
+                left_lane: None,
+            },
+            Self::Population | Self::Relying => Limits {
+                deviation_m: LANE_EDGE_M,
+                left_lane: Some(0.04),
+            },
         }
     }
 }
@@ -73,4 +103,14 @@ pub fn everyone() -> Vec<Driver> {
 pub fn lane_keeper(seed: u64) -> LaneKeeper {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(named(Stream::Faults.seed(seed), "driver"));
     LaneKeeper::draw(&mut rng, REMNANT_SD_NM)
+}
+
+/// The same driver, relying on the guidance.
+pub fn relying(seed: u64) -> LaneKeeper {
+    let driver = lane_keeper(seed);
+    LaneKeeper {
+        reliance: 0.8 + 0.2 * driver.reliance,
+        remnant_sd_nm: 0.0,
+        ..driver
+    }
 }

@@ -15,7 +15,7 @@ use haptic_sim::models::real::WorldParameters;
 use serde::Serialize;
 
 use super::bytes::{FAULT, HANDOVER};
-use super::injection::{Injection, Motor, Start};
+use super::injection::{Hand, Injection, Motor, Start};
 use super::residual::Seen;
 
 mod attacks;
@@ -258,6 +258,13 @@ impl FaultCase {
     /// Whether the motor does what the ECU says, so that the ECU decides where the vehicle goes.
     pub(super) fn obeys(&self) -> bool {
         !self.injections.contains(&Injection::Motor(Motor::Stuck))
+    }
+
+    /// Whether the absolute limits judge where the vehicle goes: the ECU decides it, and no hand pulls that the fault-free run
+    /// does not have.
+    pub(super) fn is_limited(&self) -> bool {
+        let opposes = |one: &Injection| matches!(one, Injection::Hand(Hand::Opposes { .. }));
+        self.obeys() && !self.injections.iter().any(opposes)
     }
 
     /// The latest a reaction may come after the fault can be seen, ms; `None` where none is asked for.

@@ -20,7 +20,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use super::drivers::{Driver, Drivers, everyone, lane_keeper};
+use super::drivers::{Driver, Drivers, everyone, lane_keeper, relying};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
 use super::invariants::Violation;
@@ -64,7 +64,7 @@ pub(crate) const MOST_EXCESS_M: f64 = 0.1;
 /// beyond that say nothing of a handover, and are not judged.
 pub const OFF_ROAD_M: f64 = 3.6;
 /// From the middle of a lane of 3.6 m to where a vehicle of 1.7 m begins to leave it, m.
-const LANE_EDGE_M: f64 = 0.95;
+pub(crate) const LANE_EDGE_M: f64 = 0.95;
 
 const PLACES: [PlaceOnRoad; 3] = [PlaceOnRoad::In, PlaceOnRoad::Before, PlaceOnRoad::After];
 
@@ -112,6 +112,8 @@ pub struct TrialOutcome {
     pub reaction_ms: Option<u32>,
     /// Largest torque from the onset on, N.m.
     pub peak_nm: f64,
+    /// From the onset until the ECU reported a fault or left, ms.
+    pub noticed_after_ms: Option<u32>,
     /// From the onset until the ECU left, ms.
     pub left_after_ms: Option<u32>,
     /// Where the vehicle went.
@@ -273,8 +275,9 @@ impl World {
                 driver.name.clone(),
                 scenario.driver(driver.parameters).gains(driver.gains),
             ),
-            Drivers::Population => {
-                let driver = lane_keeper(seed);
+            Drivers::Population | Drivers::Relying => {
+                let relies = self.driven_by == Drivers::Relying;
+                let driver = if relies { relying(seed) } else { lane_keeper(seed) };
                 let name = format!("t_p {:.2} s, reliance {:.2}", driver.t_p, driver.reliance);
                 let fastest_kmh =
                     change.map_or(speed.start_kmh(), |change| change.from_kmh.max(change.to_kmh));
@@ -371,6 +374,7 @@ impl World {
             });
         }
         let reported = record.ecu.events().collect();
+        let reported_at = record.ecu.first_fault_from(onset_ms);
         let verdict = match self.real {
             None => judge(row, onset_ms, &record),
             // The second opinion on what can be seen knows the paper's world only: here every rule must hold, and what is
@@ -389,6 +393,11 @@ impl World {
                 .seen_at
                 .zip(verdict.as_ref().ok().copied().flatten())
                 .map(|(seen_at, at)| at.saturating_sub(seen_at)),
+            noticed_after_ms: [reported_at, left_at]
+                .into_iter()
+                .flatten()
+                .min()
+                .map(|at| at - onset_ms),
             left_after_ms: left_at.map(|at| at - onset_ms),
             deviation,
             peak_nm: record.peak_nm,

@@ -87,6 +87,15 @@ impl EcuEvents {
         })
     }
 
+    /// The first step from one on in which a fault appeared.
+    pub fn first_fault_from(&self, step: u32) -> Option<u32> {
+        let steps = self.said.windows(2).filter_map(|pair| {
+            let appeared = pair[1].faults.without(pair[0].faults);
+            (appeared != FaultSet::NONE).then(|| (pair[1].time_s / STEP_S).round() as u32)
+        });
+        steps.into_iter().find(|at| *at >= step)
+    }
+
     /// What it said from the start, and at each change.
     pub fn into_said(self) -> Vec<Said> {
         self.said

@@ -53,6 +53,7 @@ pub mod population;
 mod preview;
 pub mod scenario;
 pub mod seeds;
+pub mod share;
 pub mod simulation;
 pub mod stability;
 pub mod unguided;

@@ -194,7 +194,7 @@ fn wrong_speeds_are_wrong_by_the_same_while_the_true_one_changes() {
 /// Whoever drives keeps a lane by hand and with guidance at every speed in between, also where nobody looked.
 #[test]
 fn whoever_drives_is_stable_at_every_speed_of_the_run() {
-    for drivers in [Drivers::Paper, Drivers::Population] {
+    for drivers in Drivers::ALL {
         let world = braking().driven_by(drivers);
         for seed in SEEDS {
             let Drawn {
@@ -228,8 +228,11 @@ fn drivers_change_who_drives_and_nothing_else() {
     let row = by_name("silent-lane");
     let mut names = std::collections::BTreeSet::new();
     for seed in SEEDS {
-        let [paper, population] =
-            [Drivers::Paper, Drivers::Population].map(|who| drawn(&braking().driven_by(who), row, seed));
+        let [paper, population, relying] =
+            Drivers::ALL.map(|who| drawn(&braking().driven_by(who), row, seed));
+        assert_eq!(relying.scenario.driver().remnant_sd_nm, 0.0);
+        assert_eq!(relying.scenario.driver().t_p, population.scenario.driver().t_p);
+        assert!(relying.scenario.gains().k_hg <= 0.2);
         assert_eq!(paper.onset_ms, population.onset_ms);
         let same = paper
             .scenario

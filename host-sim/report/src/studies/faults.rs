@@ -3,7 +3,7 @@
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_campaign::campaign::{Campaign, CaseResult};
-use haptic_campaign::drivers::Drivers;
+use haptic_campaign::drivers::{Drivers, Limits};
 use haptic_campaign::table::FaultCase;
 use haptic_campaign::{OFF_ROAD_M, TrialOutcome};
 
@@ -20,8 +20,16 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
         Block::figure("faults", figure(campaign), caption),
         Block::Table(table(campaign)),
     ];
+    blocks.push(Block::Text(limits(campaign)));
+    blocks.extend(campaign.too_often().map(|row| Block::Text(left_too_often(row))));
     blocks.extend(campaign.failures().map(|f| Block::Text(failure(f))));
-    let mut sections = vec![Section::new("Fault by fault", blocks)];
+    let mut sections = vec![
+        Section::new("Fault by fault", blocks),
+        Section::new(
+            "How often, how soon, how far",
+            vec![Block::Table(shares(campaign)), Block::Text(SHARES.into())],
+        ),
+    ];
     sections.extend(told);
     Report {
         title: "Every fault by name".into(),
@@ -54,10 +62,11 @@ fn summary(campaign: &Campaign) -> String {
     let drivers = match campaign.drivers {
         Drivers::Paper => "with the paper's drivers",
         Drivers::Population => "with drivers who keep the lane in a real car",
+        Drivers::Relying => "with drivers who keep the lane in a real car and rely on the guidance",
     };
     let world = match (campaign.world, campaign.drivers) {
         (None, Drivers::Paper) => String::new(),
-        (None, Drivers::Population) => format!("; {drivers}"),
+        (None, _) => format!("; {drivers}"),
         (Some(name), _) => {
             format!(
                 "; in the world {name}, {drivers}: a row fails by a broken rule or by where the vehicle goes"
@@ -70,6 +79,72 @@ fn summary(campaign: &Campaign) -> String {
         campaign.runs,
         campaign.cycles,
         campaign.failures().count()
+    )
+}
+
+/// The absolute limits of these drivers.
+fn limits(campaign: &Campaign) -> String {
+    let Limits {
+        deviation_m,
+        left_lane,
+    } = campaign.limits;
+    let share = match left_lane {
+        Some(share) => format!("{:.0} % of a row's runs may leave the lane", 100.0 * share),
+        None => "how many leave the lane is stated and not judged".into(),
+    };
+    format!(
+        "Limits with these drivers: a deviation of {deviation_m} m; {share}. A motor that ignores the ECU and a driver who pulls the other \
+         way are not judged by them. Seeds from {} on.",
+        campaign.first_seed
+    )
+}
+
+fn left_too_often(row: &CaseResult) -> String {
+    let [low, high] = row.left_lane_interval.map(|share| 100.0 * share);
+    format!("{}: {low:.1} to {high:.1} % leave the lane", row.name)
+}
+
+const SHARES: &str = "Noticed: the ECU reported a fault after the onset, or left. Intervals of shares are Wilson's, 95 %; times count from \
+                      the onset, over the runs in which something was noticed; deviations are of all runs.";
+
+/// How often each fault is noticed, how soon, and how far the vehicle goes.
+fn shares(campaign: &Campaign) -> Table {
+    let percent = |count: u64, runs: u64| Cell::number(100.0 * count as f64 / runs as f64, 1);
+    let interval = |of: [f64; 2]| {
+        let [low, high] = of.map(|share| 100.0 * share);
+        Cell::Text(format!("{low:.1} to {high:.1}"))
+    };
+    let row = |row: &CaseResult| {
+        let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
+        let [median, most] = row.noticed_after_ms;
+        vec![
+            Cell::text(row.name),
+            Cell::number(row.runs as f64, 0),
+            percent(row.noticed, row.runs),
+            interval(row.noticed_interval),
+            time(median),
+            time(most),
+            Cell::number(row.deviation_95_m, 2),
+            Cell::number(row.deviation_m, 2),
+            percent(row.left_lane, row.runs),
+            interval(row.left_lane_interval),
+        ]
+    };
+    Table::new(
+        "",
+        [
+            "Fault",
+            "Runs",
+            "Noticed (%)",
+            "of (%)",
+            "Median (ms)",
+            "95 % (ms)",
+            "Dev. 95 % (m)",
+            "Worst (m)",
+            "Left lane (%)",
+            "of it (%)",
+        ],
+        campaign.rows.iter().map(row),
     )
 }
 
@@ -88,6 +163,7 @@ fn table(campaign: &Campaign) -> Table {
         let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
         let metres = |value: Option<f64>| Cell::number(value, 2);
         let verdict = match row.failures.len() {
+            0 if row.leaves_too_often => "FAIL".into(),
             0 => "pass".into(),
             n => format!("FAIL in {n}"),
         };
