@@ -70,7 +70,12 @@ pub fn run(
             outcomes.push(outcome);
             done();
         }
-        results.push(campaign::result(row, &outcomes, world.drivers().limits(), " --target"));
+        results.push(campaign::result(
+            row,
+            &outcomes,
+            world.drivers().limits(),
+            " --target",
+        ));
     }
     for target in [in_lockstep, with_memory].into_iter().flatten() {
         target.end()?;
