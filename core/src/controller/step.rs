@@ -321,8 +321,8 @@ impl<I: Injection> Step<'_, I> {
         } else if let Input::New(_) = self.lane {
             (v.hot.turned, v.hot.rate_then) = past.turned(self.now, sample.at);
         } else {
-            let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
-            v.hot.turned = Radians::from_bits(v.hot.turned.bits().saturating_add(turned));
+            let turned = per_second(v.plausibility.turning().fixed(), self.elapsed);
+            v.hot.turned = v.hot.turned.plus(Radians::from_fixed(turned));
         }
     }
 
@@ -333,15 +333,12 @@ impl<I: Injection> Step<'_, I> {
         if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
             return None;
         }
-        let went_on = per_second(v.hot.rate_then.bits(), age);
-        let turned = i64::from(v.hot.turned.bits()).saturating_sub(i64::from(went_on));
-        let faster =
-            i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.hot.rate_then.bits()));
+        let went_on = per_second(v.hot.rate_then.fixed(), age);
         let speed = v.plausibility.speed();
-        let near = product(self.config.plausibility.near_time.bits(), speed.bits());
+        let near = product(self.config.plausibility.near_time.fixed(), speed.fixed());
         Some(Since::new(
-            Radians::from_wide(turned),
-            TurningRate::from_wide(faster),
+            v.hot.turned.minus(Radians::from_fixed(went_on)),
+            v.plausibility.turning().minus(v.hot.rate_then),
             speed,
             Metres::from_wide(near),
         ))
@@ -536,9 +533,9 @@ impl<I: Injection> Step<'_, I> {
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
         // Neither is more than one.
-        let share = share_of(authority.bits(), v.share.bits());
-        let share = share_of(share, v.coast.trust.bits());
-        Torque::from_bits(share_of(share, asked.bits()))
+        let share = share_of(authority.fixed(), v.share.fixed());
+        let share = share_of(share, v.coast.trust.fixed());
+        Torque::from_fixed(share_of(share, asked.fixed()))
     }
 }
 

@@ -212,10 +212,7 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
         return Some(speeds);
     };
     let ([a, b], [a_before, b_before]) = (speeds, last.speeds);
-    let moved = |from: Speed, other: Speed, other_before: Speed| {
-        let by = other.bits().wrapping_sub(other_before.bits());
-        Speed::from_bits(from.bits().saturating_add(by))
-    };
+    let moved = |from: Speed, other: Speed, other_before: Speed| from.plus(other.minus(other_before));
     // A message comes every 10 to 25 ms: no product of a count and a period wraps.
     let lasts = |doubt: u8| Micros::from_us(u32::from(doubt).wrapping_mul(slot.period.us()));
     let follow_within = |held: Micros| {
@@ -320,8 +317,8 @@ struct Standing {
 
 impl Standing {
     fn hear(&mut self, [a, b]: [Speed; 2], passed: Micros) {
-        let braked = per_second(BRAKES.bits(), passed);
-        let still = Speed::from_bits(self.at_most.bits().saturating_sub(braked));
+        let braked = Speed::from_fixed(per_second(BRAKES.fixed(), passed));
+        let still = self.at_most.minus(braked);
         (self.at_most, self.in_a_row) = (still.max(a).max(b), self.in_a_row.saturating_add(1));
     }
 }

@@ -161,7 +161,7 @@ impl Average {
         let deviation = noise.saturating_add((muscle * self.mean.abs() * 16_384.0) as u32);
         (self.total >= FIRST_REPORT).then(|| Reading {
             k_hg: Ratio::from_f32(self.mean),
-            deviation: Ratio::from_wide(i64::from(deviation) << 10),
+            deviation: Ratio::from_wide(fixed::types::I40F24::from_bits(i64::from(deviation) << 10)),
         })
     }
 }

@@ -39,7 +39,10 @@
 mod average;
 pub(crate) mod background;
 
-use crate::law::sine::{ONE, QUARTER, sine};
+use crate::law::sine::sine;
+
+const QUARTER: u32 = 1 << 30;
+
 use crate::quantity::{Instant, Radians, Ratio, Torque};
 use average::{Average, Change, Work};
 
@@ -288,6 +291,6 @@ impl EstimatorState {
 
 /// The sine as a float.
 fn unit(phase: u32) -> f32 {
-    const SCALE: f32 = 1.0 / ONE as f32;
-    sine(phase) as f32 * SCALE
+    const SCALE: f32 = 1.0 / (1 << 30) as f32;
+    sine(phase).to_bits() as f32 * SCALE
 }

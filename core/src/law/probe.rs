@@ -12,8 +12,12 @@
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
 //! word on the sum), and what the answer tells ([`crate::estimator`]).
 
+use fixed::FixedI64;
+use fixed::types::extra::U30;
+use fixed::types::{I1F31, I2F30};
+
 use crate::law::sine::sine;
-use crate::quantity::{Micros, Torque, saturate, shift_round};
+use crate::quantity::{Micros, Torque, rounded};
 use crate::safety::redundant::words;
 
 words! {
@@ -58,13 +62,11 @@ impl Probe {
             return None;
         }
         state.phase = state.phase.wrapping_add(advance);
-        // 31 bits of gain times 30 of the sine, then times 24 of the torque: each fits an i64.
-        let share = shift_round(
-            i64::from(state.gain >> 1).saturating_mul(i64::from(sine(state.phase))),
-            31,
-        );
-        let torque = i64::from(saturate(share)).saturating_mul(i64::from(self.amplitude.bits()));
-        Some(Torque::from_wide(shift_round(torque, 30)))
+        let gain = I1F31::from_bits((state.gain >> 1).cast_signed());
+        // No more than one.
+        let share: FixedI64<U30> = rounded(gain.wide_mul(sine(state.phase)));
+        let torque = self.amplitude.fixed().wide_mul(I2F30::wrapping_from_num(share));
+        Some(Torque::from_wide(rounded(torque)))
     }
 }
 

@@ -5,6 +5,8 @@
 //! table). Where the driver pushes against the torque there is nothing left to keep, and it goes faster. Neither ramp
 //! ever grows.
 
+use fixed::types::I8F24;
+
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, share_of, signed_quotient};
 use crate::safety::redundant::words;
 
@@ -33,7 +35,7 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
     let Some(driver) = driver else {
         return WITHOUT_COLUMN;
     };
-    let against = if applied.bits().is_negative() {
+    let against = if applied < Torque::ZERO {
         driver
     } else {
         driver.opposite()
@@ -49,8 +51,8 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
 /// handover, which goes on where that was; but nobody takes over in less than [`GONE_ON`].
 #[must_use]
 pub fn handover_of(trust: Ratio) -> Micros {
-    let left = share_of(trust.bits(), HANDOVER.us().cast_signed());
-    Micros::from_us(left.cast_unsigned()).max(GONE_ON)
+    let left = share_of(trust.fixed(), I8F24::from_bits(HANDOVER.us().cast_signed()));
+    Micros::from_us(left.to_bits().cast_unsigned()).max(GONE_ON)
 }
 
 words! {

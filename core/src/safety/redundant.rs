@@ -6,6 +6,8 @@
 use core::hint::black_box;
 use core::ops::Not;
 
+use fixed::FixedI32;
+
 /// A value made of 32-bit words, each of which may hold any bits.
 pub trait Words: Copy + PartialEq {
     /// The value with every word changed, in the order of the fields.
@@ -40,6 +42,19 @@ impl Words for i32 {
 
     fn agreement(&self, other: &Self) -> u32 {
         self.cast_unsigned() ^ other.cast_unsigned()
+    }
+}
+
+impl<Frac> Words for FixedI32<Frac>
+where
+    Self: Copy + PartialEq,
+{
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self::from_bits(self.to_bits().map_words(change))
+    }
+
+    fn agreement(&self, other: &Self) -> u32 {
+        self.to_bits().agreement(&other.to_bits())
     }
 }
 

@@ -21,14 +21,14 @@ const COLUMN_MARGIN: f64 = plausibility::COLUMN_MARGIN.nm_s() - NARROWER;
 const LANE_MARGIN: f64 = plausibility::LANE_MARGIN.m() - NARROWER;
 /// Core asks for half of the margin.
 const LANE_MOVED: f64 = 0.5 * plausibility::LANE_MARGIN.m() - NARROWER;
-const LANE_UNREAL: f64 = UNREAL as f64 / ONE - NARROWER;
+const LANE_UNREAL: f64 = UNREAL.m() - NARROWER;
 const COLUMN_BIAS: f64 = plausibility::COLUMN_BIAS.nm();
 const LANE_BIAS: f64 = plausibility::LANE_BIAS.m_per_s();
 const LEARNS: f64 = 1.0 / (1 << BIAS_SHIFT) as f64;
 const FRICTION: f64 = plausibility::FRICTION.nm();
-const TOLERANCE: f64 = ALIGNING_ERROR as f64 / (1_u64 << 32) as f64;
+const TOLERANCE: f64 = ALIGNING_ERROR.si();
 const ASSIST: f64 = plausibility::ASSIST as f64;
-const PUSHED_NM: f64 = PUSHED as f64 / ONE;
+const PUSHED_NM: f64 = PUSHED.nm();
 const MOST_ALIGNING_NM: f64 = 16.0;
 /// Far inside what the frames carry, rad and rad/s.
 const LARGEST_WHEEL: f64 = 12.0;

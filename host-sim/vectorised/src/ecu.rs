@@ -29,7 +29,7 @@ const WINDOW_GROWTH: i32 = bits(envelope::WINDOW_GROWTH.nm());
 const WINDOW_STEPS: i32 = ms(envelope::WINDOW) as i32;
 const OVERRIDE_FROM: i32 = bits(envelope::OVERRIDE_FROM.nm());
 const OVERRIDE_SLOPE: i32 = envelope::OVERRIDE_SLOPE.si() as i32;
-const MAX_RATE: i32 = law::MAX_RATE as i32;
+const MAX_RATE: i32 = (law::MAX_RATE << 20) as i32;
 const LANE_STEP: i32 = bits(plausibility::LANE_STEP.m());
 const YAW_STEP: i32 = bits(plausibility::YAW_STEP.rad());
 /// Ends of a lane sample on the bus, 4 m and 0.5 rad, and a bit less.

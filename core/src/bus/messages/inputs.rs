@@ -1,7 +1,9 @@
 //! What the ECU hears.
 
 use super::{Info, Message, from_lsb, info, is_within, narrow, put, to_bits, to_lsb, unsigned};
-use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, shift_round};
+use fixed::types::{I16F16, I24F40, I64F0};
+
+use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, rounded};
 
 /// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -79,21 +81,18 @@ impl Column {
     const MOTOR_MAX: i64 = (1 << 15) - 1;
     /// +-720 deg: two turns, lock to lock.
     const ANGLE_MAX: i64 = 72_000;
-    /// 0.01 deg in 2^-40 rad.
-    const ANGLE_UNIT: i64 = 191_900_981;
-    /// 1 rad in 0.01 deg, with 16 fractional bits.
-    const PER_RADIAN: i64 = 375_493_621;
+    /// 0.01 deg, rad.
+    const ANGLE_UNIT: I24F40 = I24F40::from_bits(191_900_981);
+    /// 1 rad in 0.01 deg.
+    const PER_RADIAN: I16F16 = I16F16::from_bits(375_493_621);
 }
 
 impl Message for Column {
     const INFO: Info = info::Column;
 
     fn pack(&self) -> u64 {
-        let angle = shift_round(
-            i64::from(self.wheel_angle.bits()).saturating_mul(Self::PER_RADIAN),
-            40,
-        )
-        .clamp(-Self::ANGLE_MAX, Self::ANGLE_MAX);
+        let angle: I64F0 = rounded(self.wheel_angle.fixed().wide_mul(Self::PER_RADIAN));
+        let angle = angle.to_bits().clamp(-Self::ANGLE_MAX, Self::ANGLE_MAX);
         put(
             to_lsb(self.driver_torque.bits(), Self::TORQUE_LSB, Self::DRIVER_MAX),
             12,
@@ -115,10 +114,7 @@ impl Message for Column {
             && is_within(motor, Self::MOTOR_MAX);
         in_range.then(|| Self {
             driver_torque: Torque::from_bits(to_bits(driver, Self::TORQUE_LSB)),
-            wheel_angle: Radians::from_wide(shift_round(
-                i64::from(angle).saturating_mul(Self::ANGLE_UNIT),
-                16,
-            )),
+            wheel_angle: Radians::from_wide(rounded(Self::ANGLE_UNIT.wrapping_mul_int(angle.into()))),
             motor_torque: Torque::from_bits(to_bits(motor, Self::TORQUE_LSB)),
         })
     }

@@ -15,6 +15,8 @@ pub use service::{
     Identity, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
 };
 
+use fixed::types::I40F24;
+
 use super::e2e::{Protection, ReceiverState, Reject};
 use super::frame::Frame;
 use crate::quantity::Micros;
@@ -197,6 +199,6 @@ fn to_lsb(bits: i32, lsb: u32, max: i64) -> i64 {
 }
 
 /// The other way, exact.
-fn from_lsb(raw: i64, lsb: u32) -> i64 {
-    raw.wrapping_shl(24_u32.wrapping_sub(lsb))
+fn from_lsb(raw: i64, lsb: u32) -> I40F24 {
+    I40F24::from_bits(raw.wrapping_shl(24_u32.wrapping_sub(lsb)))
 }
