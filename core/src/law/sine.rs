@@ -15,6 +15,9 @@ const C: [I2F30; 4] = [
     I2F30::from_bits(-4_651_906),
 ];
 
+/// The phase a quarter turn ahead of another: `sine(phase + QUARTER)` is the cosine.
+pub(crate) const QUARTER: u32 = 1 << 30;
+
 /// `sin(2*pi*phase/2^32)`.
 #[must_use]
 pub(crate) fn sine(phase: u32) -> I2F30 {
