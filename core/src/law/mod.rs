@@ -19,7 +19,8 @@ pub mod probe;
 pub mod schedule;
 pub(crate) mod sine;
 
-use fixed::types::{I8F24, I12F20, I40F24, I44F20};
+use fixed::types::extra::U20;
+use fixed::types::{I8F24, I12F20, I40F24};
 
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
@@ -141,10 +142,7 @@ impl LawState {
             wide(error).saturating_sub(away).saturating_add(ahead)
         };
         let away_y = aside.saturating_add(drifted).saturating_sub(bent);
-        let to_rate = |wide: I40F24| {
-            let rate: I44F20 = rounded(wide);
-            I12F20::saturating_from_num(rate)
-        };
+        let to_rate = |wide: I40F24| saturate(rounded::<_, U20>(wide));
         let mut late = *self;
         late.last.e_y = Metres::from_wide(error(self.last.e_y.fixed(), away_y, slower_y));
         late.last.e_theta = Radians::from_wide(error(self.last.e_theta.fixed(), wide(turned), slower_theta));
@@ -235,7 +233,7 @@ impl Law {
         // Rounded to nearest.
         let size = sum.unsigned_abs().saturating_add(u64::from(span >> 1));
         let size = I12F20::from_bits(quotient(size, span).min(MOST).cast_signed());
-        if sum < 0 { size.saturating_neg() } else { size }
+        if sum < 0 { size.wrapping_neg() } else { size }
     }
 
     /// Exact wide products, one rounding. Gains have 24 fractional bits, errors are cut to 20 like the

@@ -12,12 +12,11 @@
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
 //! word on the sum), and what the answer tells ([`crate::estimator`]).
 
-use fixed::FixedI64;
+use fixed::types::I1F31;
 use fixed::types::extra::U30;
-use fixed::types::{I1F31, I2F30};
 
 use crate::law::sine::sine;
-use crate::quantity::{Micros, Torque, rounded};
+use crate::quantity::{Micros, Torque, rounded, saturate};
 use crate::safety::redundant::words;
 
 words! {
@@ -64,8 +63,8 @@ impl Probe {
         state.phase = state.phase.wrapping_add(advance);
         let gain = I1F31::from_bits((state.gain >> 1).cast_signed());
         // No more than one.
-        let share: FixedI64<U30> = rounded(gain.wide_mul(sine(state.phase)));
-        let torque = self.amplitude.fixed().wide_mul(I2F30::wrapping_from_num(share));
+        let share = saturate(rounded::<_, U30>(gain.wide_mul(sine(state.phase))));
+        let torque = self.amplitude.fixed().wide_mul(share);
         Some(Torque::from_wide(rounded(torque)))
     }
 }

@@ -15,15 +15,15 @@ pub(crate) const fn rounded<From: LeEqU64, To: LeEqU64>(wide: FixedI64<From>) ->
     FixedI64::from_bits(wide.to_bits().wrapping_add(half).wrapping_shr(cut))
 }
 
-/// The nearest in I8F24: 7 instructions on a Cortex-M4, where `saturating_from_num` has 24.
-pub(crate) fn saturate(wide: I40F24) -> I8F24 {
-    let near = I8F24::wrapping_from_num(wide);
-    if near == wide {
-        near
-    } else if wide.is_negative() {
-        I8F24::MIN
+/// The nearest of 32 bits: 7 instructions on a Cortex-M4, where `saturating_from_num` has 24.
+pub(crate) const fn saturate<Frac>(wide: FixedI64<Frac>) -> FixedI32<Frac> {
+    let near = wide.to_bits() as i32;
+    if near as i64 == wide.to_bits() {
+        FixedI32::from_bits(near)
+    } else if wide.to_bits() < 0 {
+        FixedI32::MIN
     } else {
-        I8F24::MAX
+        FixedI32::MAX
     }
 }
 

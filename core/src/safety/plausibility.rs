@@ -377,11 +377,11 @@ impl Plausibility {
         }
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
-        let sum = state.column.sum.fixed();
-        let above = sum.saturating_abs().wrapping_sub(COLUMN_MARGIN.fixed());
+        let sum = state.column.sum;
+        let above = sum.abs().fixed().wrapping_sub(COLUMN_MARGIN.fixed());
         // Inertia times way over time is the wheel's momentum, in the direction of the sum.
-        let along = if sum.is_negative() {
-            moved.saturating_neg()
+        let along = if sum < AngularImpulse::ZERO {
+            I8F24::ZERO.saturating_sub(moved)
         } else {
             moved
         };
@@ -435,7 +435,11 @@ impl Plausibility {
         let far = saturate(product(self.far_time.fixed(), state.motion.speed.fixed()));
         let less = product_below(far, state.motion.yaw.sum.fixed());
         let is_too_much = predicted >= state.lane.seen;
-        let explained = if is_too_much { less.saturating_neg() } else { less };
+        let explained = if is_too_much {
+            I8F24::ZERO.saturating_sub(less)
+        } else {
+            less
+        };
         if measured && state.lane.is_alive != 0 && explained > missing.abs().fixed().wrapping_shr(2) {
             (state.lane.predicted, state.lane.seen) = (Metres::ZERO, Metres::ZERO);
             return Moved::AsTheWheelSays;
