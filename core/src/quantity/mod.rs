@@ -106,6 +106,12 @@ macro_rules! quantity {
                 Self::ZERO.minus(self)
             }
 
+            /// Whether it is no further than `most` from another.
+            #[must_use]
+            pub(crate) fn is_near(self, other: Self, most: Self) -> bool {
+                self.0.unsigned_dist(other.0) <= most.0.unsigned_abs()
+            }
+
             /// The nearest within +-`most`, which is not negative.
             #[must_use]
             pub(crate) fn within(self, most: Self) -> Self {

@@ -252,20 +252,20 @@ const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 /// Whether a new lane sample is no further from the last than a vehicle can move.
 #[must_use]
 pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
-    last.e_y.minus(new.e_y).abs() <= LANE_STEP && last.e_theta.minus(new.e_theta).abs() <= YAW_STEP
+    last.e_y.is_near(new.e_y, LANE_STEP) && last.e_theta.is_near(new.e_theta, YAW_STEP)
 }
 
 /// Whether a speed follows from the last one, which has been held for so long.
 #[must_use]
 pub fn speed_step_is_possible(last: Speed, new: Speed, held: Micros) -> bool {
     let braked = Speed::from_fixed(per_second(BRAKES.fixed(), held));
-    last.minus(new).abs() <= SPEED_STEP.plus(braked)
+    last.is_near(new, SPEED_STEP.plus(braked))
 }
 
 /// Whether two sources of speed agree: less than 2 m/s apart.
 #[must_use]
 pub fn speeds_agree(a: Speed, b: Speed) -> bool {
-    a.minus(b).abs() < SPEED_SPREAD
+    a.fixed().unsigned_dist(b.fixed()) < SPEED_SPREAD.fixed().unsigned_abs()
 }
 
 /// What a lane may miss of the motion predicted within a second.
@@ -370,7 +370,8 @@ impl Plausibility {
             let lacking = nearest_to_zero(least, most).wrapping_sub(learnt);
             let learnt = Torque::from_fixed(lacking.wrapping_shr(BIAS_SHIFT));
             state.column.bias = state.column.bias.plus(learnt).within(COLUMN_BIAS);
-            let tolerance = I8F24::wrapping_from_num(aligning.wrapping_abs().wide_mul(ALIGNING_SHARE));
+            let tolerance =
+                I8F24::wrapping_from_num(aligning.max(aligning.wrapping_neg()).wide_mul(ALIGNING_SHARE));
             let tolerance = impulse(tolerance.wrapping_add(FRICTION.fixed()));
             // The tolerance is that of the sum: what is not used up between two pushes explains a part of the last.
             let sum = state.column.sum.fixed();
@@ -420,7 +421,7 @@ impl Plausibility {
             let bias = state.lane.bias.fixed();
             let predicted = predicted.saturating_add(per_second(bias, dt));
             let learnt = seen.saturating_sub(predicted).wrapping_shr(BIAS_SHIFT);
-            state.lane.bias = state.lane.bias.plus(Speed::from_fixed(learnt)).within(most);
+            state.lane.bias = Speed::from_fixed(bias.saturating_add(learnt)).within(most);
             let summed = |sum: Metres, change: I8F24| Metres::from_fixed(leak(sum.fixed(), change, dt));
             state.lane.predicted = summed(state.lane.predicted, predicted);
             state.lane.seen = summed(state.lane.seen, seen);
@@ -430,8 +431,7 @@ impl Plausibility {
         // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. A large one is: no
         // vehicle goes there.
         let (predicted, missing) = (state.lane.predicted, state.missing());
-        let half = margin.fixed().wrapping_shr(1);
-        let is_missing = missing > margin && predicted.abs().fixed() > half;
+        let is_missing = missing > margin && predicted.abs().fixed() > margin.fixed().wrapping_shr(1);
         if !is_missing && missing.abs() <= unreal {
             return LaneMotion::Consistent;
         }

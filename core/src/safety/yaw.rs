@@ -75,7 +75,7 @@ impl YawState {
         let sideways = |rate: TurningRate, most: u32| {
             product(speed.fixed(), rate.fixed()).wrapping_abs() <= I40F24::wrapping_from_num(most)
         };
-        let stepped = last.is_some_and(|last| last.minus(measured).abs() > STEP);
+        let stepped = last.is_some_and(|last| !last.is_near(measured, STEP));
         if stepped || !sideways(measured, MOST_SIDEWAYS) {
             self.held = Micros::from_us(self.held.us().saturating_add(passed.us()));
             if last.is_some() && self.held <= PATIENCE {
