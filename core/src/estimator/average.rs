@@ -3,7 +3,6 @@
 //! The work on a reading is cut into pieces, of which a step does one. Not here: what a reading is.
 
 #![expect(
-    clippy::as_conversions,
     clippy::float_arithmetic,
     reason = "the estimate of K_hg is in f32; it moves nothing, and runs when the torque is on its way"
 )]

@@ -368,8 +368,8 @@ impl Plausibility {
             );
             let learnt = impulse(state.column.bias.fixed());
             let lacking = nearest_to_zero(least, most).wrapping_sub(learnt);
-            let learnt = Torque::from_fixed(lacking.wrapping_shr(BIAS_SHIFT));
-            state.column.bias = state.column.bias.plus(learnt).within(COLUMN_BIAS);
+            let bias = (state.column.bias.fixed()).wrapping_add(lacking.wrapping_shr(BIAS_SHIFT));
+            state.column.bias = Torque::from_fixed(bias).within(COLUMN_BIAS);
             let tolerance =
                 I8F24::wrapping_from_num(aligning.max(aligning.wrapping_neg()).wide_mul(ALIGNING_SHARE));
             let tolerance = impulse(tolerance.wrapping_add(FRICTION.fixed()));
