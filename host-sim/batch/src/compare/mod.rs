@@ -21,7 +21,7 @@ use std::path::Path;
 
 use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
 use haptic_sim::input::InputError;
-use haptic_sim::kind::{Kind, Make};
+use haptic_sim::kind::{Kind, Make, Parameter};
 use haptic_sim::laws::{LAWS, Law};
 use haptic_sim::scenario::{Scenario, ScenarioError};
 use haptic_sim::seeds::named;
@@ -30,7 +30,7 @@ use rayon::prelude::*;
 pub use drive::{Driven, METRICS, Metric};
 pub(crate) use drive::{failures, measured};
 pub(crate) use file::drives;
-pub(crate) use parts::{Source, unknown};
+pub(crate) use parts::{Source, parts, unknown};
 pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean};
 
 /// The laws, drivers and habits that a file may name.
@@ -62,14 +62,33 @@ pub struct Chosen<'k, P: ?Sized + 'static> {
     pub around: Vec<(&'k Kind<P>, Vec<f64>)>,
 }
 
-impl<P: ?Sized> Chosen<'_, P> {
+impl<'k, P: ?Sized> Chosen<'k, P> {
     /// The values of its parameters, untuned.
     pub fn untuned(&self) -> Vec<f64> {
         let pairs = self.values.iter().zip(self.kind.parameters);
         pairs.map(|(value, p)| value.unwrap_or(p.default)).collect()
     }
 
-    fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
+    /// The same, with other values of some parameters of what is around it.
+    pub(crate) fn with_habit(&self, kind: &str, changed: &[(&str, f64)]) -> Self {
+        let value = |p: &Parameter, value: &f64| {
+            let found = changed.iter().find(|(name, _)| *name == p.name);
+            found.map_or(*value, |(_, value)| *value)
+        };
+        let outer = |(outer, values): &(&'k Kind<P>, Vec<f64>)| {
+            let values = outer.parameters.iter().zip(values);
+            let all = values.map(|(p, old)| if outer.name == kind { value(p, old) } else { *old });
+            (*outer, all.collect())
+        };
+        Self {
+            name: self.name.clone(),
+            kind: self.kind,
+            values: self.values.clone(),
+            around: self.around.iter().map(outer).collect(),
+        }
+    }
+
+    pub(crate) fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
         let Make::Part(make) = self.kind.make else {
             // The file was checked: what goes around another one is in `around`.
             unreachable!("{} is made around another one", self.kind.name)
