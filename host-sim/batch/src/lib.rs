@@ -50,6 +50,8 @@ pub mod experiment;
 pub mod files;
 pub mod handover;
 pub mod identify;
+#[cfg(feature = "parquet")]
+mod parquet;
 pub mod real_drives;
 mod record;
 pub mod reliance;

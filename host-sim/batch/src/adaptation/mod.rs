@@ -36,6 +36,8 @@ pub use linear::{Swing, of_series, steepest, swings};
 
 /// Small gain with a margin of two: the largest product of slopes that a law may have with a driver.
 pub const SMALL_GAIN: f64 = 0.5;
+/// A gain that moves by less does not swing: noise of the estimate moves it so far, N.m.
+const SWINGS_NM: f64 = 0.02;
 /// Equilibria that lie further apart are two.
 const APART: f64 = 0.1;
 
@@ -120,7 +122,7 @@ pub struct Pair {
     pub against_first: Option<Mean>,
     /// Deviation of K_1 before the loss, N.m.
     pub swing_nm: Option<Mean>,
-    /// How long a swing lasts, s; none if K_1 did not swing twice.
+    /// How long a swing lasts, s; none if K_1 did not swing twice, or by less than 0.02 N.m.
     pub period_s: Option<f64>,
     /// Drives that left the road or in which the ECU ended guidance by itself, of all of this law with this driver.
     pub ended: u32,
@@ -297,7 +299,8 @@ impl<'k> Adaptation<'k> {
         let swings: Vec<_> = (own.iter())
             .map(|drive| of_series(&drive.within([settles_s, lost_at_s], |seen| seen.k_1)))
             .collect();
-        let periods: Vec<f64> = swings.iter().filter_map(|swing| swing.period_s).collect();
+        let large = swings.iter().filter(|swing| swing.deviation >= SWINGS_NM);
+        let periods: Vec<f64> = large.filter_map(|swing| swing.period_s).collect();
         Pair {
             law: 0,
             driver: 0,

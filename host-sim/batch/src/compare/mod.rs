@@ -31,7 +31,7 @@ pub use drive::{Driven, METRICS, Metric};
 pub(crate) use drive::{failures, measured};
 pub(crate) use file::drives;
 pub(crate) use parts::{Source, parts, unknown};
-pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean};
+pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean, Ratio};
 
 /// The laws, drivers and habits that a file may name.
 pub struct Kinds {
@@ -89,11 +89,12 @@ impl<'k, P: ?Sized> Chosen<'k, P> {
     }
 
     pub(crate) fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
-        let Make::Part(make) = self.kind.make else {
+        let mut made = match self.kind.make {
+            Make::Part(make) => make(scenario, values)?,
+            Make::Given(make) => make(scenario, values)?,
             // The file was checked: what goes around another one is in `around`.
-            unreachable!("{} is made around another one", self.kind.name)
+            Make::Around(_) => unreachable!("{} is made around another one", self.kind.name),
         };
-        let mut made = make(scenario, values)?;
         for (kind, values) in &self.around {
             if let Make::Around(make) = kind.make {
                 made = make(scenario, values, made);
@@ -152,8 +153,12 @@ pub struct Compare<'k> {
     pub laws: Vec<Chosen<'k, dyn Law>>,
     /// The drivers.
     pub drivers: Vec<Chosen<'k, dyn AnyDriver>>,
-    /// What is judged.
+    /// What is judged: the places of each world, one behind the other.
     pub judged: Drives,
+    /// Names of the worlds; one without a name if the file has none.
+    pub worlds: Vec<String>,
+    /// Which laws are tuned for each driver by itself: what who knows the driver could choose.
+    pub oracles: Vec<bool>,
     /// How laws are tuned first, if they are.
     pub tuning: Option<Tuning>,
     /// What fails.
@@ -196,7 +201,15 @@ impl<'k> Compare<'k> {
     pub fn run(&self, progress: impl Fn() + Sync) -> Result<CompareResults, ScenarioError> {
         let tuned = tune::tune(self, &progress)?;
         let jobs = self.jobs(&self.judged, |_| 1);
-        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| vec![law.values.clone()]).collect();
+        // A driver's own set has the driver's number.
+        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| law.values.clone()).collect();
+        let jobs: Vec<Job> = jobs
+            .into_iter()
+            .map(|job| Job {
+                set: job.driver,
+                ..job
+            })
+            .collect();
         let driven = self.drive(&jobs, &sets, &self.judged, "judged", self.faults, &progress)?;
         Ok(results::sum_up(self, tuned, &jobs, &driven))
     }
