@@ -137,9 +137,11 @@ fn oracles(source: &Source, laws: &[Table]) -> Result<(Vec<Table>, Vec<bool>), I
 
 /// Names of the worlds, and the drives in each, one world behind the other; one world without a name if the file has none.
 fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputError> {
-    let drives = |fields: &Table| drives(source, "", fields, &file.roads, &file.speeds_kmh, file.seeds);
+    let drives = |source: &Source, fields: &Table| {
+        drives(source, "", fields, &file.roads, &file.speeds_kmh, file.seeds)
+    };
     if file.world.is_empty() {
-        return Ok((vec![String::new()], drives(&file.scenario)?));
+        return Ok((vec![String::new()], drives(source, &file.scenario)?));
     }
     let names: Vec<String> = file.world.iter().map(|world| world.name.clone()).collect();
     check_names("world", &names).map_err(|e| source.bad(e))?;
@@ -155,7 +157,11 @@ fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputEr
                 _ => _ = fields.insert(name.clone(), value.clone()),
             }
         }
-        let made = drives(&fields).map_err(|e| source.bad(format!("world {}: {e}", world.name)))?;
+        let source = Source {
+            name: format!("{}: world {}", source.name, world.name),
+            folder: source.folder,
+        };
+        let made = drives(&source, &fields)?;
         all.places.extend(made.places);
         all.seeds = made.seeds;
     }

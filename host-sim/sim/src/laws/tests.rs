@@ -32,6 +32,7 @@ fn law(name: &str, changed: &[(&str, f64)]) -> Box<dyn Law> {
     }
     match kind.make {
         Make::Part(make) => make(&Scenario::default(), &values).unwrap(),
+        Make::Given(make) => make(&Scenario::default(), &values).unwrap(),
         Make::Around(make) => make(&Scenario::default(), &values, Box::new(Gains::PAPER)),
     }
 }
