@@ -2,6 +2,7 @@
 //! the command line uses too. What only arranges results is Python (`python/haptic_guidance`).
 
 mod bus;
+mod compare;
 mod driver_view;
 mod ecu;
 mod errors;
@@ -22,6 +23,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::bus::{Bus, Frame};
+    #[pymodule_export]
+    use crate::compare::{LawView, compare};
     #[pymodule_export]
     use crate::driver_view::DriverView;
     #[pymodule_export]

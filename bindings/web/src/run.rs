@@ -203,6 +203,7 @@ fn law_at(place: usize, scenario: &Scenario) -> Result<Box<dyn Law>, String> {
         None => return Ok(Box::new(PageLaw)),
         Some(kind) => match &kind.make {
             Make::Part(make) => make(scenario, &kind.defaults()),
+            Make::Given(make) => make(scenario, &kind.defaults()),
             // The only limit of the library is around its paper's law.
             Make::Around(make) => {
                 let paper = LAWS.iter().find(|kind| kind.name == "paper");

@@ -19,6 +19,7 @@ from ._native import (
     DriverView,
     Ecu,
     Frame,
+    LawView,
     Outcome,
     Scenario,
     Simulation,
@@ -26,7 +27,7 @@ from ._native import (
     metric_definitions,
     parameters,
 )
-from ._results import Evaluation, Experiment, Run, evaluate, experiment, simulate
+from ._results import Comparison, Evaluation, Experiment, Run, compare, evaluate, experiment, simulate
 from ._sweep import SweepResult, sweep
 
 __all__ = [
@@ -37,9 +38,11 @@ __all__ = [
     "Evaluation",
     "Experiment",
     "Change",
+    "Comparison",
     "Fit",
     "Frame",
     "InputError",
+    "LawView",
     "Outcome",
     "Parameter",
     "Piece",
@@ -50,6 +53,7 @@ __all__ = [
     "Step",
     "SweepResult",
     "UnknownNameError",
+    "compare",
     "evaluate",
     "experiment",
     "identify",

@@ -28,6 +28,8 @@ struct File {
     #[serde(default)]
     faults: FaultsFile,
     tuning: Option<TuningFile>,
+    #[serde(default)]
+    world: Vec<WorldFile>,
     law: Vec<Table>,
     driver: Vec<Table>,
 }
@@ -38,6 +40,14 @@ struct FaultsFile {
     sudden_loss: u64,
     silent_lane: u64,
     lasts_s: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WorldFile {
+    name: String,
+    #[serde(default)]
+    scenario: Table,
 }
 
 #[derive(Deserialize)]
@@ -83,16 +93,10 @@ pub(super) fn from_text<'k>(
     };
     let file: File = parse_toml(name, text)?;
     check_names("comparison", [&file.name]).map_err(|e| source.bad(e))?;
-    let laws = parts(&source, "law", &file.law, &kinds.laws)?;
+    let (tables, oracles) = oracles(&source, &file.law)?;
+    let laws = parts(&source, "law", &tables, &kinds.laws)?;
     let drivers = parts(&source, "driver", &file.driver, &kinds.drivers)?;
-    let judged = drives(
-        &source,
-        "",
-        &file.scenario,
-        &file.roads,
-        &file.speeds_kmh,
-        file.seeds,
-    )?;
+    let (worlds, judged) = worlds(&source, &file)?;
     let tuning = file
         .tuning
         .as_ref()
@@ -110,11 +114,58 @@ pub(super) fn from_text<'k>(
         laws,
         drivers,
         judged,
+        worlds,
+        oracles,
         tuning,
         faults,
     };
     check_parts(&source, &compare)?;
     Ok(compare)
+}
+
+/// The tables of the laws without `oracle`, and whether each is one.
+fn oracles(source: &Source, laws: &[Table]) -> Result<(Vec<Table>, Vec<bool>), InputError> {
+    let mut tables = laws.to_vec();
+    let is_oracle = |table: &mut Table| match table.remove("oracle") {
+        None => Ok(false),
+        Some(Value::Boolean(is)) => Ok(is),
+        Some(other) => Err(source.bad(format!("law.oracle = {other}: true or false is wanted"))),
+    };
+    let oracles = tables.iter_mut().map(is_oracle).collect::<Result<_, _>>()?;
+    Ok((tables, oracles))
+}
+
+/// Names of the worlds, and the drives in each, one world behind the other; one world without a name if the file has none.
+fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputError> {
+    let drives = |source: &Source, fields: &Table| {
+        drives(source, "", fields, &file.roads, &file.speeds_kmh, file.seeds)
+    };
+    if file.world.is_empty() {
+        return Ok((vec![String::new()], drives(source, &file.scenario)?));
+    }
+    let names: Vec<String> = file.world.iter().map(|world| world.name.clone()).collect();
+    check_names("world", &names).map_err(|e| source.bad(e))?;
+    let mut all = Drives {
+        places: Vec::new(),
+        seeds: 0,
+    };
+    for world in &file.world {
+        let mut fields = file.scenario.clone();
+        for (name, value) in &world.scenario {
+            match (fields.get_mut(name), value) {
+                (Some(Value::Table(fields)), Value::Table(own)) => fields.extend(own.clone()),
+                _ => _ = fields.insert(name.clone(), value.clone()),
+            }
+        }
+        let source = Source {
+            name: format!("{}: world {}", source.name, world.name),
+            folder: source.folder,
+        };
+        let made = drives(&source, &fields)?;
+        all.places.extend(made.places);
+        all.seeds = made.seeds;
+    }
+    Ok((names, all))
 }
 
 /// Every law and driver can be made, and there are not too many drives.
