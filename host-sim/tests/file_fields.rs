@@ -77,7 +77,7 @@ fn scenario_text(row: &DocumentedField, value: &str) -> String {
     match row.table.as_str() {
         "" => set(&row.field),
         "speed" => match row.field.as_str() {
-            "kmh" => format!("[speed]\ntime = [0, 1000]\nkmh = [60, {value}]\n"),
+            "kmh" => format!("[speed]\ntime_s = [0, 1000]\nkmh = [60, {value}]\n"),
             axis => format!("[speed]\n{axis} = [0, {value}]\nkmh = [60, 60]\n"),
         },
         "driver_change" => {

@@ -159,7 +159,7 @@ def _slack(scenario: Scenario) -> Any:
 
 
 class _Authority(_Loops):
-    default = Scenario(condition="mid", driver={"remnant_sd": 0.072})
+    default = Scenario(condition="mid", driver={"remnant_sd_nm": 0.072})
     period_ms = 100
     field, unit = "authority", ""
 

@@ -16,7 +16,7 @@ seeds = 2
 roads = ['road.toml']
 speeds_kmh = [50, 60]
 [scenario]
-driver = { remnant_sd = 0.1 }
+driver = { remnant_sd_nm = 0.1 }
 [faults]
 sudden_loss = 2
 silent_lane = 1

@@ -40,10 +40,10 @@ mod tests {
     #[test]
     fn a_field_has_the_unit_of_the_reference() {
         for (path, unit) in [
-            ("speed", Some("km/h")),
-            ("driver.t_p", Some("s")),
-            ("driver.K_hg", Some("-")),
-            ("vehicle.B_s", Some("N.m.s/rad")),
+            ("speed_m_per_s", Some("m/s")),
+            ("driver.t_p_s", Some("s")),
+            ("driver.k_hg", Some("-")),
+            ("vehicle.b_s_nms_per_rad", Some("N.m.s/rad")),
             ("course.segment.2.curvature_end", Some("1/m")),
             ("course.lane_width", Some("m")),
             ("no.such", None),
@@ -57,12 +57,12 @@ mod tests {
             over: None,
         };
         assert_eq!(
-            of(&column(&["driver.t_p", "driver.t_nms"], 1.0)).as_deref(),
+            of(&column(&["driver.t_p_s", "driver.t_nms_s"], 1.0)).as_deref(),
             Some("s")
         );
-        assert_eq!(of(&column(&["driver.t_p", "driver.K_d"], 1.0)), None, "two units");
+        assert_eq!(of(&column(&["driver.t_p_s", "driver.k_d_nm_per_rad"], 1.0)), None, "two units");
         assert_eq!(
-            of(&column(&["failure.time"], 3.6)),
+            of(&column(&["failure.time_s"], 3.6)),
             None,
             "a number of the user's own"
         );

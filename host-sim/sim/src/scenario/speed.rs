@@ -60,6 +60,24 @@ impl Speed {
         Self::Constant(kmh / 3.6)
     }
 
+    /// Through speeds (km/h) by time (s).
+    pub fn by_time_kmh(time_s: Vec<f64>, kmh: &[f64]) -> Self {
+        let speed_m_per_s = kmh.iter().map(|kmh| kmh / 3.6).collect();
+        Self::ByTime {
+            time_s,
+            speed_m_per_s,
+        }
+    }
+
+    /// Through speeds (km/h) by place (m).
+    pub fn by_place_kmh(place_m: Vec<f64>, kmh: &[f64]) -> Self {
+        let speed_m_per_s = kmh.iter().map(|kmh| kmh / 3.6).collect();
+        Self::ByPlace {
+            place_m,
+            speed_m_per_s,
+        }
+    }
+
     /// What it is at the start, km/h.
     pub fn start_kmh(&self) -> f64 {
         let points = match self {

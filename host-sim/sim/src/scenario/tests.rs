@@ -36,8 +36,8 @@ fn an_empty_file_is_tables_4_8_and_9() {
 fn every_field_can_be_set() {
     let s = parse(
         "course = 'paper-course'\nspeed = 80\ncondition = 'high'\nsensors = 'exact'\nseed = 9\n\
-         [driver]\nt_p = 0.3\nK_hg = 0.25\nremnant_sd = 0.1\n[vehicle]\nm = 1500\nI = 3000\n\
-         [guidance]\nK_1 = 0.5\na2 = 0.1\nt_f = 0.8\ntorque_limit_nm = 3\n\
+         [driver]\nt_p_s = 0.3\nK_hg = 0.25\nremnant_sd = 0.1\n[vehicle]\nm_kg = 1500\nI = 3000\n\
+         [guidance]\nk_1_nm = 0.5\na2 = 0.1\nt_f = 0.8\ntorque_limit_nm = 3\n\
          [failure]\nkind = 'torque'\ntime = 50",
     )
     .unwrap();
@@ -62,7 +62,7 @@ fn every_field_can_be_set() {
         ArmGains { k_d: 4.0, k_hg: 1.0 }
     );
     assert_eq!(
-        parse("[driver]\nK_d = 2\nK_hg = 0").unwrap().condition(),
+        parse("[driver]\nk_d_nm_per_rad = 2\nK_hg = 0").unwrap().condition(),
         Condition::High
     );
 }
@@ -109,51 +109,51 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ("condition = 'custom'", "custom"),
         ("sensors = 'perfect'", "perfect"),
         ("[failure]\nkind = 'brakes'", "brakes"),
-        ("[driver]\nt_p = 0", "driver.t_p = 0 s is outside 0.001 to 2 s"),
+        ("[driver]\nt_p_s = 0", "driver.t_p_s = 0 s is outside 0.001 to 2 s"),
         (
-            "[driver]\nK_d = -1",
-            "driver.K_d = -1 N.m/rad is outside 0 to 50 N.m/rad",
+            "[driver]\nk_d_nm_per_rad = -1",
+            "driver.k_d_nm_per_rad = -1 N.m/rad is outside 0 to 50 N.m/rad",
         ),
-        ("[driver]\nremnant_sd = -1", "driver.remnant_sd = -1"),
-        ("[vehicle]\nm = 0", "vehicle.m = 0 kg"),
+        ("[driver]\nremnant_sd_nm = -1", "driver.remnant_sd_nm = -1"),
+        ("[vehicle]\nm_kg = 0", "vehicle.m_kg = 0 kg"),
         (
-            "[guidance]\nK_1 = 50",
-            "guidance.K_1 = 50 N.m is outside 0 to 4 N.m",
-        ),
-        (
-            "[guidance]\na3 = 1e3",
-            "guidance.a_3 = 1000 1/rad is outside 0 to 100 1/rad",
+            "[guidance]\nk_1_nm = 50",
+            "guidance.k_1_nm = 50 N.m is outside 0 to 4 N.m",
         ),
         (
-            "[guidance]\na4 = -1",
-            "guidance.a_4 = -1 s/rad is outside 0 to 100 s/rad",
+            "[guidance]\na_3_per_rad = 1e3",
+            "guidance.a_3_per_rad = 1000 1/rad is outside 0 to 100 1/rad",
         ),
         (
-            "[guidance]\nK_1 = 4\na1 = 9",
+            "[guidance]\na_4_s_per_rad = -1",
+            "guidance.a_4_s_per_rad = -1 s/rad is outside 0 to 100 s/rad",
+        ),
+        (
+            "[guidance]\nk_1_nm = 4\na1 = 9",
             "guidance: K_1*a_1 = 36 N.m/m is outside 0 to 32 N.m/m",
         ),
         (
-            "[guidance]\nt_f = 0.05",
-            "guidance.t_f = 0.05 s is outside 0.1 to 3 s",
+            "[guidance]\nt_f_s = 0.05",
+            "guidance.t_f_s = 0.05 s is outside 0.1 to 3 s",
         ),
         (
-            "[vehicle]\nK_t = 0.2\nl_f = 0.1\nl_r = 0.1",
+            "[vehicle]\nk_t = 0.2\nl_f = 0.1\nl_r = 0.1",
             "vehicle: K_t/(l_f + l_r) = 1 1/m is outside 0.001 to 0.1 1/m",
         ),
-        ("[guidance]\nt_n = -0.1", "guidance.t_n = -0.1"),
-        ("[failure]\ntime = -3", "failure.time = -3"),
-        ("[driver_change]\ntime = 3\nK_d = 2", "K_hg"),
+        ("[guidance]\nt_n_s = -0.1", "guidance.t_n_s = -0.1"),
+        ("[failure]\ntime_s = -3", "failure.time_s = -3"),
+        ("[driver_change]\ntime_s = 3\nK_d = 2", "K_hg"),
         (
-            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = -1",
-            "driver_change.K_hg = -1",
+            "[driver_change]\ntime_s = 3\nK_d = 2\nK_hg = -1",
+            "driver_change.k_hg = -1",
         ),
         (
             "[guidance]\nprobe_amplitude_nm = 0.31",
             "guidance.probe_amplitude_nm = 0.31",
         ),
         (
-            "[driver]\nt_f = 5\n[guidance]\nt_f = 5.5",
-            "guidance.t_f = 5.5 s is outside 0.1 to 3 s",
+            "[driver]\nt_f_s = 5\n[guidance]\nt_f_s = 5.5",
+            "guidance.t_f_s = 5.5 s is outside 0.1 to 3 s",
         ),
     ];
     each_is_refused(&cases);
@@ -172,11 +172,11 @@ fn a_manual_driver_has_nothing_that_needs_guidance() {
     for (text, expected) in [
         ("[failure]\nkind = 'torque'", "failure.kind = \"torque\""),
         ("[failure]\nkind = 'input'", "failure.kind = \"input\""),
-        ("[driver]\nK_hg = 0.5", "driver.K_hg = 0.5"),
+        ("[driver]\nk_hg = 0.5", "driver.k_hg = 0.5"),
         ("[guidance]\nprobe = true", "guidance.probe = true"),
         (
-            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0.25",
-            "driver_change.K_hg = 0.25",
+            "[driver_change]\ntime_s = 3\nK_d = 2\nK_hg = 0.25",
+            "driver_change.k_hg = 0.25",
         ),
     ] {
         let error = manual(text).unwrap_err().to_string();
@@ -186,7 +186,7 @@ fn a_manual_driver_has_nothing_that_needs_guidance() {
         );
     }
     let own_arm =
-        manual("[driver]\nK_d = 3\nK_hg = 0\n[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0").unwrap();
+        manual("[driver]\nk_d_nm_per_rad = 3\nK_hg = 0\n[driver_change]\ntime_s = 3\nK_d = 2\nK_hg = 0").unwrap();
     assert_eq!(
         (own_arm.condition(), own_arm.gains().k_d),
         (Condition::Manual, 3.0)
@@ -213,7 +213,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
         after(30.1, FailureKind::Input)
             .check_times()
             .map_err(|e| e.to_string()),
-        Err("failure.time = 30.1 s is outside 0 to 30 s: the run ends there".into())
+        Err("failure.time_s = 30.1 s is outside 0 to 30 s: the run ends there".into())
     );
     let change = DriverChange {
         time_s: 31.0,
@@ -223,7 +223,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
     let changing = after(0.0, FailureKind::None).to_builder();
     let changing = changing.driver_change(Some(change)).build().unwrap();
     let error = changing.check_times().unwrap_err().to_string();
-    assert!(error.starts_with("driver_change.time = 31 s"), "{error}");
+    assert!(error.starts_with("driver_change.time_s = 31 s"), "{error}");
 }
 
 #[test]
@@ -249,9 +249,9 @@ fn a_scenario_written_and_read_again_is_the_same() {
     let course = "lane_width = 3.1\n[[segment]]\nlength = 150.5\n\
                   [[segment]]\nlength = 1000\ncurvature_start = 0.0\ncurvature_end = -0.00123456789012345\n";
     let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed = 71.3\nseed = 7\n\
-                  [driver]\nt_p = 0.1234567890123\nK_d = 3.21\nremnant_sd = 0.1\n\
-                  [guidance]\na2 = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
-                  [driver_change]\ntime = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm = 1234.5\n";
+                  [driver]\nt_p_s = 0.1234567890123\nK_d = 3.21\nremnant_sd = 0.1\n\
+                  [guidance]\na_2_s_per_m = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
+                  [driver_change]\ntime_s = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm_kg = 1234.5\n";
     for text in ["", "condition = 'manual'", others] {
         let load = |name: &str, _: &LaneChoice| Course::from_toml(name, course);
         let scenario = Scenario::from_toml("s.toml", text, load).unwrap();
@@ -293,7 +293,7 @@ fn neutral_and_oversteering_vehicles_can_be_driven() {
 #[test]
 fn a_real_world_is_driven_and_stands_in_the_file_of_the_scenario() {
     let text = "seed = 3\n[world]\ntyres = \"saturating\"\nmu = 0.8\nfriction = 0.3\nmotor_lag = 0.005\n\
-                gust_sd = 100\n[sensor_errors]\ntorque_bias = 0.05\nlane_noise = 0.01\n";
+                gust_sd_n = 100\n[sensor_errors]\ntorque_bias_nm = 0.05\nlane_noise = 0.01\n";
     let scenario = Scenario::from_toml("s", text, |_, _| unreachable!()).unwrap();
     let again = Scenario::from_toml("s", &scenario.to_toml(), |_, _| unreachable!()).unwrap();
     assert_eq!(again, scenario);

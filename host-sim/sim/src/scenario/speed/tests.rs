@@ -6,17 +6,11 @@ use crate::models::road::Course;
 use crate::scenario::Scenario;
 
 fn by_time(time: &[f64], kmh: &[f64]) -> Speed {
-    Speed::ByTime {
-        time: time.to_vec(),
-        kmh: kmh.to_vec(),
-    }
+    Speed::by_time_kmh(time.to_vec(), kmh)
 }
 
 fn by_place(place: &[f64], kmh: &[f64]) -> Speed {
-    Speed::ByPlace {
-        place: place.to_vec(),
-        kmh: kmh.to_vec(),
-    }
+    Speed::by_place_kmh(place.to_vec(), kmh)
 }
 
 fn close(found: f64, wanted: f64, within: f64) {
@@ -92,7 +86,7 @@ fn a_run_ends_when_the_look_ahead_gets_to_the_end_of_the_road() {
 
 #[test]
 fn a_speed_that_stays_has_the_end_that_it_always_had() {
-    let profile = Speed::Constant(61.7).profile().unwrap();
+    let profile = Speed::constant_kmh(61.7).profile().unwrap();
     let v = 61.7 / 3.6;
     assert_eq!(profile.end(3350.0, 1.3), ((3350.0 - v * 1.3) / v, v));
 }
@@ -107,31 +101,31 @@ fn points_that_make_no_sense_are_refused_by_name() {
     for (table, expected) in [
         (
             "time = [0, 10, 5]\nkmh = [60, 50, 60]",
-            "speed.time (point 3) = 5 s is not behind point 2",
+            "speed.time_s (point 3) = 5 s is not behind point 2",
         ),
         (
             "time = [0, 10, 10]\nkmh = [60, 50, 60]",
-            "speed.time (point 3) = 10 s is not behind point 2",
+            "speed.time_s (point 3) = 10 s is not behind point 2",
         ),
         (
             "time = [0, nan]\nkmh = [60, 60]",
-            "speed.time (point 2) = NaN s is outside 0 to 1000000 s",
+            "speed.time_s (point 2) = NaN s is outside 0 to 1000000 s",
         ),
         (
             "place = [-1, 5]\nkmh = [60, 60]",
-            "speed.place (point 1) = -1 m is outside 0 to 1000000 m",
+            "speed.place_m (point 1) = -1 m is outside 0 to 1000000 m",
         ),
         (
             "time = [0, 9]\nkmh = [60, nan]",
-            "speed.kmh (point 2) = NaN km/h is outside 10 to 250 km/h",
+            "speed.speed_m_per_s (point 2) = NaN km/h is outside 10 to 250 km/h",
         ),
         (
             "time = [0, 9]\nkmh = [60, 0]",
-            "speed.kmh (point 2) = 0 km/h is outside 10 to 250 km/h",
+            "speed.speed_m_per_s (point 2) = 0 km/h is outside 10 to 250 km/h",
         ),
         (
             "time = [0, 9]\nkmh = [60, 60, 60]",
-            "speed.time has 2 and speed.kmh 3 values",
+            "speed.time_s has 2 and speed.kmh 3 values",
         ),
         ("time = [0]\nkmh = [60]", "takes two points at least, not 1"),
         ("place = []\nkmh = []", "takes two points at least, not 0"),
@@ -162,7 +156,7 @@ fn points_that_make_no_sense_are_refused_by_name() {
             "{table}: {error}"
         );
     }
-    let both = "speed = 60\n[speed]\ntime = [0, 9]\nkmh = [60, 60]";
+    let both = "speed = 60\n[speed]\ntime_s = [0, 9]\nkmh = [60, 60]";
     let none = |name: &str, _: &_| -> Result<Course, _> { Err(InputError::new(name, "not there")) };
     let error = Scenario::from_toml("s.toml", both, none).unwrap_err().to_string();
     assert!(error.contains("duplicate key"), "{error}");
