@@ -77,8 +77,10 @@ fn scenario_text(row: &DocumentedField, value: &str) -> String {
     match row.table.as_str() {
         "" => set(&row.field),
         "speed" => match row.field.as_str() {
-            "kmh" => format!("[speed]\ntime_s = [0, 1000]\nkmh = [60, {value}]\n"),
-            axis => format!("[speed]\n{axis} = [0, {value}]\nkmh = [60, 60]\n"),
+            "kmh" => format!("[speed]\ntime_s = [0, 1000]\nspeed_m_per_s = [16.666666666666668, {value}]\n"),
+            axis => format!(
+                "[speed]\n{axis} = [0, {value}]\nspeed_m_per_s = [16.666666666666668, 16.666666666666668]\n"
+            ),
         },
         "driver_change" => {
             let others = [("time", "1"), ("K_d", "2"), ("K_hg", "0.25")];

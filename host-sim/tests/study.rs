@@ -29,7 +29,7 @@ person = true
 const COURSE: &str =
     "lane_width = 3.6\n[[segment]]\nlength = 150\n[[segment]]\nlength = 300\ncurvature = 0.002\n";
 /// What a person might leave: the lab writes the same columns.
-const PERSON: &str = "course = \"course.toml\"\nseed = 9\n[driver]\nt_p_s = 0.25\nremnant_sd = 0.1\n";
+const PERSON: &str = "course = \"course.toml\"\nseed = 9\n[driver]\nt_p_s = 0.25\nremnant_sd_nm = 0.1\n";
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));

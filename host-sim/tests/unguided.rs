@@ -11,7 +11,7 @@ use serde_json::Value;
 const HELD: &str = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
                     [[segment]]\nlength = 1000\ncurvature = 0.00125\n";
 /// A camera that is blind for 1.5 s every few seconds: the ECU hands over after a second of that.
-const BLIND: &str = "[sensor_errors]\ndropout_rate_per_s = 0.2\ndropout = 1.5\n";
+const BLIND: &str = "[sensor_errors]\ndropout_rate_per_s = 0.2\ndropout_duration_s = 1.5\n";
 const RELIANCES: [&str; 3] = ["high", "mid", "low"];
 
 fn folder() -> tempfile::TempDir {

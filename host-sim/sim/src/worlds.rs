@@ -274,7 +274,11 @@ impl WorldKind {
             },
             gust_corner_hz: if self.has(Gusts) { 1.0 } else { off.gust_corner_hz },
             wind_lever_m: 0.5,
-            motor_ripple_nm: if self.has(Motor) { 0.02 } else { off.motor_ripple_nm },
+            motor_ripple_nm: if self.has(Motor) {
+                0.02
+            } else {
+                off.motor_ripple_nm
+            },
             motor_lag_s: if self.has(Motor) { 0.002 } else { off.motor_lag_s },
             assist_nm: if self.has(Assist) { 8.0 } else { off.assist_nm },
             ..off

@@ -191,7 +191,14 @@ pub(crate) fn drives(
             return Err(source.bad(format!("{table}{field} = []: one at least is wanted")));
         }
     }
-    for field in ["seed", "course", "speed", "speed_m_per_s", "failure", "driver_change"] {
+    for field in [
+        "seed",
+        "course",
+        "speed",
+        "speed_m_per_s",
+        "failure",
+        "driver_change",
+    ] {
         if fields.contains_key(field) {
             return Err(source.bad(format!(
                 "scenario.{field}: this file has its own seeds, roads, speeds, faults and drivers"

@@ -115,7 +115,11 @@ fn a_study_goes_on_and_overwrites_nothing() {
     // Another seed, speed or name is another study.
     for (from, to, says) in [
         ("seed = 7", "seed = 8", "another scenario or seed"),
-        ("speed_m_per_s = 16", "speed_m_per_s = 17", "another scenario or seed"),
+        (
+            "speed_m_per_s = 16",
+            "speed_m_per_s = 17",
+            "another scenario or seed",
+        ),
         ("\"reliance\"", "\"trust\"", "in study reliance"),
     ] {
         let error = study(&STUDY.replace(from, to))
@@ -309,7 +313,11 @@ fn what_is_no_study_is_refused_by_name() {
             "repetitions = 0 is outside 1 to 100",
         ),
         ("speed_m_per_s = 16", "sped = 16", "sped"),
-        ("speed_m_per_s = 16", "seed = 16", "seed: every session has its own"),
+        (
+            "speed_m_per_s = 16",
+            "seed = 16",
+            "seed: every session has its own",
+        ),
         (
             "person = true",
             "person = false",

@@ -404,7 +404,8 @@ mod tests {
         effects.finish()
     }
 
-    const TWO_FIELDS: &str = "[vary]\nspeed_m_per_s = [14, 17, 22]\n\"driver.t_p_s\" = { uniform = [0.1, 0.4] }\n";
+    const TWO_FIELDS: &str =
+        "[vary]\nspeed_m_per_s = [14, 17, 22]\n\"driver.t_p_s\" = { uniform = [0.1, 0.4] }\n";
 
     /// What every sample shares is no doubt about a list's values: means of 1.0, 0.9 and 1.1 with a spread of 1 between samples
     /// are told apart as soon as the difference is the same in each sample. Of 20 samples with peaks 0, 2, 0, 2 ... the interval

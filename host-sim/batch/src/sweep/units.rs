@@ -60,7 +60,11 @@ mod tests {
             of(&column(&["driver.t_p_s", "driver.t_nms_s"], 1.0)).as_deref(),
             Some("s")
         );
-        assert_eq!(of(&column(&["driver.t_p_s", "driver.k_d_nm_per_rad"], 1.0)), None, "two units");
+        assert_eq!(
+            of(&column(&["driver.t_p_s", "driver.k_d_nm_per_rad"], 1.0)),
+            None,
+            "two units"
+        );
         assert_eq!(
             of(&column(&["failure.time_s"], 3.6)),
             None,

@@ -96,7 +96,8 @@ impl Tolerances {
         vehicle.k_r *= 1.0 + self.tyres * draw.both_sides();
         vehicle.e_t *= 1.0 + self.trail * draw.both_sides();
         *vehicle = loaded(vehicle, self.load_kg * draw.share());
-        let friction = self.friction_least_nm + (self.friction_most_nm - self.friction_least_nm) * draw.share();
+        let friction =
+            self.friction_least_nm + (self.friction_most_nm - self.friction_least_nm) * draw.share();
         if self.friction_most_nm > 0.0 {
             car.world.friction_nm = friction;
         }

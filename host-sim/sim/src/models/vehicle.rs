@@ -10,7 +10,7 @@ fields! {
         /// mass
         m: f64 = 1100.0, "m_kg", "m", "kg", Between(100.0, 50_000.0);
         /// yaw inertia
-        i: f64 = 2940.0, "i_kg_m2", "I", "kg.m^2", Between(100.0, 500_000.0);
+        i: f64 = 2940.0, "i_kg_m2", "I", "kg.m2", Between(100.0, 500_000.0);
         /// centre of gravity to the front axle
         l_f: f64 = 1.0, "l_f_m", "l_f", "m", Between(0.1, 10.0);
         /// centre of gravity to the rear axle
@@ -26,7 +26,7 @@ fields! {
         /// damping of the column
         b_s: f64 = 0.57, "b_s_nms_per_rad", "B_s", "N.m.s/rad", Between(0.01, 10.0);
         /// inertia of the column
-        j_s: f64 = 0.11, "j_s_kg_m2", "J_s", "kg.m^2", Between(0.01, 2.0);
+        j_s: f64 = 0.11, "j_s_kg_m2", "J_s", "kg.m2", Between(0.01, 2.0);
         /// front wheel angle per steering wheel angle: 1/17
         k_t: f64 = 1.0 / 17.0, "k_t", "K_t", "", Between(0.02, 0.2);
     }

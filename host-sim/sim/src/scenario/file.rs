@@ -21,8 +21,8 @@ pub(super) fn parse(
     text: &str,
     course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
 ) -> Result<ScenarioBuilder, InputError> {
-    let file: ScenarioFile =
-        parse_toml(name, text).map_err(|e| old_name(text, fields_of).map_or(e, |old| InputError::new(name, old)))?;
+    let file: ScenarioFile = parse_toml(name, text)
+        .map_err(|e| old_name(text, fields_of).map_or(e, |old| InputError::new(name, old)))?;
     let choice = LaneChoice {
         road: file.road.clone(),
         lane: file.lane,

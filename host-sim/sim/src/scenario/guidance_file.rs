@@ -47,10 +47,12 @@ const FORMULAS: [(&str, &str); 7] = [
 
 /// The controller's parameters that a file may set, by their places in [`PARAMETERS`].
 static LISTED: LazyLock<Vec<(usize, Field)>> = LazyLock::new(|| {
-    let here = |parameter: &Parameter| {
-        !NOT_IN_THE_FILE.contains(&parameter.name) && !parameter.name.contains('.')
-    };
-    let listed = PARAMETERS.iter().enumerate().filter(|(_, parameter)| here(parameter));
+    let here =
+        |parameter: &Parameter| !NOT_IN_THE_FILE.contains(&parameter.name) && !parameter.name.contains('.');
+    let listed = PARAMETERS
+        .iter()
+        .enumerate()
+        .filter(|(_, parameter)| here(parameter));
     let field = |(place, parameter): (usize, &'static Parameter)| {
         let symbol = SYMBOLS.iter().find(|(name, _)| *name == parameter.name);
         let field = Field {

@@ -94,8 +94,14 @@ impl Speed {
                 in_range("speed_m_per_s", *m_per_s, SPEED_M_PER_S, "m/s")?;
                 Ok(SpeedProfile::constant(*m_per_s))
             }
-            Self::ByTime { time_s, speed_m_per_s } => SpeedProfile::through(Axis::Time, time_s, speed_m_per_s),
-            Self::ByPlace { place_m, speed_m_per_s } => SpeedProfile::through(Axis::Place, place_m, speed_m_per_s),
+            Self::ByTime {
+                time_s,
+                speed_m_per_s,
+            } => SpeedProfile::through(Axis::Time, time_s, speed_m_per_s),
+            Self::ByPlace {
+                place_m,
+                speed_m_per_s,
+            } => SpeedProfile::through(Axis::Place, place_m, speed_m_per_s),
         }
     }
 }
