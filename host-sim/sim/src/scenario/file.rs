@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::guidance_file::GuidanceInFile;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors, Speed};
-use crate::fields::{Field, Fields, InFile, old_name};
+use crate::fields::{Field, Fields, InFile, Range, old_name};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
@@ -150,6 +150,26 @@ pub const TABLES: [(&str, fn() -> Vec<&'static Field>); 8] = [
 pub fn fields_of(table: &str) -> Vec<&'static Field> {
     let found = TABLES.iter().find(|(name, _)| *name == table);
     found.map_or_else(Vec::new, |(_, fields)| fields())
+}
+
+/// The unit of a field by its path, such as `driver.t_p_s` or `course.segment.1.length`; empty for a number without one, none of
+/// what is no number.
+pub fn unit_of(path: &str) -> Option<&'static str> {
+    match path.split('.').collect::<Vec<_>>()[..] {
+        ["speed_m_per_s"] => Some("m/s"),
+        ["course", "lane_width"] | ["course", "segment", _, "length"] => Some("m"),
+        ["course", "segment", _, field] => match field.split('_').next()? {
+            "curvature" => Some("1/m"),
+            "bank" => Some("rad"),
+            "grade" => Some(""),
+            _ => None,
+        },
+        [table, name] => {
+            let field = fields_of(table).into_iter().find(|field| field.name == name)?;
+            matches!(field.range, Range::Between(..)).then_some(field.unit)
+        }
+        _ => None,
+    }
 }
 
 /// A course by its name, or the course itself.
