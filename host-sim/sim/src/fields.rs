@@ -357,8 +357,12 @@ impl<'de, T: Fields> Deserialize<'de> for Name<T> {
 
 /// Names of versions before units stood in them that are not the new name without its unit, or had another unit: table,
 /// old name, new name, old unit, and how much of the new unit that is.
-const OLD_NAMES: [(&str, &str, &str, &str, f64); 17] = [
+const OLD_NAMES: [(&str, &str, &str, &str, f64); 21] = [
     ("", "speed", "speed_m_per_s", "km/h", 1.0 / 3.6),
+    ("", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
+    ("tuning", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
+    ("training", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
+    ("held_out", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
     ("speed", "kmh", "speed_m_per_s", "km/h", 1.0 / 3.6),
     ("speed", "time", "time_s", "", 1.0),
     ("speed", "place", "place_m", "", 1.0),

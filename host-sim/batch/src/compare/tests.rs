@@ -14,7 +14,7 @@ const FILE: &str = "
 name = 'short'
 seeds = 2
 roads = ['road.toml']
-speeds_kmh = [50, 60]
+speeds_m_per_s = [13.88888888888889, 16.666666666666668]
 [scenario]
 driver = { remnant_sd_nm = 0.1 }
 [faults]
@@ -39,7 +39,7 @@ kind = 'paper'
 k_hg = 0
 around = [{ kind = 'own_line', offset_m = 0.3 }]
 ";
-const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { peak_lateral_error_m = 1 }\n";
+const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\nweights = { peak_lateral_error_m = 1 }\n";
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -245,14 +245,14 @@ const WRONG: [(&str, &str, &str); 24] = [
     ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
     ("seeds = 2", "seedz = 2", "unknown field `seedz`"),
     (
-        "speeds_kmh = [50, 60]",
-        "speeds_kmh = []",
-        "speeds_kmh = []: one at least is wanted",
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_m_per_s = []",
+        "speeds_m_per_s = []: one at least is wanted",
     ),
     (
-        "speeds_kmh = [50, 60]",
-        "speeds_kmh = [300]",
-        "speed = 300 km/h is outside 20 to 250 km/h",
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_m_per_s = [83.33333333333333]",
+        "speed_m_per_s = 83.33333333333333 m/s is outside 5.5 to 70 m/s",
     ),
     ("['road.toml']", "['lost.toml']", "lost.toml"),
     (
@@ -273,12 +273,12 @@ const WRONG: [(&str, &str, &str); 24] = [
     ("[scenario]\n", "[scenario]\nsped = 4\n", "sped"),
     (
         "[scenario]\n",
-        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\n[scenario]\n",
+        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\n[scenario]\n",
         "tuning.budget = 0 is outside 1 to 10000",
     ),
     (
         "[scenario]\n",
-        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { luck = 1 }\n[scenario]\n",
+        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\nweights = { luck = 1 }\n[scenario]\n",
         "tuning.weights: there is no \"luck\", only peak_lateral_error_m",
     ),
     (

@@ -9,7 +9,7 @@ const STUDY: &str = r#"
 name = "reliance"
 seed = 7
 [scenario]
-speed_m_per_s = 16
+speed_m_per_s = 16.666666666666668
 [scenario.course]
 name = "one curve"
 lane_width = 3.6
@@ -116,7 +116,7 @@ fn a_study_goes_on_and_overwrites_nothing() {
     for (from, to, says) in [
         ("seed = 7", "seed = 8", "another scenario or seed"),
         (
-            "speed_m_per_s = 16",
+            "speed_m_per_s = 16.666666666666668",
             "speed_m_per_s = 17",
             "another scenario or seed",
         ),
@@ -312,9 +312,9 @@ fn what_is_no_study_is_refused_by_name() {
             "repetitions = 0",
             "repetitions = 0 is outside 1 to 100",
         ),
-        ("speed_m_per_s = 16", "sped = 16", "sped"),
+        ("speed_m_per_s = 16.666666666666668", "sped = 16", "sped"),
         (
-            "speed_m_per_s = 16",
+            "speed_m_per_s = 16.666666666666668",
             "seed = 16",
             "seed: every session has its own",
         ),

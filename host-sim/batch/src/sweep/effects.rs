@@ -420,7 +420,7 @@ mod tests {
         let speed = &found[0];
         assert_eq!(
             (speed.best.as_slice(), speed.unit.as_deref()),
-            (&["60".to_string()][..], Some("km/h"))
+            (&["17".to_string()][..], Some("m/s"))
         );
         let drives = &speed.levels[1].drives;
         let [low, high] = drives.interval.unwrap();
@@ -461,7 +461,7 @@ mod tests {
         });
         assert_eq!(
             (found[0].best.as_slice(), found[0].levels[0].drives.diverged),
-            (&["60".to_string()][..], 1)
+            (&["17".to_string()][..], 1)
         );
     }
 
@@ -475,7 +475,7 @@ mod tests {
         );
         assert_eq!(lists[0].field, "driver.t_p_s");
         let best: Vec<_> = lists.iter().map(|effect| effect.best.clone()).collect();
-        assert_eq!(best, [Vec::<String>::new(), vec!["50".into()]]);
+        assert_eq!(best, [Vec::<String>::new(), vec!["14".into()]]);
         assert_eq!(lists[1].levels[0].drives.interval, None);
         let limited = effects_of("samples = 20\nlimit = 0.3\n", TWO_FIELDS, |point| {
             let bad = point.sample < [1, 12, 20][point.levels[0] as usize];
@@ -485,7 +485,7 @@ mod tests {
                 0.2 - 0.01 * f64::from(point.levels[0])
             })
         });
-        assert_eq!(limited[0].best, ["50"]);
+        assert_eq!(limited[0].best, ["14"]);
         assert_eq!(limited[0].levels[1].drives.beyond, Some(0.6));
     }
 }

@@ -51,7 +51,7 @@ fn lists_and_ranges_meet_each_other_and_every_sample() {
     let of = |point: &Point| [0, 1].map(|i| value::text(&point.values[i]));
     let grid: BTreeSet<[String; 2]> = points.iter().map(of).collect();
     assert_eq!(grid.len(), 6);
-    assert!(grid.contains(&["0.2".to_string(), "60".into()]), "{grid:?}");
+    assert!(grid.contains(&["0.2".to_string(), "17".into()]), "{grid:?}");
     // Within a sample K_hg stays, and repeats differ by their seed, which is the same on all of the grid.
     for sample in points.chunks(12) {
         assert!(sample.iter().all(|point| point.values[2] == sample[0].values[2]));
@@ -125,19 +125,20 @@ fn one_value_may_set_several_fields() {
     assert!((0.001..=0.002).contains(&drawn));
 }
 
-/// A place on the road in place of an instant: at 72 km/h 100 m are 5 s.
+/// A place on the road in place of an instant: at 20 m/s 100 m are 5 s.
 #[test]
 fn a_value_may_go_over_another() {
     let place = "place = { list = [100], fields = [\"failure.time_s\"], over = \"speed_m_per_s\" }";
     let kind = "[scenario.failure]\nkind = \"torque\"\n";
-    let sweep = with_road(kind, &format!("[vary]\nspeed = [36, 72]\n{place}\n"));
+    let sweep = with_road(kind, &format!("[vary]\nspeed_m_per_s = [10, 20]\n{place}\n"));
     let times = [0, 1].map(|drive| {
         let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
         scenario.failure().at_s().unwrap()
     });
     assert_eq!(times, [10.0, 5.0]);
     assert!(
-        refused(&format!("{kind}[vary]\n{place}\n")).contains("over = \"speed\" is no other varied field")
+        refused(&format!("{kind}[vary]\n{place}\n"))
+            .contains("over = \"speed_m_per_s\" is no other varied field")
     );
 }
 
@@ -271,7 +272,7 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
     };
     has(
         vary("speed_m_per_s = { uniform = [14, 80] }"),
-        &["sweep.toml: ", "speed = ", "20 to 250 km/h"],
+        &["sweep.toml: ", "speed_m_per_s = ", "5.5 to 70 m/s"],
     );
     has(
         vary("\"driver.t_x\" = { uniform = [0, 1] }"),
@@ -279,20 +280,20 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
     );
     has(
         vary("speed_m_per_s = { uniform = [70, 50] }"),
-        &["vary.speed: uniform = 70, 50"],
+        &["vary.speed_m_per_s: uniform = 70, 50"],
     );
     has(
         vary("speed_m_per_s = { uniform = [50, 70], list = [1] }"),
-        &["vary.speed: exactly one of"],
+        &["vary.speed_m_per_s: exactly one of"],
     );
     has(
         vary("speed_m_per_s = { normal = [50, 5], truncated = [1, 2] }"),
-        &["vary.speed: unknown field `truncated`"],
+        &["vary.speed_m_per_s: unknown field `truncated`"],
     );
     has(vary("speed_m_per_s = 50"), &["vary.speed_m_per_s: takes a list"]);
     has(
         vary("speed_m_per_s = { from = 50, to = 70, count = 1 }"),
-        &["vary.speed: count = 1 is outside 2 to"],
+        &["vary.speed_m_per_s: count = 1 is outside 2 to"],
     );
     has(
         vary("\"failure.time_s\" = { uniform = [10, 900] }\n[scenario.failure]\nkind = \"torque\""),
@@ -303,11 +304,11 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
         &["vary.course.segment.7.length"],
     );
     has(
-        refused("[vary]\nspeed = { uniform = [50, 70] }\n"),
+        refused("[vary]\nspeed_m_per_s = { uniform = [50, 70] }\n"),
         &["samples: how many"],
     );
     has(
-        refused("samples = 3\n[vary]\nspeed = [50]\n"),
+        refused("samples = 3\n[vary]\nspeed_m_per_s = [14]\n"),
         &["samples: nothing is sampled"],
     );
     has(
@@ -325,17 +326,20 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
     has(refused("base = \"no-such.toml\"\n"), &["no-such.toml: "]);
     for (compare, why) in [
         ("speed_m_per_s", "from a distribution"),
-        ("seed", "is not varied; varied are speed"),
+        ("seed", "is not varied; varied are speed_m_per_s"),
     ] {
-        let text =
-            format!("samples = 3\ncompare = \"{compare}\"\n[vary]\nspeed = {{ uniform = [50, 60] }}\n");
+        let text = format!(
+            "samples = 3\ncompare = \"{compare}\"\n[vary]\nspeed_m_per_s = {{ uniform = [50, 60] }}\n"
+        );
         has(
             refused(&text),
             &["sweep.toml: ", &format!("compare = \"{compare}\""), why],
         );
     }
     has(
-        refused("design = \"saltelli\"\nsamples = 4\n[vary]\nspeed = [50]\nseed = { choice = [1, 2] }\n"),
+        refused(
+            "design = \"saltelli\"\nsamples = 4\n[vary]\nspeed_m_per_s = [14]\nseed = { choice = [1, 2] }\n",
+        ),
         &["saltelli"],
     );
     has(

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::guidance_file::GuidanceInFile;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors, Speed};
-use crate::fields::{Field, Fields, InFile, Range, old_name};
+use crate::fields::{Field, Fields, InFile, Range};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
@@ -21,8 +21,7 @@ pub(super) fn parse(
     text: &str,
     course: impl FnOnce(&str, &LaneChoice) -> Result<Course, InputError>,
 ) -> Result<ScenarioBuilder, InputError> {
-    let file: ScenarioFile = parse_toml(name, text)
-        .map_err(|e| old_name(text, fields_of).map_or(e, |old| InputError::new(name, old)))?;
+    let file: ScenarioFile = parse_toml(name, text)?;
     let choice = LaneChoice {
         road: file.road.clone(),
         lane: file.lane,
