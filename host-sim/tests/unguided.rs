@@ -174,7 +174,7 @@ fn a_sweep_has_columns_for_it_and_counts() {
     let here = folder.path();
     let sweep = "metrics = [\"peak_lateral_error_m\"]\n[scenario]\ncourse = \"held.toml\"\n\
                  [scenario.sensor_errors]\ndropout_duration_s = 1.5\n[vary]\ncondition = [\"manual\", \"high\", \"mid\", \"low\"]\n\
-                 \"sensor_errors.dropout_rate_per_s\" = [0, 720]\n";
+                 \"sensor_errors.dropout_rate_per_s\" = [0, 0.2]\n";
     fs::write(here.join("sweep.toml"), sweep).unwrap();
     let output = host_sim(here, &["sweep", "sweep.toml", "--out", "s"]);
     assert_eq!(
@@ -200,7 +200,7 @@ fn a_sweep_has_columns_for_it_and_counts() {
         let drive = field("drive");
         match (field("condition"), field("sensor_errors.dropout_rate_per_s")) {
             ("manual", _) => assert_eq!(away, [""; 4]),
-            (_, "720") => assert_eq!((away[1], away[2]), ("LaneTimeout", "")),
+            (_, "0.2") => assert_eq!((away[1], away[2]), ("LaneTimeout", "")),
             _ => assert!(["", "HandsOff"].contains(&away[1]), "{row:?}"),
         }
         let left_by_itself = !away[1].is_empty();

@@ -158,7 +158,7 @@ def test_the_drivers_speed_is_drawn_from_50_to_80():
 
 
 def test_a_function_makes_a_scenario_for_each_drive():
-    env = envs.AuthorityEnv(lambda rng: short(speed=float(rng.uniform(40, 90))))
+    env = envs.AuthorityEnv(lambda rng: short(speed_m_per_s=float(rng.uniform(11, 25))))
     speeds = {float(env.reset(seed=seed)[0][-1]) for seed in (1, 2, 1, 3)}
     assert len(speeds) == 3
     assert env.reset(options={"scenario": short(speed_m_per_s=100 / 3.6)})[0][-1] == pytest.approx(100 / 3.6)

@@ -130,8 +130,8 @@ def test_ctrl_c_ends_a_sweep_and_what_is_under_way(tmp_path, monkeypatch):
 
 def test_bad_input_is_not_tried_again(tmp_path):
     path = tmp_path / "bad.toml"
-    path.write_text("samples = 4\n[vary]\nspeed = { uniform = [50, 300] }\n")
-    with pytest.raises(hg.InputError, match="speed = .* is outside 20 to 250 km/h"):
+    path.write_text("samples = 4\n[vary]\nspeed_m_per_s = { uniform = [14, 80] }\n")
+    with pytest.raises(hg.InputError, match="speed_m_per_s = .* is outside 5.5 to 70 m/s"):
         hg.sweep(path, out=tmp_path / "out")
 
 

@@ -16,7 +16,7 @@ HELD = {
     ]
 }
 # A camera that is blind for 1.5 s now and then: the ECU hands over after a second of that.
-BLIND = {"dropouts": 720.0, "dropout": 1.5}
+BLIND = {"dropout_rate_per_s": 0.2, "dropout_duration_s": 1.5}
 RELIANCES = ("high", "mid", "low")
 MODES = ("Boot", "Standby", "Active", "Fade", "Handover", "Fault", "Locked")
 FAULTS = {0: "LaneTimeout", 19: "HandsOff"}
@@ -114,12 +114,12 @@ def test_a_sweep_has_columns_for_it(tmp_path):
     spec.write_text(
         'metrics = ["sdlp_m"]\n[scenario.course]\nname = "c"\nlane_width = 3.6\n'
         + segments
-        + '[scenario.sensor_errors]\ndropout_duration_s = 1.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropout_rate_per_s" = [0, 720]\n'
+        + '[scenario.sensor_errors]\ndropout_duration_s = 1.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropout_rate_per_s" = [0, 0.2]\n'
     )
     result = hg.sweep(spec, out=tmp_path / "out")
     rows = list(csv.DictReader(result.csv.open()))
     whys = {(row["condition"], row["sensor_errors.dropout_rate_per_s"]): row["guidance_left_why"] for row in rows}
-    assert whys == {("manual", "0"): "", ("manual", "720"): "", ("high", "0"): "", ("high", "720"): "LaneTimeout"}
+    assert whys == {("manual", "0"): "", ("manual", "0.2"): "", ("high", "0"): "", ("high", "0.2"): "LaneTimeout"}
     assert result.summary["left_by_itself"] == 1 and result.summary["left_why"] == {"LaneTimeout": 1}
     table = pyarrow_parquet.read_table(result.parquet).to_pylist()
     for row, other in zip(rows, table):

@@ -303,9 +303,9 @@ fn what_is_no_study_is_refused_by_name() {
             "participant P01, condition manual: published = 15 is outside 1 to 14",
         ),
         (
-            "t_p = 0.3",
-            "t_p = 3.0",
-            "participant P02, condition guided: driver.t_p = 3 s is outside 0.001 to 2 s",
+            "t_p_s = 0.3",
+            "t_p_s = 3.0",
+            "participant P02, condition guided: driver.t_p_s = 3 s is outside 0.001 to 2 s",
         ),
         (
             "seed = 7",
