@@ -181,7 +181,11 @@ fn a_persons_drive_comes_in_once() {
         ]
     );
     // Another study in the same place is refused, and nothing is driven.
-    fs::write(at.join("other.toml"), STUDY.replace("t_p = 0.2,", "t_p = 0.3,")).unwrap();
+    fs::write(
+        at.join("other.toml"),
+        STUDY.replace("t_p_s = 0.2,", "t_p_s = 0.3,"),
+    )
+    .unwrap();
     refused(
         at,
         &["study", "other.toml", "--out", "out"],

@@ -85,7 +85,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         ),
         (
             &["run", "late.toml"],
-            "late.toml: failure.time = 5000 s is outside 0 to 200 s",
+            "late.toml: failure.time_s = 5000 s is outside 0 to 200 s",
         ),
         (
             &["evaluate", "--course", "empty.toml"],
