@@ -1,11 +1,11 @@
 //! The table `guidance` of a scenario file: the controller's parameters by their names in the one list of
-//! [`haptic_core::params`], with their units, and beside them the camera's look-ahead and the host's request for a probe.
+//! [`haptic_core::controller::params`], with their units, and beside them the camera's look-ahead and the host's request for a probe.
 //!
 //! A new parameter of the controller is a field here by itself. Not here: ranges, which the scenario checks.
 
 use std::sync::LazyLock;
 
-use haptic_core::params::{PARAMETERS, ParamError, Parameter, Params};
+use haptic_core::controller::params::{PARAMETERS, ParamError, Parameter, Params};
 use serde::de::MapAccess;
 use serde::ser::SerializeMap;
 
