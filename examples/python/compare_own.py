@@ -12,9 +12,9 @@ FILE = """
 name = "own"
 seeds = 1
 roads = ["road.toml"]
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 faults = { sudden_loss = 1, lasts_s = 5 }
-scenario = { driver = { remnant_sd = 0.1 } }
+scenario = { driver = { remnant_sd_nm = 0.1 } }
 law = [{ kind = "paper" }, { kind = "spring", stiffness_nm_per_rad = 3 }]
 driver = [{ kind = "paper" }, { kind = "intermittent" }]
 """

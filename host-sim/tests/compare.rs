@@ -8,14 +8,14 @@ const FILE: &str = "
 name = 'short'
 seeds = 2
 roads = ['road.toml']
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 [faults]
 sudden_loss = 1
 [tuning]
 budget = 2
 seeds = 1
 roads = ['road.toml']
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 [[law]]
 kind = 'none'
 [[law]]

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use haptic_sim::fields::Field;
+
 /// What a variable is to FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -114,6 +116,16 @@ pub const fn parameter(
         range: Some(range),
         ..variable(name, Kind::Real, Role::Parameter, unit, meaning)
     }
+}
+
+/// A field of a scenario as a parameter; its start is the field's default, or zero if that is none.
+#[must_use]
+pub const fn of_field(field: &Field) -> Variable {
+    let start = match field.default {
+        Some(start) => start,
+        None => 0.0,
+    };
+    parameter(field.name, field.unit, start, field.ends(), field.meaning)
 }
 
 /// A model as an importing tool sees it.

@@ -125,7 +125,7 @@ def test_a_step_can_be_pickled_and_copied():
                 assert getattr(again, name) == getattr(each, name), name
 
 
-@pytest.mark.parametrize("params", [None, {"k_1": 0.2, "torque_limit_nm": 2.0}, hg.Scenario(guidance={"K_1": 0.2})])
+@pytest.mark.parametrize("params", [None, {"k_1": 0.2, "torque_limit_nm": 2.0}, hg.Scenario(guidance={"k_1_nm": 0.2})])
 def test_a_pickled_ecu_goes_on_as_the_original(params):
     """Beyond the wrap of its clock, with a step that came late and frames that it refused."""
     start, inputs = 2**32 - 1_000_000, dict(driver_torque_nm=0.1, wheel_angle_rad=0.01, speed_m_per_s=16.7)

@@ -267,10 +267,7 @@ mod tests {
 
     #[test]
     fn a_speed_that_changes_has_no_place_on_the_map() {
-        let speed = Speed::ByTime {
-            time: vec![0.0, 10.0],
-            kmh: vec![60.0, 50.0],
-        };
+        let speed = Speed::by_time_kmh(vec![0.0, 10.0], &[60.0, 50.0]);
         let scenario = Scenario::builder().speed(speed).build().unwrap();
         for error in [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()] {
             assert!(error.starts_with("speed: a map over speeds"), "{error}");

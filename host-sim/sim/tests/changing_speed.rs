@@ -14,17 +14,13 @@ use haptic_sim::simulation::{Ending, Run, observe, simulate};
 use haptic_sim::{Action, Scenario, Simulation};
 
 fn by_time(points: &[(f64, f64)]) -> Speed {
-    Speed::ByTime {
-        time: points.iter().map(|p| p.0).collect(),
-        kmh: points.iter().map(|p| p.1).collect(),
-    }
+    let kmh: Vec<f64> = points.iter().map(|p| p.1).collect();
+    Speed::by_time_kmh(points.iter().map(|p| p.0).collect(), &kmh)
 }
 
 fn by_place(points: &[(f64, f64)]) -> Speed {
-    Speed::ByPlace {
-        place: points.iter().map(|p| p.0).collect(),
-        kmh: points.iter().map(|p| p.1).collect(),
-    }
+    let kmh: Vec<f64> = points.iter().map(|p| p.1).collect();
+    Speed::by_place_kmh(points.iter().map(|p| p.0).collect(), &kmh)
 }
 
 fn course(text: &str) -> Course {

@@ -21,7 +21,7 @@ struct File {
     seed: u64,
     seeds: u64,
     road: String,
-    speed_kmh: f64,
+    speed_m_per_s: f64,
     #[serde(default)]
     scenario: Table,
     map: MapFile,
@@ -87,7 +87,7 @@ pub(super) fn from_text<'k>(
     for (field, value, least) in limits {
         source.within(field, value, least, 3000.0, "s")?;
     }
-    let (roads, speeds) = ([file.road], [file.speed_kmh]);
+    let (roads, speeds) = ([file.road], [file.speed_m_per_s]);
     let mut made = drives(&source, "", &file.scenario, &roads, &speeds, file.seeds)?;
     let (road, speed_kmh, scenario) = made.places.remove(0);
     let scenario = laid_end_to_end(&source, &scenario, times.loop_s())?;

@@ -111,9 +111,9 @@ const FILE: &str = "
 name = 'short'
 seeds = 2
 road = 'road.toml'
-speed_kmh = 60
+speed_m_per_s = 16.666666666666668
 [scenario]
-driver = { remnant_sd = 0.1 }
+driver = { remnant_sd_nm = 0.1 }
 guidance = { probe = true }
 [map]
 k_1 = [0.25, 0.45]
@@ -253,8 +253,8 @@ const WRONG: [(&str, &str, &str); 10] = [
         "driver paper: around ends with no habit \"trust\", which moves K_hg",
     ),
     (
-        "speed_kmh = 60",
-        "speed_kmh = 300",
+        "speed_m_per_s = 16.666666666666668",
+        "speed_m_per_s = 83",
         "speed = 300 km/h is outside 20 to 250 km/h",
     ),
     ("road = 'road.toml'", "road = 'lost.toml'", "lost.toml"),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::models::road::Course;
-use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+use haptic_sim::scenario::{Condition, FailureKind, Scenario, Speed};
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -22,7 +22,7 @@ struct File {
     seed: u64,
     seeds: u64,
     roads: Vec<String>,
-    speeds_kmh: Vec<f64>,
+    speeds_m_per_s: Vec<f64>,
     #[serde(default)]
     scenario: Table,
     #[serde(default)]
@@ -56,7 +56,7 @@ struct TuningFile {
     budget: u64,
     seeds: u64,
     roads: Vec<String>,
-    speeds_kmh: Vec<f64>,
+    speeds_m_per_s: Vec<f64>,
     weights: Option<BTreeMap<String, f64>>,
 }
 
@@ -138,7 +138,7 @@ fn oracles(source: &Source, laws: &[Table]) -> Result<(Vec<Table>, Vec<bool>), I
 /// Names of the worlds, and the drives in each, one world behind the other; one world without a name if the file has none.
 fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputError> {
     let drives = |source: &Source, fields: &Table| {
-        drives(source, "", fields, &file.roads, &file.speeds_kmh, file.seeds)
+        drives(source, "", fields, &file.roads, &file.speeds_m_per_s, file.seeds)
     };
     if file.world.is_empty() {
         return Ok((vec![String::new()], drives(source, &file.scenario)?));
@@ -220,7 +220,7 @@ fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning
             "tuning.",
             scenario,
             &file.roads,
-            &file.speeds_kmh,
+            &file.speeds_m_per_s,
             file.seeds,
         )?,
         weights,
@@ -233,16 +233,26 @@ pub(crate) fn drives(
     table: &str,
     fields: &Table,
     roads: &[String],
-    speeds_kmh: &[f64],
+    speeds_m_per_s: &[f64],
     seeds: u64,
 ) -> Result<Drives, InputError> {
     let seeds = source.count(&format!("{table}seeds"), seeds, 1.0, 1000.0)?;
-    for (field, is_empty) in [("roads", roads.is_empty()), ("speeds_kmh", speeds_kmh.is_empty())] {
+    for (field, is_empty) in [
+        ("roads", roads.is_empty()),
+        ("speeds_m_per_s", speeds_m_per_s.is_empty()),
+    ] {
         if is_empty {
             return Err(source.bad(format!("{table}{field} = []: one at least is wanted")));
         }
     }
-    for field in ["seed", "course", "speed", "failure", "driver_change"] {
+    for field in [
+        "seed",
+        "course",
+        "speed",
+        "speed_m_per_s",
+        "failure",
+        "driver_change",
+    ] {
         if fields.contains_key(field) {
             return Err(source.bad(format!(
                 "scenario.{field}: this file has its own seeds, roads, speeds, faults and drivers"
@@ -262,13 +272,10 @@ pub(crate) fn drives(
         if scenario.condition() == Condition::Manual || scenario.failure().kind != FailureKind::None {
             return Err(source.bad("scenario.condition = \"manual\": a law of kind \"none\" is no guidance"));
         }
-        for speed_kmh in speeds_kmh {
-            let built = scenario.to_builder().speed_kmh(*speed_kmh).build();
-            places.push((
-                road.clone(),
-                *speed_kmh,
-                built.map_err(|e| InputError::new(&here, e))?,
-            ));
+        for speed in speeds_m_per_s {
+            let built = scenario.to_builder().speed(Speed::Constant(*speed)).build();
+            let built = built.map_err(|e| InputError::new(&here, e))?;
+            places.push((road.clone(), built.speed_kmh(), built));
         }
     }
     Ok(Drives { places, seeds })

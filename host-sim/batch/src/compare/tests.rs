@@ -14,9 +14,9 @@ const FILE: &str = "
 name = 'short'
 seeds = 2
 roads = ['road.toml']
-speeds_kmh = [50, 60]
+speeds_m_per_s = [13.88888888888889, 16.666666666666668]
 [scenario]
-driver = { remnant_sd = 0.1 }
+driver = { remnant_sd_nm = 0.1 }
 [faults]
 sudden_loss = 2
 silent_lane = 1
@@ -39,7 +39,7 @@ kind = 'paper'
 k_hg = 0
 around = [{ kind = 'own_line', offset_m = 0.3 }]
 ";
-const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { peak_lateral_error_m = 1 }\n";
+const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\nweights = { peak_lateral_error_m = 1 }\n";
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -172,7 +172,7 @@ fn tuning_varies_what_a_file_leaves_open() {
 #[test]
 fn worlds_are_places_with_the_same_seeds_and_ratios_are_those_of_the_rows() {
     let worlds =
-        "[[world]]\nname = 'as-it-is'\n[[world]]\nname = 'slow'\nscenario = { driver = { t_nms = 0.15 } }\n";
+        "[[world]]\nname = 'as-it-is'\n[[world]]\nname = 'slow'\nscenario = { driver = { t_nms_s = 0.15 } }\n";
     let found = results(&FILE.replacen("[faults]", &format!("{worlds}[faults]"), 1));
     let plain = results(FILE);
     let of_world =
@@ -320,14 +320,14 @@ const WRONG: [(&str, &str, &str); 26] = [
     ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
     ("seeds = 2", "seedz = 2", "unknown field `seedz`"),
     (
-        "speeds_kmh = [50, 60]",
-        "speeds_kmh = []",
-        "speeds_kmh = []: one at least is wanted",
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_m_per_s = []",
+        "speeds_m_per_s = []: one at least is wanted",
     ),
     (
-        "speeds_kmh = [50, 60]",
-        "speeds_kmh = [300]",
-        "speed = 300 km/h is outside 20 to 250 km/h",
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_m_per_s = [83.33333333333333]",
+        "speed_m_per_s = 83.33333333333333 m/s is outside 5.5 to 70 m/s",
     ),
     ("['road.toml']", "['lost.toml']", "lost.toml"),
     (
@@ -348,12 +348,12 @@ const WRONG: [(&str, &str, &str); 26] = [
     ("[scenario]\n", "[scenario]\nsped = 4\n", "sped"),
     (
         "[scenario]\n",
-        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\n[scenario]\n",
+        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\n[scenario]\n",
         "tuning.budget = 0 is outside 1 to 10000",
     ),
     (
         "[scenario]\n",
-        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { luck = 1 }\n[scenario]\n",
+        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\nweights = { luck = 1 }\n[scenario]\n",
         "tuning.weights: there is no \"luck\", only peak_lateral_error_m",
     ),
     (
