@@ -125,5 +125,6 @@ pub mod redundant;
 pub mod rejections;
 pub mod schedule;
 mod sine;
+pub mod still;
 pub mod stored;
 pub mod yaw;

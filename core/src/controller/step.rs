@@ -17,6 +17,7 @@ use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
 use crate::ramp::{History, Ramp, handover_of, pace, smaller_of_same_sign};
+use crate::still::{TURNED, TURNED_WHEN_ASKED};
 
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
@@ -33,6 +34,9 @@ const EARLY_STEPS: u8 = 3;
 
 /// A lane sample that is no older than this when it comes needs no other making up for than its rates.
 const PROMPT: Micros = Micros::from_ms(10);
+
+#[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+const STANDBY: u8 = Mode::Standby as u8;
 
 /// Spans beyond half a wrap of the clock are negative.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
@@ -193,8 +197,12 @@ impl<I: Injection> Step<'_, I> {
             };
             let measured = motion.yaw_rate();
             let yaw_rate = measured.and_then(|rate| v.plausibility.believed(rate, passed));
-            let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
-            kept.set(is_distrusted, Fault::YawRate);
+            let (is_measured, yaw) = (measured.is_some(), &v.plausibility.motion.yaw);
+            kept.set(is_measured && yaw.is_distrusted(), Fault::YawRate);
+            kept.set(is_measured && yaw.is_wheel_distrusted(), Fault::WheelAngle);
+            if !is_measured {
+                v.plausibility.without_yaw_rate();
+            }
             checks.motion(&mut v.plausibility, speed, yaw_rate);
             v.share = self.config.schedule.share(v.plausibility.speed());
             past.turn(self.now, v.plausibility.turning());
@@ -258,6 +266,9 @@ impl<I: Injection> Step<'_, I> {
         let checks = &self.config.plausibility;
         if let Some(c) = to_check(&self.inputs.column, &mut due.column) {
             changed.add(Changed::COLUMN);
+            let is_alive = v
+                .plausibility
+                .feel(self.now, c.driver_torque, c.wheel_angle, turned(v));
             let plausible = checks.column(
                 &mut v.plausibility,
                 self.now,
@@ -265,7 +276,7 @@ impl<I: Injection> Step<'_, I> {
                 c.wheel_angle,
                 self.applied,
             );
-            kept.set(!plausible, Fault::ColumnImplausible);
+            kept.set(!(is_alive && plausible), Fault::ColumnImplausible);
         }
         if let Some(sample) = to_check(&self.lane, &mut due.lane) {
             changed.add(Changed::LANE);
@@ -275,11 +286,19 @@ impl<I: Injection> Step<'_, I> {
             } else {
                 let moved = checks.lane(&mut v.plausibility, past, self.now, sample);
                 kept.set(moved == Moved::Otherwise, Fault::LaneImplausible);
-                if moved == Moved::AsTheWheelSays {
-                    changed.add(Changed::MOTION);
-                    v.plausibility.distrust_yaw_rate();
-                    kept.insert(Fault::YawRate);
+                match moved {
+                    Moved::AsTheWheelSays => {
+                        v.plausibility.distrust_yaw_rate();
+                        kept.insert(Fault::YawRate);
+                    }
+                    Moved::AsTheYawRateSays => {
+                        v.plausibility.distrust_wheel();
+                        kept.set(false, Fault::YawRate);
+                        kept.insert(Fault::WheelAngle);
+                    }
+                    Moved::AsItMust | Moved::Otherwise => return,
                 }
+                changed.add(Changed::MOTION);
             }
         }
     }
@@ -458,7 +477,7 @@ impl<I: Injection> Step<'_, I> {
         };
         let (wanted, probe) = match mode {
             Mode::Active => {
-                let probe = self.probe(v);
+                let probe = self.probe(v, changed);
                 (with(asked, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
@@ -513,9 +532,13 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// The probe's torque, while it is wanted or on its way out.
-    fn probe(&self, v: &mut Memory) -> Option<Torque> {
+    fn probe(&self, v: &mut Memory, changed: &mut Changed) -> Option<Torque> {
         // Without trust left there is no guidance to ride on.
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
+        if wanted && v.hot.probe == ProbeState::SILENT && self.config.probe.is_any() {
+            changed.add(Changed::COLUMN);
+            v.plausibility.column.still.begin_anew();
+        }
         self.config.probe.step(&mut v.hot.probe, self.elapsed, wanted)
     }
 
@@ -547,6 +570,15 @@ impl<I: Injection> Step<'_, I> {
 fn to_check<T: Copy>(input: &Input<T>, is_due: &mut bool) -> Option<T> {
     let was_due = core::mem::replace(is_due, matches!(input, Input::New(_)) && !*is_due);
     input.value().filter(|_| was_due)
+}
+
+/// How far the wheel turns at most while the driver torque is still to the bit.
+fn turned(v: &Memory) -> Radians {
+    if v.hot.small.mode == STANDBY || v.hot.probe != ProbeState::SILENT {
+        TURNED_WHEN_ASKED
+    } else {
+        TURNED
+    }
 }
 
 fn with(guidance: Torque, probe: Option<Torque>) -> Torque {
