@@ -6,10 +6,10 @@
 //! more time in Standby; beside the probe, which moves the wheel to and fro, even a small turn has to be answered; and beside
 //! a guidance that acts it costs a handover, so that what a driver model without noise does in a bend has to stay below.
 //!
-//! Not here: a torque that is wrong and moves (the sum of torques in [`crate::plausibility`]).
+//! Not here: a torque that is wrong and moves (the sum of torques in [`crate::safety::plausibility`]).
 
 use crate::quantity::{Micros, Radians, Torque};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// The torque has to be still for so long.
 pub const LASTS: Micros = Micros::from_ms(1000);
