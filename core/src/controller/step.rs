@@ -197,12 +197,8 @@ impl<I: Injection> Step<'_, I> {
             };
             let measured = motion.yaw_rate();
             let yaw_rate = measured.and_then(|rate| v.plausibility.believed(rate, passed));
-            let (is_measured, yaw) = (measured.is_some(), &v.plausibility.motion.yaw);
-            kept.set(is_measured && yaw.is_distrusted(), Fault::YawRate);
-            kept.set(is_measured && yaw.is_wheel_distrusted(), Fault::WheelAngle);
-            if !is_measured {
-                v.plausibility.without_yaw_rate();
-            }
+            let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
+            kept.set(is_distrusted, Fault::YawRate);
             checks.motion(&mut v.plausibility, speed, yaw_rate);
             v.share = self.config.schedule.share(v.plausibility.speed());
             past.turn(self.now, v.plausibility.turning());
@@ -286,19 +282,11 @@ impl<I: Injection> Step<'_, I> {
             } else {
                 let moved = checks.lane(&mut v.plausibility, past, self.now, sample);
                 kept.set(moved == Moved::Otherwise, Fault::LaneImplausible);
-                match moved {
-                    Moved::AsTheWheelSays => {
-                        v.plausibility.distrust_yaw_rate();
-                        kept.insert(Fault::YawRate);
-                    }
-                    Moved::AsTheYawRateSays => {
-                        v.plausibility.distrust_wheel();
-                        kept.set(false, Fault::YawRate);
-                        kept.insert(Fault::WheelAngle);
-                    }
-                    Moved::AsItMust | Moved::Otherwise => return,
+                if moved == Moved::AsTheWheelSays {
+                    changed.add(Changed::MOTION);
+                    v.plausibility.distrust_yaw_rate();
+                    kept.insert(Fault::YawRate);
                 }
-                changed.add(Changed::MOTION);
             }
         }
     }

@@ -114,8 +114,6 @@ faults! {
     19 HandsOff: A, 0;
     /// L: the yaw rate is impossible, or denied by wheel angle and speed: guidance goes on without it.
     20 YawRate: L, 0;
-    /// L: the wheel angle is denied by yaw rate and lane: the checks go on without it.
-    21 WheelAngle: L, 0;
 }
 
 // The word has 32 bits, and a fault's code is its place in the list.

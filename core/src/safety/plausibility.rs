@@ -173,16 +173,6 @@ impl PlausibilityState {
         self.motion.has_yaw_rate = 0;
     }
 
-    /// Wheel angle and speed are denied by a lane that moves as the yaw rate says, which is believed from the next one on.
-    pub(crate) fn distrust_wheel(&mut self) {
-        self.motion.yaw.distrust_wheel();
-    }
-
-    /// There is no yaw rate: nothing says something else than wheel angle and speed.
-    pub(crate) fn without_yaw_rate(&mut self) {
-        self.motion.yaw.sum = Radians::ZERO;
-    }
-
     /// How fast the wheel angle lets the vehicle turn where nothing pushes it.
     fn turning_by_wheel(&self) -> TurningRate {
         TurningRate::from_wide(product(self.motion.turning_gain.bits(), self.column.wheel.bits()))
@@ -458,23 +448,14 @@ impl Plausibility {
             return Moved::AsItMust;
         }
         // A yaw rate that is too large predicts so much less: over the time from near to far point, and at the near point. What it
-        // does so comes up to 0.4 s later, so that a quarter of what is missing is enough. Where the wheel angle predicts in place
-        // of a yaw rate that is not believed, what they differ by explains the opposite.
+        // does so comes up to 0.4 s later, so that a quarter of what is missing is enough.
         let far = saturate(product(self.far_time.bits(), state.motion.speed.bits()));
         let less = product_below(far, state.motion.yaw.sum.bits());
         let is_too_much = predicted >= state.lane.seen.bits();
-        let explained = if is_too_much == measured {
-            less.saturating_neg()
-        } else {
-            less
-        };
-        if state.lane.is_alive != 0 && explained > missing.saturating_abs() >> 2 {
+        let explained = if is_too_much { less.saturating_neg() } else { less };
+        if measured && state.lane.is_alive != 0 && explained > missing.saturating_abs() >> 2 {
             (state.lane.predicted, state.lane.seen) = (Metres::ZERO, Metres::ZERO);
-            return if measured {
-                Moved::AsTheWheelSays
-            } else {
-                Moved::AsTheYawRateSays
-            };
+            return Moved::AsTheWheelSays;
         }
         Moved::Otherwise
     }
@@ -532,8 +513,6 @@ pub enum Moved {
     AsItMust,
     /// As wheel angle and speed say, and not as the yaw rate does.
     AsTheWheelSays,
-    /// As the yaw rate says that was not believed, and not as wheel angle and speed do.
-    AsTheYawRateSays,
     /// As nothing says.
     Otherwise,
 }

@@ -3,8 +3,7 @@
 //! The lane is judged by it ([`crate::safety::plausibility`]), so it is judged itself: no vehicle turns as fast, or changes its turning as
 //! fast, as the first two bounds say; and where wheel angle and speed say that the vehicle goes by the bicycle model, what differs
 //! from that model, but for a constant that is learnt slowly, is summed with a memory of 1 s. What fails is not believed until it
-//! has agreed for a while, and guidance goes on without. Where the lane then moves as the yaw rate says, it is the wheel angle that
-//! is not believed.
+//! has agreed for a while, and guidance goes on without.
 
 use crate::quantity::{FRAC_BITS, Micros, Radians, Speed, TurningRate, leak, per_second, product};
 use crate::safety::redundant::words;
@@ -35,8 +34,6 @@ words! {
         /// For how long impossible ones have been left out, and for how long none is believed.
         held: Micros,
         distrust: Micros,
-        /// Whether it is the wheel angle that is not believed meanwhile.
-        is_wheel: u32,
     }
 }
 
@@ -47,27 +44,16 @@ impl YawState {
         sum: Radians::ZERO,
         held: Micros::from_us(0),
         distrust: Micros::from_us(0),
-        is_wheel: 0,
     };
 
     /// None is believed for a while.
     pub(crate) fn distrust(&mut self) {
-        (self.distrust, self.is_wheel) = (DISTRUST, 0);
-    }
-
-    /// It was the wheel angle.
-    pub(crate) fn distrust_wheel(&mut self) {
-        (self.distrust, self.is_wheel) = (DISTRUST, 1);
+        self.distrust = DISTRUST;
     }
 
     /// Whether none is believed.
     pub(crate) fn is_distrusted(&self) -> bool {
-        self.distrust.us() > 0 && self.is_wheel == 0
-    }
-
-    /// Whether the wheel angle is not believed.
-    pub(crate) fn is_wheel_distrusted(&self) -> bool {
-        self.distrust.us() > 0 && self.is_wheel != 0
+        self.distrust.us() > 0
     }
 
     /// Whether wheel angle and speed say something else, by a quarter of the margin.
@@ -125,9 +111,7 @@ impl YawState {
             MARGIN.bits().saturating_add(larger >> 2),
         );
         if used > margin {
-            // Who was found not to be believed stays so.
-            self.is_wheel = u32::from(self.is_wheel_distrusted());
-            self.distrust = DISTRUST;
+            self.distrust();
         }
         used <= margin >> 1
     }

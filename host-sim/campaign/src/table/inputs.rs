@@ -496,7 +496,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "wheel angle with the wrong sign",
         &[JERK, Sensor(WheelAngle, Times(-1.0))],
     )
-    .may_hand_over(),
+    .may_hand_over_at_once(),
     row(
         "driver-torque-full-left",
         "T_d stuck at 20 N.m",
