@@ -215,7 +215,10 @@ impl<I: Injection> Step<'_, I> {
                 v.heard.column = self.now;
                 changed.add(Changed::HEARD);
                 changed.add(Changed::COLUMN);
-                v.hot.hands.feel(c.driver_torque);
+                // The rim of a free wheel answers the probe too: driver torques are compared at the same place of its wave.
+                if v.hot.probe.is_passing_zero() {
+                    v.hot.hands.feel(c.driver_torque);
+                }
                 v.plausibility.steer(c.wheel_angle);
             }
             Input::Held(_) => {}

@@ -15,8 +15,8 @@ use crate::safety::redundant::words;
 pub const LASTS: Micros = Micros::from_ms(1000);
 /// A turn counts within this time: a slower one is what a driver does who hardly turns.
 pub const WITHIN: Micros = Micros::from_ms(2000);
-/// So far the wheel turns meanwhile, beside a guidance that acts: 5 deg. Models of drivers without noise come to 3.4 deg.
-pub const TURNED: Radians = Radians::from_rad(0.0873);
+/// So far the wheel turns meanwhile, beside a guidance that acts: 8 deg. Models of drivers without noise come to 6 deg.
+pub const TURNED: Radians = Radians::from_rad(0.14);
 /// The same in Standby and beside the probe: 0.5 deg, five steps of an ordinary sensor.
 pub const TURNED_WHEN_ASKED: Radians = Radians::from_rad(0.0087);
 /// Found, until the torque moves.
@@ -101,10 +101,10 @@ mod tests {
     fn a_torque_that_is_still_while_the_wheel_turns_is_found_after_a_second() {
         for sign in [1.0, -1.0] {
             for (torque, deg_per_s, turned, found) in [
-                (0.0, 5.1, TURNED, 1000),
+                (0.0, 8.1, TURNED, 1000),
                 (0.7, 20.0, TURNED, 1000),
-                // 5 deg within two seconds.
-                (-0.7, 2.6, TURNED, 1920),
+                // 8 deg within two seconds.
+                (-0.7, 4.2, TURNED, 1910),
                 (0.0, 0.4, TURNED_WHEN_ASKED, 1250),
             ] {
                 let ms = found_ms(|ms| sign * deg_per_s * 1e-3 * f64::from(ms), |_| torque, turned);
@@ -114,14 +114,14 @@ mod tests {
                 );
             }
             // Slower than that, and as fast but with a torque that moves by its last bit every second.
-            let slowly = |ms: u32| sign * 2.4e-3 * f64::from(ms);
+            let slowly = |ms: u32| sign * 3.9e-3 * f64::from(ms);
             assert_eq!(found_ms(slowly, |_| 0.3, TURNED), None);
             let bit = |ms: u32| f64::from(ms / 990 % 2) / f64::from(1 << 24);
             assert_eq!(found_ms(|ms| sign * 0.02 * f64::from(ms), bit, TURNED), None);
         }
         // To and fro, as by the probe: 0.6 deg between the ends.
         let to_and_fro = |ms: u32| 0.3 * (f64::from(ms) * 0.015_7).sin();
-        assert_eq!(found_ms(to_and_fro, |_| 0.1, TURNED_WHEN_ASKED), Some(998));
+        assert_eq!(found_ms(to_and_fro, |_| 0.1, TURNED_WHEN_ASKED), Some(1000));
         assert_eq!(
             found_ms(|ms| 0.8 * to_and_fro(ms), |_| 0.1, TURNED_WHEN_ASKED),
             None
@@ -135,8 +135,8 @@ mod tests {
             let (torque, wheel) = (Torque::from_nm(torque), Radians::from_rad(deg.to_radians()));
             state.is_alive(torque, wheel, Micros::from_ms(ms), TURNED)
         };
-        assert!(still(0.2, 0.0, 0) && still(0.2, 6.0, 999));
-        assert!(!still(0.2, 6.0, 1) && !still(0.2, 6.0, 5000) && !still(0.2, 0.0, 5000));
+        assert!(still(0.2, 0.0, 0) && still(0.2, 9.0, 999));
+        assert!(!still(0.2, 9.0, 1) && !still(0.2, 9.0, 5000) && !still(0.2, 0.0, 5000));
         assert!(still(0.201, 0.0, 2) && still(0.201, 0.0, 5000));
     }
 
