@@ -84,11 +84,11 @@ impl Config {
             }
             i += 1;
         }
-        Ok(Self::of(p))
+        Ok(Self::from_params(p))
     }
 
     /// The configuration of parameters that are in range.
-    const fn of(p: &Params) -> Self {
+    const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
         Self {
             law: Law {

@@ -8,8 +8,8 @@
 //! which in one of six core knows a message later: at 8 m/s2 that is 0.08 m/s, and less than 0.002 m in the sum.
 
 use haptic_core::controller::params::Params;
+use haptic_core::safety::frozen_torque;
 use haptic_core::safety::plausibility::{self, ALIGNING_ERROR, PUSHED, UNREAL};
-use haptic_core::safety::still;
 use haptic_core::safety::yaw::{self, BIAS_SHIFT};
 
 use super::counts::{ONE, flag, ms, speed_heard};
@@ -47,10 +47,10 @@ const DOUBTFUL: f64 = 0.25 * yaw::MARGIN.rad();
 const YAW_RATE_COUNTS: f64 = 4096.0;
 /// A driver torque is still for so long, ms, a little shorter than core's; so far the wheel turns meanwhile, less a step of its
 /// sensor.
-const STILL_MS: i32 = ms(still::LASTS) as i32 - 10;
-const STILL_WITHIN_MS: i32 = ms(still::WITHIN) as i32;
-const TURNED: f64 = still::TURNED.rad() - 0.002;
-const TURNED_WHEN_ASKED: f64 = still::TURNED_WHEN_ASKED.rad() - 0.002;
+const STILL_MS: i32 = ms(frozen_torque::LASTS) as i32 - 10;
+const STILL_WITHIN_MS: i32 = ms(frozen_torque::WITHIN) as i32;
+const TURNED: f64 = frozen_torque::MOST_TURN.rad() - 0.002;
+const TURNED_WHEN_ASKED: f64 = frozen_torque::MOST_TURN_WHEN_TESTED.rad() - 0.002;
 /// Times in s: between frames of the column, and of the vehicle.
 const COLUMN_S: f64 = 0.002;
 const COLUMN_MS: i32 = 2;

@@ -69,7 +69,7 @@ impl Reason {
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
         ),
-        (Self::ExactSensors, "exact sensors, past the bus"),
+        (Self::ExactSensors, "exact sensors, motion_history the bus"),
         (Self::TooSlow, "slower than is guided"),
         (
             Self::EarlyFailure,
