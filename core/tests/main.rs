@@ -33,5 +33,6 @@ mod road;
 mod schedule;
 mod senders;
 mod slcan;
+mod slow_lies;
 mod stored;
 mod yaw;
