@@ -65,11 +65,12 @@ fn a_hand_is_free_of_the_guidance_soon_after_the_driver_torque_has_stuck() {
 /// A torque that moves by as little as the bus tells is alive.
 #[test]
 fn a_driver_torque_that_moves_is_believed_however_far_the_wheel_turns() {
-    let mut rig = stuck(0.4, 0.2);
+    let mut rig = stuck(0.4, 0.0);
     let straight = rig.wheel;
     for ms in 0..6000_u32 {
-        rig.driver = Some(0.2 + f64::from(ms / 900 % 2) / 4096.0);
-        rig.wheel = straight + 0.15 * (f64::from(ms) * 1e-3 * std::f64::consts::PI).sin();
+        rig.driver = Some(f64::from(ms / 900 % 2) / 4096.0);
+        // 10 deg to and fro, each way within two seconds.
+        rig.wheel = straight + 0.09 * (f64::from(ms) * 0.5e-3 * std::f64::consts::PI).sin();
         let step = rig.tick();
         assert_eq!(step.command.mode, Mode::Active, "{ms} ms");
     }
