@@ -280,6 +280,8 @@ fn a_wheel_angle_hides_no_driver_torque() {
         turned.curve(3.0 * sign);
         for ms in 0..1000 {
             rig.wheel = turned.wheel * f64::from(ms) * 1e-3;
+            // A sensor that is alive moves by its last bit.
+            rig.driver = Some(f64::from(ms / 100 % 2) / 4096.0);
             let faults = rig.tick().command.faults;
             assert!(!faults.contains(Fault::ColumnImplausible), "{ms} ms");
         }

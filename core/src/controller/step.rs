@@ -13,6 +13,7 @@ use crate::quantity::{
 use crate::safety::coast::{Coast, EXTRAPOLATION_PERIOD, PictureVerdict};
 use crate::safety::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::frozen_torque::{MOST_TURN, MOST_TURN_WHEN_TESTED};
 use crate::safety::hands::{END, WARN};
 use crate::safety::modes::{Event, Events, Mode};
 use crate::safety::motion_history::MotionHistory;
@@ -34,6 +35,9 @@ const EARLY_STEPS: u8 = 3;
 
 /// A lane sample that is no older than this when it comes needs no other making up for than its rates.
 const PROMPT: Micros = Micros::from_ms(10);
+
+#[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+const STANDBY: u8 = Mode::Standby as u8;
 
 /// Spans beyond half a wrap of the clock are negative.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
@@ -218,7 +222,10 @@ impl<I: Injection> Step<'_, I> {
                 v.input_times.column = self.now;
                 changed.add(ChangedParts::INPUT_TIMES);
                 changed.add(ChangedParts::COLUMN);
-                v.fast.hands.update(c.driver_torque);
+                // The rim of a free wheel answers the probe too: driver torques are compared at the same place of its wave.
+                if v.fast.probe.is_passing_zero() {
+                    v.fast.hands.update(c.driver_torque);
+                }
                 v.plausibility.set_wheel_angle(c.wheel_angle);
             }
             Input::Held(_) => {}
@@ -265,6 +272,9 @@ impl<I: Injection> Step<'_, I> {
         let checks = &self.config.plausibility;
         if let Some(c) = to_check(&self.inputs.column, &mut pending.column) {
             changed.add(ChangedParts::COLUMN);
+            let most_turn = most_turn(v);
+            let (torque, wheel) = (c.driver_torque, c.wheel_angle);
+            let is_alive = v.plausibility.is_torque_alive(self.now, torque, wheel, most_turn);
             let plausible = checks.column(
                 &mut v.plausibility,
                 self.now,
@@ -272,7 +282,7 @@ impl<I: Injection> Step<'_, I> {
                 c.wheel_angle,
                 self.applied,
             );
-            kept.set(!plausible, Fault::ColumnImplausible);
+            kept.set(!(is_alive && plausible), Fault::ColumnImplausible);
         }
         if let Some(sample) = to_check(&self.lane, &mut pending.lane) {
             changed.add(ChangedParts::LANE);
@@ -465,7 +475,7 @@ impl<I: Injection> Step<'_, I> {
         };
         let (wanted, probe) = match mode {
             Mode::Active => {
-                let probe = self.probe(v);
+                let probe = self.probe(v, changed);
                 (add_probe(demanded, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
@@ -520,9 +530,13 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// The probe's torque, while it is wanted or on its way out.
-    fn probe(&self, v: &mut Memory) -> Option<Torque> {
+    fn probe(&self, v: &mut Memory, changed: &mut ChangedParts) -> Option<Torque> {
         // Without trust left there is no guidance to ride on.
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
+        if wanted && v.fast.probe == ProbeState::SILENT && self.config.probe.is_any() {
+            changed.add(ChangedParts::COLUMN);
+            v.plausibility.column.frozen_torque.restart();
+        }
         self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
@@ -554,6 +568,15 @@ impl<I: Injection> Step<'_, I> {
 fn to_check<T: Copy>(input: &Input<T>, is_pending: &mut bool) -> Option<T> {
     let was_pending = core::mem::replace(is_pending, matches!(input, Input::New(_)) && !*is_pending);
     input.value().filter(|_| was_pending)
+}
+
+/// How far the wheel may turn while the driver torque is the same to the bit.
+fn most_turn(v: &Memory) -> Radians {
+    if v.fast.packed.mode == STANDBY || v.fast.probe != ProbeState::SILENT {
+        MOST_TURN_WHEN_TESTED
+    } else {
+        MOST_TURN
+    }
 }
 
 fn add_probe(guidance: Torque, probe: Option<Torque>) -> Torque {

@@ -41,12 +41,27 @@ words! {
 impl ProbeState {
     /// Silent.
     pub const SILENT: Self = Self { phase: 0, gain: 0 };
+
+    /// Whether it is silent, or a sixteenth of a turn about its rise through zero: where what the wheel answers to it by its inertia
+    /// is the same every time, and little.
+    #[must_use]
+    pub(crate) const fn is_passing_zero(&self) -> bool {
+        self.gain == 0 || self.phase.wrapping_add(SIXTEENTH >> 1) < SIXTEENTH
+    }
 }
+
+/// Of a turn: 25 ms at 2.5 Hz, so that the slowest sender of a driver torque has a message in it.
+pub const SIXTEENTH: u32 = 1 << 28;
 
 /// As the envelope's rate limits count it: two ticks.
 const MAX_ELAPSED_US: u32 = 2_000;
 
 impl Probe {
+    /// Whether there is one.
+    pub(crate) fn is_any(&self) -> bool {
+        self.amplitude != Torque::ZERO
+    }
+
     /// The torque to add now; `None` once it is silent.
     #[must_use]
     pub fn step(&self, state: &mut ProbeState, elapsed: Micros, wanted: bool) -> Option<Torque> {
@@ -56,7 +71,7 @@ impl Probe {
         } else {
             state.gain.saturating_sub(advance)
         };
-        if state.gain == 0 || self.amplitude == Torque::ZERO {
+        if state.gain == 0 || !self.is_any() {
             *state = ProbeState::SILENT;
             return None;
         }

@@ -245,6 +245,7 @@ fn changed(change: &Change, value: f64, held: f64, since_s: f64, noise: &mut Xos
             let way = end - value;
             value + way.signum() * (per_s * since_s).min(way.abs())
         }
+        Change::Growing { to, ms } => value * (1.0 + (to - 1.0) * (since_s * 1e3 / f64::from(ms)).min(1.0)),
         Change::Sliding { by, ms } => value + by * (since_s * 1e3 / f64::from(ms)).min(1.0),
         // A period of the host's messages up, one down.
         Change::Jumping(by) => {

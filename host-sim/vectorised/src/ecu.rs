@@ -302,8 +302,9 @@ impl<const N: usize> Ecus<N> {
             let is_small = sensed.abs() <= LARGEST_DRIVER_NM;
             self.suspect[l] |= !flag(is_small) & self.matters[l] & Reason::SensorRange.bit();
             self.driver[l] = driver;
-            let is_felt =
-                (driver.wrapping_abs() > HELD) | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT);
+            let is_felt = self.probes.is_passing_zero(l)
+                & ((driver.wrapping_abs() > HELD)
+                    | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT));
             self.felt[l] = if is_felt { driver } else { self.felt[l] };
             self.without_ms[l] = if is_felt { 0 } else { self.without_ms[l] };
         }

@@ -35,6 +35,13 @@ pub(super) const ROWS: &[FaultCase] = &[
     .torque(5.0)
     .lasts(1000),
     row(
+        "camera-slides-slowly",
+        "e_y' slides to the next lane's line: 3.5 m in 4.5 s",
+        &[Sensor(LateralError, Sliding { by: 3.5, ms: 4500 })],
+    )
+    .may_hand_over()
+    .torque(5.0),
+    row(
         "yaw-error-flipped-before-curve",
         "e_theta' with the wrong sign from before a curve",
         &[Sensor(YawError, Times(-1.0))],
