@@ -263,7 +263,7 @@ mod tests {
             change(&mut run);
             let (result, taken) = told(&run);
             assert_eq!(taken, 0, "what is wrong is not taken");
-            result.unwrap_err()
+            result.unwrap_err().to_string()
         };
         let error = lie(&|run| run.trace.samples[700].yaw_rate_rad_per_s += 1e-18);
         assert!(error.starts_with("run 0: yaw_rate"), "{error}");
