@@ -3,6 +3,7 @@
 use haptic_sim::models::arm::Arm;
 use haptic_sim::models::driver::{ArmGains, DriverParameters, Vision};
 
+use crate::error::FmuError;
 use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, parameter, variable};
 use Kind::Real;
 use Role::Output;
@@ -92,9 +93,9 @@ struct Driver {
 }
 
 impl Model for Driver {
-    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), String> {
+    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), FmuError> {
         let [a_1, a_2, a_3, t_p, t_nms, k_nms, k_d, k_hg, ..] = values[FIRST..] else {
-            return Err("variables are missing".into());
+            return Err(FmuError::Other("variables are missing"));
         };
         let parameters = DriverParameters {
             a_1,
@@ -105,14 +106,14 @@ impl Model for Driver {
             k_nms,
             ..DriverParameters::default()
         };
-        parameters.check().map_err(|e| e.to_string())?;
+        parameters.check()?;
         self.vision = Vision::new(&parameters);
         self.arm = Some(Arm::new(&parameters, ArmGains { k_d, k_hg }));
         values[TORQUE] = 0.0;
         Ok(())
     }
 
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let target_rad = self.vision.step(values[0], values[1]);
         if let Some(arm) = &mut self.arm {
             values[TORQUE] = arm.step(target_rad, values[2], values[3]);

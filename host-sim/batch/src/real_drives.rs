@@ -172,7 +172,8 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
     };
     let file = path.strip_prefix(directory).unwrap_or(path).display().to_string();
     let drive = |layout: &str, by_hand, found: Result<Found, StudyError>| {
-        let (refused, found) = found.map_or_else(|why| (Some(why.to_string()), None), |found| (None, Some(found)));
+        let (refused, found) =
+            found.map_or_else(|why| (Some(why.to_string()), None), |found| (None, Some(found)));
         RealDrive {
             file: file.clone(),
             layout: layout.into(),

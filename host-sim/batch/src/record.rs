@@ -228,7 +228,7 @@ mod tests {
             )
         );
         assert_eq!(
-            check(0.0, 9000.0),
+            check(0.0, 9000.0).map_err(|e| e.to_string()),
             Err("window to = 9000 m is outside 0 to 3350 m".into())
         );
         for (from_m, to_m) in [(500.0, 100.0), (500.0, 500.0), (500.0, 500.5)] {

@@ -273,7 +273,9 @@ mod tests {
             kmh: vec![60.0, 50.0],
         };
         let scenario = Scenario::builder().speed(speed).build().unwrap();
-        for error in [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()].map(|e| e.to_string()) {
+        for error in
+            [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()].map(|e| e.to_string())
+        {
             assert!(error.starts_with("speed: a map over speeds"), "{error}");
         }
     }

@@ -220,7 +220,9 @@ mod tests {
         put(&mut table, "speed", Value::Integer(50)).unwrap();
         assert_eq!(table["course"]["segment"][0]["length"].as_float(), Some(2.0));
         assert_eq!(table["world"]["mu"].as_float(), Some(0.5));
-        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0)).unwrap_err().to_string();
+        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("list of 1"), "{error}");
         assert!(put(&mut table, "speed.x", Value::Float(2.0)).is_err());
     }

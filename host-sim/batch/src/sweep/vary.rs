@@ -67,7 +67,9 @@ pub(super) fn varied(file: &str, above: &str, table: &Table, axes: &mut Vec<Axis
             _ => {
                 let form = "takes a list [..] or a table with one of";
                 let kinds = KINDS.join(", ");
-                return Err(error(format!("{form} {kinds}; a fixed value belongs to [scenario]").into()));
+                return Err(error(
+                    format!("{form} {kinds}; a fixed value belongs to [scenario]").into(),
+                ));
             }
         }
     }

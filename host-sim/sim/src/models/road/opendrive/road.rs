@@ -147,7 +147,10 @@ impl<'a> Road<'a> {
     }
 }
 
-fn shapes<'a>(nodes: impl Iterator<Item = Node<'a, 'a>>, place: &str) -> Result<Vec<(f64, Profile)>, RoadError> {
+fn shapes<'a>(
+    nodes: impl Iterator<Item = Node<'a, 'a>>,
+    place: &str,
+) -> Result<Vec<(f64, Profile)>, RoadError> {
     let mut shapes: Vec<(f64, Profile)> = Vec::new();
     for node in nodes {
         let s_m = number(node, "s", place)?;
@@ -196,7 +199,8 @@ impl<'a> Section<'a> {
             }
             let there = if there.is_empty() { "none".into() } else { there };
             let start_m = self.start_m;
-            format!("road {road}: the lane section at s = {start_m} m has no lane {id}; it has {there}").into()
+            format!("road {road}: the lane section at s = {start_m} m has no lane {id}; it has {there}")
+                .into()
         })
     }
 }
