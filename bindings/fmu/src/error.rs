@@ -1,7 +1,7 @@
 //! Why a unit refuses: what the importing tool then prints.
 
-use haptic_core::modes::Mode;
-use haptic_core::params::ParamError;
+use haptic_core::controller::params::ParamError;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::input::{InputError, RangeError};
 use haptic_sim::scenario::ScenarioError;
 

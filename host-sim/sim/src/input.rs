@@ -91,12 +91,6 @@ impl RangeError {
     }
 }
 
-impl From<RangeError> for String {
-    fn from(error: RangeError) -> Self {
-        error.to_string()
-    }
-}
-
 /// Refuses a value outside `range`, and NaN.
 ///
 /// # Errors

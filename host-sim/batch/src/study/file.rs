@@ -160,7 +160,7 @@ fn session(
             let mut driver = Table::new();
             driver.insert(
                 "driver".into(),
-                Value::Table(of_published(number, manual).map_err(|e| bad(e.into()))?),
+                Value::Table(of_published(number, manual).map_err(|e| bad(e.to_string()))?),
             );
             merge(&mut fields, &driver);
             Who::Simulated

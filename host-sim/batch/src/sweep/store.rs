@@ -188,7 +188,7 @@ impl<'a> Store<'a> {
             match fs::rename(from, to) {
                 // A shard that finished at the same time has tidied up behind itself; its bytes are the same.
                 Err(e) if e.kind() == io::ErrorKind::NotFound && to.exists() => {}
-                moved => moved.map_err(|e| StoreError::file(&to, e))?,
+                moved => moved.map_err(|e| StoreError::file(to, e))?,
             }
         }
         self.tidy();
