@@ -4,6 +4,7 @@ use haptic_sim::fields::{Field, Fields, from_numbers};
 use haptic_sim::models::arm::Arm;
 use haptic_sim::models::driver::{ArmGains, ArmInFile, DriverParameters, Vision};
 
+use crate::error::FmuError;
 use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, of_field, variable};
 use Kind::Real;
 use Role::Output;
@@ -98,14 +99,13 @@ struct Driver {
 }
 
 impl Model for Driver {
-    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), String> {
+    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), FmuError> {
         let names = FIELDS.iter().map(|field| field.name);
         let (parameters, arm): (DriverParameters, ArmInFile) =
             from_numbers(names.zip(values[FIRST..].iter().copied()))?;
         parameters
             .check()
-            .and_then(|()| arm.check())
-            .map_err(|e| e.to_string())?;
+            .and_then(|()| arm.check())?;
         let (k_d, k_hg) = (values[K_D], values[K_HG]);
         self.vision = Vision::new(&parameters);
         self.arm = Some(Arm::new(&parameters, ArmGains { k_d, k_hg }));
@@ -113,7 +113,7 @@ impl Model for Driver {
         Ok(())
     }
 
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let target_rad = self.vision.step(values[0], values[1]);
         if let Some(arm) = &mut self.arm {
             values[TORQUE] = arm.step(target_rad, values[2], values[3]);

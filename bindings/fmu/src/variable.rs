@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use haptic_sim::fields::Field;
 
+use crate::error::FmuError;
+
 /// What a variable is to FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -157,20 +159,20 @@ pub trait Model: Send {
     ///
     /// # Errors
     /// A parameter that cannot be, with its name.
-    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), String>;
+    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), FmuError>;
 
     /// One step of 1 ms under the inputs; writes the outputs.
     ///
     /// # Errors
     /// Why there is no next step.
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String>;
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError>;
 
     /// Takes tunable parameters that were set since the start.
     ///
     /// # Errors
     /// Why they cannot be, or not now.
-    fn tune(&mut self, _values: &[f64]) -> Result<(), String> {
-        Err("it cannot be set now".into())
+    fn tune(&mut self, _values: &[f64]) -> Result<(), FmuError> {
+        Err(FmuError::Other("it cannot be set now"))
     }
 
     /// The same again, for a state that is taken.

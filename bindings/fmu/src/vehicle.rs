@@ -3,6 +3,7 @@
 
 use haptic_sim::fields::from_numbers;
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
+use haptic_sim::input::InputError;
 use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::parts::PaperPair;
@@ -10,6 +11,7 @@ use haptic_sim::scenario::{Condition, SPEED_M_PER_S, Speed};
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Scenario, Simulation};
 
+use crate::error::FmuError;
 use crate::variable::{
     About, Kind, Model, Role, Texts, Variable, input, limits, of_field, parameter, variable,
 };
@@ -149,24 +151,24 @@ const OWN: [Variable; FIRST] = [
 ];
 
 /// The road that was asked for.
-fn course(texts: &Texts) -> Result<Course, String> {
+fn course(texts: &Texts) -> Result<Course, FmuError> {
     let name = texts.texts[COURSE].as_str();
     if name == PAPER_COURSE {
         return Ok(Course::paper());
     }
     let path = texts.resources.join(name);
-    let bytes = std::fs::read(&path).map_err(|why| format!("course = {}: {why}", path.display()))?;
+    let bytes = std::fs::read(&path).map_err(|why| FmuError::Course(InputError::new(path.display(), why)))?;
     let text = String::from_utf8_lossy(&bytes);
-    Course::from_text(name, &text, &LaneChoice::default()).map_err(|why| format!("course = {why}"))
+    Course::from_text(name, &text, &LaneChoice::default()).map_err(FmuError::Course)
 }
 
 /// A guidance that applies what it is told.
 #[derive(Clone, Default)]
-struct Told {
+struct GivenTorque {
     torque_nm: f64,
 }
 
-impl Guidance for Told {
+impl Guidance for GivenTorque {
     fn looks_at_road(&self, _step: u32) -> bool {
         true
     }
@@ -181,16 +183,16 @@ impl Guidance for Told {
 
 #[derive(Clone)]
 struct Vehicle {
-    simulation: Option<Simulation<Told>>,
+    simulation: Option<Simulation<GivenTorque>>,
     lateral_error_m: f64,
     s_m: f64,
 }
 
 impl Vehicle {
     /// What there is to be seen now: a copy looks, and is thrown away.
-    fn look(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn look(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &self.simulation else {
-            return Err("the vehicle was not started".into());
+            return Err(FmuError::Other("the vehicle was not started"));
         };
         let action = Action {
             hand_torque_nm: values[0],
@@ -222,15 +224,15 @@ impl Vehicle {
 }
 
 /// Why there is no next step.
-fn ended(simulation: &Simulation<Told>) -> String {
+fn ended(simulation: &Simulation<GivenTorque>) -> FmuError {
     match simulation.ending() {
-        Some(Ending::Diverged { s_m }) => format!("the vehicle has left the road, at {s_m:.1} m"),
-        _ => "the course has ended".into(),
+        Some(Ending::Diverged { s_m }) => FmuError::LeftRoad(s_m),
+        _ => FmuError::Other("the course has ended"),
     }
 }
 
 impl Model for Vehicle {
-    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), String> {
+    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), FmuError> {
         let names = VehicleParameters::FIELDS.iter().map(|field| field.name);
         let vehicle = from_numbers(names.zip(values[FIRST..COURSE].iter().copied()))?;
         let scenario = Scenario::builder()
@@ -238,20 +240,19 @@ impl Model for Vehicle {
             .condition(Condition::High)
             .speed(Speed::Constant(values[SPEED]))
             .vehicle(vehicle)
-            .build()
-            .map_err(|e| e.to_string())?;
+            .build()?;
         self.simulation = Some(Simulation::of(
             &scenario,
             PaperPair::without_driver(&scenario),
-            Told::default(),
+            GivenTorque::default(),
         ));
         (self.lateral_error_m, self.s_m) = (0.0, 0.0);
         self.look(values)
     }
 
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &mut self.simulation else {
-            return Err("the vehicle was not started".into());
+            return Err(FmuError::Other("the vehicle was not started"));
         };
         simulation.guidance_mut().torque_nm = values[1];
         let action = Action {

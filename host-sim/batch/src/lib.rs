@@ -45,6 +45,7 @@ pub mod compare;
 pub mod course;
 pub mod design;
 pub mod design_guidance;
+mod error;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;
@@ -64,6 +65,7 @@ mod vectorised;
 pub mod stability;
 
 pub use away::{Away, left_by_themselves};
+pub use error::StudyError;
 pub use record::{RunRecord, check_window};
 pub use shares::shares;
 

@@ -10,6 +10,8 @@ use std::fmt;
 use std::marker::PhantomData;
 
 use serde::de::value::MapDeserializer;
+/// Why numbers by name are no table: a name that there is not, or one that lacks.
+pub use serde::de::value::Error as NotATable;
 use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, MapAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -317,11 +319,8 @@ impl<'de, T: Fields> Deserialize<'de> for InFile<T> {
 ///
 /// # Errors
 /// A name that is none.
-pub fn from_numbers<T: Fields>(numbers: impl Iterator<Item = (&'static str, f64)>) -> Result<T, String> {
-    let map = MapDeserializer::<_, de::value::Error>::new(numbers);
-    InFile::deserialize(map)
-        .map(|table| table.0)
-        .map_err(|e| e.to_string())
+pub fn from_numbers<T: Fields>(numbers: impl Iterator<Item = (&'static str, f64)>) -> Result<T, NotATable> {
+    InFile::deserialize(MapDeserializer::new(numbers)).map(|table| table.0)
 }
 
 /// The name of a field that there is.

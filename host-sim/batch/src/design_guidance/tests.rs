@@ -277,7 +277,7 @@ fn a_wrong_file_is_refused_by_field_value_and_range() {
         "{error}"
     );
     assert_eq!(
-        design(FILE).unwrap().row(3).unwrap_err(),
+        design(FILE).unwrap().row(3).unwrap_err().to_string(),
         "--choose = 3 is outside 1 to 2"
     );
 }

@@ -125,7 +125,8 @@ fn a_study_goes_on_and_overwrites_nothing() {
         let error = study(&STUDY.replace(from, to))
             .unwrap()
             .run(out.path(), || ())
-            .unwrap_err();
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(says) && error.contains("P01"), "{error}");
         assert_eq!(fs::read(kept.join("drive.csv")).unwrap(), before);
     }
@@ -179,14 +180,17 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
         ("P02/guided", &guided, "this participant is simulated"),
         ("P03/wet", &guided, "there are: P03/manual, P03/guided"),
     ] {
-        let error = study.import(out.path(), what, path).unwrap_err();
+        let error = study.import(out.path(), what, path).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
         assert!(!out.path().join("sessions").exists(), "{what}: nothing is left");
     }
     study.import(out.path(), "P03/guided", &guided).unwrap();
     let place = out.path().join("sessions/P03/2-guided");
     assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
-    let error = study.import(out.path(), "P03/guided", &fast).unwrap_err();
+    let error = study
+        .import(out.path(), "P03/guided", &fast)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("2-guided is recorded already"), "{error}");
     assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
     let results = study.results(out.path()).unwrap();
@@ -258,7 +262,8 @@ fn repetitions_are_blocks_with_orders_and_seeds_of_their_own() {
     let out = tempfile::tempdir().unwrap();
     let missing = twice
         .import(out.path(), "P03/guided/3", Path::new("x.csv"))
-        .unwrap_err();
+        .unwrap_err()
+        .to_string();
     assert!(missing.contains("P03/guided, P03/guided/2"), "{missing}");
     twice.run(out.path(), || ()).unwrap();
     let results = twice.results(out.path()).unwrap();

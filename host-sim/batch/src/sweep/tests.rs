@@ -204,7 +204,7 @@ fn a_directory_of_another_sweep_is_left_alone() {
     ));
     let store = Store::open(&one, "test 1", folder.path()).unwrap();
     assert!(matches!(store.finish(), Err(StoreError::Missing(1, 1))));
-    assert!(matches!(store.put(0, b"bytes"), Err(StoreError::Spoiled(0))));
+    assert!(matches!(store.put(0, b"bytes"), Err(StoreError::Corrupted(0))));
 }
 
 /// With K_hg from 0 to 1 the peak varies; its mean is known to 20 mm before all 1,000 are driven, at the same

@@ -1,5 +1,6 @@
 //! What a varied field takes: values in a list, or a distribution.
 
+use crate::error::{StudyError, refuse};
 use haptic_sim::input::InputError;
 use statrs::distribution::{ContinuousCDF, Normal};
 use toml::{Table, Value};
@@ -77,7 +78,7 @@ fn truncated(mean: f64, sd: f64, [low, high]: [f64; 2], u: f64) -> f64 {
 ///
 /// # Errors
 /// A part of the path that is neither a table nor a place in a list.
-pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), String> {
+pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), StudyError> {
     let mut parts = path.split('.').peekable();
     let first = parts.next().unwrap_or("");
     if parts.peek().is_none() {
@@ -90,7 +91,7 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), Str
         let is_last = parts.peek().is_none();
         place = match place {
             Value::Table(table) if table.is_empty() && part.parse::<usize>().is_ok() => {
-                return Err(format!(
+                return refuse(format!(
                     "{path}: there is no list before {part:?}; a course's segments have to stand in [scenario]"
                 ));
             }
@@ -106,7 +107,7 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), Str
                     format!("{path}: {part:?} is no place in a list of {count}, counted from 0")
                 })?
             }
-            _ => return Err(format!("{path}: what is before {part:?} is a value, not a table")),
+            _ => return refuse(format!("{path}: what is before {part:?} is a value, not a table")),
         };
         if is_last {
             *place = value;
@@ -219,7 +220,9 @@ mod tests {
         put(&mut table, "speed_m_per_s", Value::Integer(50)).unwrap();
         assert_eq!(table["course"]["segment"][0]["length"].as_float(), Some(2.0));
         assert_eq!(table["world"]["mu"].as_float(), Some(0.5));
-        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0)).unwrap_err();
+        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("list of 1"), "{error}");
         assert!(put(&mut table, "speed_m_per_s.x", Value::Float(2.0)).is_err());
     }

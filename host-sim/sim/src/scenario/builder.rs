@@ -1,7 +1,5 @@
 //! How a scenario is made, and why it is refused.
 
-use std::fmt;
-
 use haptic_core::controller::config::Setup;
 
 use super::guidance_file::in_words_of_the_file;
@@ -26,16 +24,20 @@ pub struct ScenarioBuilder {
 }
 
 /// Why there is no such scenario.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
     /// A value outside its range.
-    Range(RangeError),
+    #[error(transparent)]
+    Range(#[from] RangeError),
     /// An instant outside the run.
+    #[error("{0}: the run ends there")]
     AfterTheEnd(RangeError),
     /// Points of a speed that do not go together.
+    #[error("{0}")]
     Speed(String),
     /// A manual driver with something that takes guidance.
+    #[error("condition = \"manual\" has no guidance, but {what}; {cure}")]
     ManualWith {
         /// The field, with its value.
         what: String,
@@ -43,6 +45,10 @@ pub enum ScenarioError {
         cure: &'static str,
     },
     /// A course with less than a second to drive.
+    #[error(
+        "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {needed_m:.1} m: {look_ahead_m:.1} m of \
+         look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive"
+    )]
     CourseTooShort {
         /// Its name.
         course: String,
@@ -57,45 +63,6 @@ pub enum ScenarioError {
         /// The same as time, s.
         look_ahead_s: f64,
     },
-}
-
-impl From<RangeError> for ScenarioError {
-    fn from(error: RangeError) -> Self {
-        Self::Range(error)
-    }
-}
-
-impl fmt::Display for ScenarioError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Range(error) => error.fmt(f),
-            Self::AfterTheEnd(error) => write!(f, "{error}: the run ends there"),
-            Self::Speed(message) => f.write_str(message),
-            Self::ManualWith { what, cure } => {
-                write!(f, "condition = \"manual\" has no guidance, but {what}; {cure}")
-            }
-            Self::CourseTooShort {
-                course,
-                length_m,
-                needed_m,
-                speed_kmh,
-                look_ahead_m,
-                look_ahead_s,
-            } => write!(
-                f,
-                "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {needed_m:.1} m: \
-                 {look_ahead_m:.1} m of look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for ScenarioError {}
-
-impl From<ScenarioError> for String {
-    fn from(error: ScenarioError) -> Self {
-        error.to_string()
-    }
 }
 
 impl ScenarioBuilder {
