@@ -1,6 +1,6 @@
 //! Drivers, vehicles and guidance as parts: the examples, the published parts against the published pair, failures that end.
 
-use haptic_core::modes::Mode;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::road::{Course, Segment};
 use haptic_sim::parts::{Acting, DriverView, PaperDriver, PaperVehicle, Vehicle};

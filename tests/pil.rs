@@ -9,8 +9,8 @@ use std::process::{Command, Stdio};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_lockstep::{Start, StartState};
 use haptic_pil::{Channel, Machine, Pil, PilError, Report, Target, image};

@@ -31,10 +31,10 @@
 //!
 //! ```
 //! use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-//! use haptic_core::config::Setup;
+//! use haptic_core::controller::config::Setup;
 //! use haptic_core::ecu::{Boot, Ecu};
-//! use haptic_core::modes::Mode;
-//! use haptic_core::params::Params;
+//! use haptic_core::safety::modes::Mode;
+//! use haptic_core::controller::params::Params;
 //! use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed};
 //!
 //! let setup = Setup::new(&Params::PAPER)?;
@@ -69,20 +69,20 @@
 //! }
 //! // Equation (9): K_1*a1'*e_y' = 0.25*2*0.5 = 0.25 N.m to the left, to an LSB of the bus.
 //! assert!((last.unwrap_or_default().nm() - 0.25).abs() < 1.0 / 4096.0);
-//! # Ok::<(), haptic_core::params::ParamError>(())
+//! # Ok::<(), haptic_core::controller::params::ParamError>(())
 //! ```
 //!
 //! # What holds in every line
 //!
 //! No allocation, no `unsafe`. From `Ecu::receive` and `Ecu::step` no float and no panic is reachable, which is proved
 //! on the linked image (`cargo xtask gate`). `Ecu::background_step`, called when the torque is already on its way, may
-//! use f32: what it estimates moves nothing. State that must survive a bit flip is kept twice ([`redundant`]). SI
+//! use f32: what it estimates moves nothing. State that must survive a bit flip is kept twice ([`safety::redundant`]). SI
 //! values as `f64` exist for parameters, for the host and for tests, and cross into fixed point in [`quantity`] alone.
 //!
 //! # Where things are listed
 //!
-//! Parameters in [`params`], faults in [`faults`], messages in [`bus::messages`], modes and what follows what in
-//! [`modes`]: each declared once.
+//! Parameters in [`controller::params`], faults in [`safety::faults`], messages in [`bus::messages`], modes and what leads
+//! from one to another in [`safety::modes`]: each declared once.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -99,31 +99,11 @@
     )
 )]
 
-pub mod actuator;
-mod background;
 pub mod bus;
-pub mod coast;
-pub mod config;
 pub mod controller;
-pub mod download;
 pub mod ecu;
-pub mod envelope;
 pub mod estimator;
-pub mod faults;
-pub mod hands;
-mod injection;
 pub mod law;
-pub mod modes;
-pub mod monitor;
-pub mod params;
-pub mod past;
-pub mod plausibility;
-pub mod probe;
 pub mod quantity;
-pub mod ramp;
-pub mod redundant;
-pub mod rejections;
-pub mod schedule;
-mod sine;
-pub mod stored;
-pub mod yaw;
+pub mod safety;
+pub mod service;

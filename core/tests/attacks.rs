@@ -6,13 +6,13 @@ use haptic_core::bus::messages::{
     Column, Demand, Guidance, LanePreview, MESSAGES, Message, Sender, Vehicle, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::download::{Conditions, Download, frames, unlock};
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
-use haptic_core::rejections::Rejections;
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
+use haptic_core::service::download::{Conditions, Download, frames, unlock};
+use haptic_core::service::rejections::Rejections;
 
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;

@@ -11,12 +11,12 @@ use haptic_core::bus::messages::{
     Warning, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::envelope::LimitReason;
+use haptic_core::controller::params::PARAMETERS;
 use haptic_core::estimator::Reading;
-use haptic_core::faults::{Fault, FaultSet, Record};
-use haptic_core::modes::Mode;
-use haptic_core::params::PARAMETERS;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet, Record};
+use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 

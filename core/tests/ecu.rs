@@ -6,14 +6,14 @@
 use crate::rig::Rig;
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::config::Setup;
 use haptic_core::controller::Command;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Micros, Radians, Torque};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;

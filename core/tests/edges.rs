@@ -3,18 +3,18 @@
 //! fails if none of the tests does.
 
 use crate::rig::Rig;
-use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{Column, Guidance, Identity, Message, Telemetry};
-use haptic_core::config::Setup;
 use haptic_core::controller::Motion;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Step;
 use haptic_core::ecu::injection::Region;
 use haptic_core::estimator::{Reading, Sample};
-use haptic_core::faults::Fault;
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::actuator::{Actuator, Motor};
+use haptic_core::safety::faults::Fault;
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;

@@ -7,13 +7,13 @@
 
 use crate::rig::Rig;
 use crate::rig::watch::Watch;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Metres, Torque};
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 

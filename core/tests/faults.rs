@@ -1,7 +1,7 @@
 //! The list of faults against the table in docs/reference/bus.md, and the sets that follow from their classes against
 //! masks written here by hand.
 
-use haptic_core::faults::{Class, Fault, FaultSet};
+use haptic_core::safety::faults::{Class, Fault, FaultSet};
 
 /// Every row of the document's table: bit, name and class.
 fn documented() -> Vec<String> {

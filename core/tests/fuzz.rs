@@ -16,8 +16,8 @@ use haptic_core::bus::messages::{
     Column, Demand, FaultRecord, Guidance, LanePreview, Message, Vehicle, Warning,
 };
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::quantity::{Metres, Radians};
+use haptic_core::safety::faults::{Fault, FaultSet};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 

@@ -1,12 +1,12 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
-use haptic_core::config::Config;
+use haptic_core::controller::config::Config;
+use haptic_core::controller::params::Params;
 use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
-use haptic_core::faults::FaultSet;
 use haptic_core::law::{LaneSample, Law, LawState, Since};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::faults::FaultSet;
+use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 

@@ -1,7 +1,7 @@
 //! The transition table of the code against the table and the drawing in docs/explanation/behaviour.md, written
 //! by hand.
 
-use haptic_core::modes::{Event, Events, Mode};
+use haptic_core::safety::modes::{Event, Events, Mode};
 use std::collections::BTreeSet;
 
 const BEHAVIOUR: &str = include_str!("../../docs/explanation/behaviour.md");

@@ -4,13 +4,13 @@
 //! The vehicle is steered by a preview driver along a line of given curvature, in small angles about that line.
 //! The closed loop with the whole ECU is in the fault campaign.
 
-use haptic_core::config::Config;
+use haptic_core::controller::config::Config;
 use haptic_core::law::LaneSample;
-use haptic_core::past::Past;
-use haptic_core::plausibility::{
+use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
+use haptic_core::safety::past::Past;
+use haptic_core::safety::plausibility::{
     Moved, Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
 };
-use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
 
 const DT: f64 = 1e-3;
 // Table 8.

@@ -6,13 +6,13 @@ use std::f64::consts::TAU;
 use crate::rig::Rig;
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Demand, Guidance, Message, ResetCause, Telemetry};
-use haptic_core::config::Setup;
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::FaultSet;
-use haptic_core::modes::Mode;
-use haptic_core::monitor::{Evidence, Monitor, MonitorState};
-use haptic_core::params::Params;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Ratio, Torque};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::FaultSet;
+use haptic_core::safety::modes::Mode;
+use haptic_core::safety::monitor::{Evidence, Monitor, MonitorState};
 
 /// Half an LSB of the torque on the bus, and the arithmetic of the core.
 const ROUNDING: f64 = 0.5 / 4096.0 + 1e-5;

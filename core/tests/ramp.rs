@@ -1,7 +1,7 @@
 //! The ways to zero against hand values: linear, never growing, started from what can be trusted.
 
 use haptic_core::quantity::{Instant, Micros, Ratio, Torque, TorqueRate};
-use haptic_core::ramp::{HANDOVER, History, Ramp, handover_of, pace, smaller_of_same_sign};
+use haptic_core::safety::ramp::{HANDOVER, History, Ramp, handover_of, pace, smaller_of_same_sign};
 
 /// The resolution of a torque, N.m.
 const LSB: f64 = 1.0 / 16_777_216.0;

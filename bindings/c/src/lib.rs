@@ -9,9 +9,9 @@ use core::mem::{align_of, size_of};
 
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// `HG_ECU_SIZE` and `HG_ECU_ALIGN` of the header.

@@ -1,11 +1,11 @@
 //! `HapticController`: the shipping ECU with its sensors' frames inside, SI values outside.
 
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::modes::Mode;
-use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::Status;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::unguided::{Cause, Circumstances, Watch};

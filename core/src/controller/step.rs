@@ -2,21 +2,21 @@
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
 use super::{Changed, Command, Due, Input, Inputs, Memory, READY, Request};
-use crate::coast::{Coast, GOES_ON, Shows};
-use crate::config::Config;
-use crate::envelope::{EnvelopeState, LimitReason, Situation};
-use crate::faults::{Fault, FaultSet};
-use crate::hands::{END, WARN};
-use crate::injection::Injection;
+use crate::controller::config::Config;
+use crate::controller::injection::Injection;
+use crate::law::probe::ProbeState;
 use crate::law::{LaneSample, LawState, Since};
-use crate::modes::{Event, Events, Mode};
-use crate::past::Past;
-use crate::plausibility::{Moved, lane_step_is_possible};
-use crate::probe::ProbeState;
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
-use crate::ramp::{History, Ramp, handover_of, pace, smaller_of_same_sign};
+use crate::safety::coast::{Coast, GOES_ON, Shows};
+use crate::safety::envelope::{EnvelopeState, LimitReason, Situation};
+use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::hands::{END, WARN};
+use crate::safety::modes::{Event, Events, Mode};
+use crate::safety::past::Past;
+use crate::safety::plausibility::{Moved, lane_step_is_possible};
+use crate::safety::ramp::{History, Ramp, handover_of, pace, smaller_of_same_sign};
 
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);

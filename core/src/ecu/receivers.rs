@@ -3,7 +3,6 @@
 //! Every receiver is guarded apart, so that a frame costs the check of its own and not of all. Not here: what the
 //! values lead to.
 
-use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
     Column as ColumnMessage, Demand, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus,
@@ -11,11 +10,12 @@ use crate::bus::messages::{
 };
 use crate::bus::{Frame, Reject};
 use crate::controller::{Column, Input, Inputs, Motion, Request};
-use crate::faults::Fault;
 use crate::law::LaneSample;
-use crate::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
-use crate::redundant::{Redundant, Words};
+use crate::safety::actuator::Actuator;
+use crate::safety::faults::Fault;
+use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
+use crate::safety::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
 const COLUMN_PERIOD_US: u32 = 2000;

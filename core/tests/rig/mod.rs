@@ -10,11 +10,11 @@ pub(crate) mod watch;
 
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Telemetry, Vehicle};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::modes::Mode;
 
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;

@@ -14,11 +14,11 @@ use haptic_core::bus::messages::{
     Column, FaultRecord, Guidance, Info, LanePreview, MESSAGES, Message, Rejection, ResetCause, Telemetry,
     Vehicle, Warning,
 };
-use haptic_core::config::arm_share;
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::controller::config::arm_share;
+use haptic_core::controller::params::Params;
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use serde::Serialize;
 
 use super::PilError;

@@ -3,8 +3,8 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance, Message};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 use crate::guidance::Status;
 use crate::models::STEP_S;
@@ -112,8 +112,8 @@ impl Default for EcuEvents {
 mod tests {
     use super::*;
     use haptic_core::bus::messages::ResetCause;
-    use haptic_core::envelope::LimitReason;
     use haptic_core::quantity::Torque;
+    use haptic_core::safety::envelope::LimitReason;
 
     #[test]
     fn a_fault_is_told_by_name_once_and_a_mode_when_it_changes() {

@@ -2,8 +2,8 @@
 
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message, Vehicle};
-use haptic_core::faults::FaultSet;
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::FaultSet;
+use haptic_core::safety::modes::Mode;
 use haptic_log::trace::Sample;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::disturbances::SensorErrors;

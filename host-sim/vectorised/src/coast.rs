@@ -3,12 +3,12 @@
 //! Where the lane goes on to depends on the last second of pictures and yaw rates alone. So a run whose preview fails watches
 //! them from a little before, one by one; the torque then has the share and the bounds of `haptic-core`'s `coast`.
 
-use haptic_core::coast;
-use haptic_core::config::Config;
+use haptic_core::controller::config::Config;
 use haptic_core::law::LaneSample;
-use haptic_core::past::Past;
-use haptic_core::plausibility::PlausibilityState;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
+use haptic_core::safety::coast;
+use haptic_core::safety::past::Past;
+use haptic_core::safety::plausibility::PlausibilityState;
 
 use super::counts::{MS, ONE, bits, ms, on_the_bus, per_second, small_bits, whole};
 

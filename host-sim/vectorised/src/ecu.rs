@@ -6,8 +6,9 @@
 //! decided here, makes a run suspect ([`super::checks`]).
 
 use haptic_core::bus::messages::TIMEOUT;
-use haptic_core::params::Params;
-use haptic_core::{envelope, hands, law, plausibility, ramp, schedule};
+use haptic_core::controller::params::Params;
+use haptic_core::law::{self, schedule};
+use haptic_core::safety::{envelope, hands, plausibility, ramp};
 
 use super::band::Band;
 use super::coast::{Coast, GOES_ON_MS};

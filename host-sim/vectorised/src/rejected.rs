@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use haptic_core::params::{Params, VehicleParams};
+use haptic_core::controller::params::{Params, VehicleParams};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::real::WorldParameters;

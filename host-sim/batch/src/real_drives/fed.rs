@@ -9,11 +9,11 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Ecu;
-use haptic_core::envelope::LimitReason;
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::models::sensors;
 use serde::Serialize;
 

@@ -1,13 +1,13 @@
-//! Hands on the wheel: the ECU's own criterion ([`haptic_core::hands`]) on every second of recordings that say who steers.
+//! Hands on the wheel: the ECU's own criterion ([`haptic_core::safety::hands`]) on every second of recordings that say who steers.
 //!
 //! Nothing says where the hands are. Driving by hand is a hand on the wheel for certain; shared driving is not known, and holds hands
 //! too. So "false" here is "felt in shared driving": the area under the curve is how well the criterion tells the two kinds of
 //! driving apart, not hands from none.
 
 use haptic_analysis::identify::Layout;
-use haptic_core::envelope::OVERRIDE_FROM;
-use haptic_core::hands::{ACTS, HandsState};
 use haptic_core::quantity::{Micros, Torque};
+use haptic_core::safety::envelope::OVERRIDE_FROM;
+use haptic_core::safety::hands::{ACTS, HandsState};
 use haptic_log::formats::Format;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};

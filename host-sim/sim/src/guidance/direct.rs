@@ -1,11 +1,11 @@
 //! The shipping controller without its bus: full resolution every step, so that what is seen is the law and
 //! the envelope alone.
 
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
-use haptic_core::faults::FaultSet;
 use haptic_core::law::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::faults::FaultSet;
 
 use super::{Actuation, Guidance, Observation, Status, is_limited};
 

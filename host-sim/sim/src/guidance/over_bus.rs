@@ -9,7 +9,7 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
     Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Telemetry, Vehicle,
 };
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::{Ecu, Step};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use heapless::Vec;

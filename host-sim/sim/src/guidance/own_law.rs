@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use haptic_core::bus::Frame;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::quantity::Torque;
 
 use super::{Actuation, Guidance, LaneErrors, Observation, OverBus, Status};

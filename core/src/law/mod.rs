@@ -15,12 +15,16 @@
 //!
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
+pub mod probe;
+pub mod schedule;
+pub(crate) mod sine;
+
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
     TorquePerTurningRate, TurningRate, per_second, per_second_times, product, quotient, saturate,
     shift_round,
 };
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 words! {
     /// Lane errors at the guidance's own points (t'_n = 0.3 s, t'_f = 0.7 s), ISO 8855: positive asks for a
@@ -37,7 +41,7 @@ words! {
 }
 
 words! {
-/// Coefficients of the law; immutable once validated by [`crate::params`].
+/// Coefficients of the law; immutable once validated by [`crate::controller::params`].
 pub struct Law {
     /// K_1*a1'.
     pub(crate) e_y: TorquePerLength,

@@ -15,7 +15,7 @@
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 words! {
     /// Limits in mN.m and per unit; immutable.

@@ -4,9 +4,9 @@
 //! `de_y'/dt = v*theta_n - L_n*psi_dot`, with the line's direction at the near point against the vehicle's, `theta_n`, and
 //! the rate of turn, `psi_dot`. With a measured yaw rate both are known: the near point is now where the far point was
 //! `t'_f - t'_n` ago, so that `theta_n` is the far point's direction of then, less what the vehicle has turned since
-//! ([`crate::past`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
+//! ([`crate::safety::past`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
 //! yaw rate's zero; a slow estimate takes them away, bounded so that a lie cannot hide in it. Without a yaw rate that is
-//! believed ([`crate::yaw`]) the rate of turn comes from wheel angle and speed by the steady-state bicycle model, and from what
+//! believed ([`crate::safety::yaw`]) the rate of turn comes from wheel angle and speed by the steady-state bicycle model, and from what
 //! the yaw rate was more in the long run. A gust, a bank or a tyre spoils it, so the margins are 2.5 times as wide.
 //!
 //! The change predicted and the change seen are both summed with a memory of 1 s; the preview is declared implausible
@@ -24,24 +24,24 @@
 //! far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is estimated slowly, and bounded.
 //!
 //! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists, the input goes
-//! stale, and in Active the lane seen last goes on ([`crate::coast`]).
+//! stale, and in Active the lane seen last goes on ([`crate::safety::coast`]).
 //!
 //! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
 //! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
 
 use crate::law::LaneSample;
-use crate::past::Past;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
     leak, per_second, product, product_below, product_within, saturate, signed_quotient, upper_product,
     wide_product,
 };
-use crate::redundant::words;
-use crate::yaw::{BIAS_SHIFT, YawState};
+use crate::safety::past::Past;
+use crate::safety::redundant::words;
+use crate::safety::yaw::{BIAS_SHIFT, YawState};
 
 words! {
-    /// The vehicle as the checks know it; immutable once validated by [`crate::params`].
+    /// The vehicle as the checks know it; immutable once validated by [`crate::controller::params`].
     pub struct Plausibility {
         /// K_t/l: front wheel angle per wheel angle, over the wheelbase.
         pub(crate) curvature_gain: CurvaturePerAngle,

@@ -10,21 +10,21 @@ use core::hint::black_box;
 
 use heapless::Vec;
 
-use crate::actuator::Motor;
-use crate::background::Background;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use crate::bus::{Frame, Reject};
-use crate::config::{Config, Setup};
+use crate::controller::config::{Config, Setup};
+use crate::controller::injection::{Injection, NoInjection};
 use crate::controller::{Column, Command, Controller, ControllerState, Input, Inputs};
-use crate::envelope::LimitReason;
 use crate::estimator::Sample;
-use crate::faults::{Fault, FaultSet, History};
-use crate::injection::{Injection, NoInjection};
-use crate::modes::Mode;
-use crate::monitor::{Evidence, Monitor, MonitorState};
+use crate::estimator::background::Background;
 use crate::quantity::{Instant, Torque};
-use crate::redundant::{Redundant, words};
+use crate::safety::actuator::Motor;
+use crate::safety::envelope::LimitReason;
+use crate::safety::faults::{Fault, FaultSet, History};
+use crate::safety::modes::Mode;
+use crate::safety::monitor::{Evidence, Monitor, MonitorState};
+use crate::safety::redundant::{Redundant, words};
 use receivers::{Accepted, Receivers};
 
 /// How the ECU came up: what the firmware knows before the first step.

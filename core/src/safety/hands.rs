@@ -10,7 +10,7 @@
 //! Not here: what the warning leads to ([`crate::controller`]).
 
 use crate::quantity::{Micros, Torque};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// A change of the driver torque that only a hand makes: beyond the sensor's noise and the inertia of the wheel's rim.
 pub const FELT: Torque = Torque::from_nm(0.08);

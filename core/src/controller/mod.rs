@@ -3,22 +3,25 @@
 //!
 //! Not here: bytes and their checks, the monitor, the motor ([`crate::ecu`]).
 
+pub mod config;
+pub(crate) mod injection;
+pub mod params;
 mod step;
 
-use crate::coast::Coast;
-use crate::config::Config;
-use crate::envelope::{EnvelopeState, LimitReason};
-use crate::faults::{Fault, FaultSet};
-use crate::hands::HandsState;
-use crate::injection::{Injection, NoInjection};
+use crate::controller::config::Config;
+use crate::controller::injection::{Injection, NoInjection};
+use crate::law::probe::ProbeState;
 use crate::law::{LaneSample, LawState};
-use crate::modes::Mode;
-use crate::past::Past;
-use crate::plausibility::PlausibilityState;
-use crate::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
-use crate::ramp::{History, Ramp};
-use crate::redundant::{Redundant, Words, are_whole, words};
+use crate::safety::coast::Coast;
+use crate::safety::envelope::{EnvelopeState, LimitReason};
+use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::hands::HandsState;
+use crate::safety::modes::Mode;
+use crate::safety::past::Past;
+use crate::safety::plausibility::PlausibilityState;
+use crate::safety::ramp::{History, Ramp};
+use crate::safety::redundant::{Redundant, Words, are_whole, words};
 use step::{Step, without};
 
 /// Inputs must be valid for this long in Standby before a request can engage.
