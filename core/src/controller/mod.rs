@@ -10,6 +10,7 @@ mod step;
 
 use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
+use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::law::{LaneSample, LawState};
 use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
@@ -305,6 +306,7 @@ pub struct ControllerState {
     history: History,
     past: Past,
     due: Due,
+    activity: Activity,
 }
 
 impl ControllerState {
@@ -326,6 +328,7 @@ impl ControllerState {
             history: History::new(),
             past: Past::new(),
             due: Due::default(),
+            activity: Activity::NEW,
         }
     }
 
@@ -400,7 +403,14 @@ impl Controller {
         if !found_whole && !are_whole(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
-        let memory = state.memory.value_mut();
+        let ControllerState {
+            memory: kept,
+            history,
+            past,
+            due,
+            activity,
+        } = state;
+        let memory = kept.value_mut();
         let mut step = Step {
             config: self.config.value(),
             now,
@@ -408,14 +418,14 @@ impl Controller {
             inputs,
             lane: inputs.lane,
             elapsed: now.since(memory.hot.last_step),
+            activity,
             injection,
         };
         memory.hot.last_step = now;
         let mut changed = Changed::NOTHING;
-        let (history, past) = (&mut state.history, &mut state.past);
-        let command = step.run(memory, &mut changed, history, past, &mut state.due);
-        seal(&mut state.memory, changed);
-        state.history.push(now, without(command.torque, command.probe));
+        let command = step.run(memory, &mut changed, history, past, due);
+        seal(kept, changed);
+        history.push(now, without(command.torque, command.probe));
         command
     }
 }

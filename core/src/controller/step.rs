@@ -4,6 +4,8 @@
 use super::{Changed, Command, Due, Input, Inputs, Memory, READY, Request};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
+use crate::law::activity::Activity;
+use crate::law::fdca::Car;
 use crate::law::probe::ProbeState;
 use crate::law::{LaneSample, LawState, Since};
 use crate::quantity::{
@@ -51,6 +53,7 @@ pub(super) struct Step<'a, I> {
     /// The lane that the law is shown: the input's, or in its place the one seen last as it went on.
     pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
+    pub(super) activity: &'a mut Activity,
     pub(super) injection: &'a I,
 }
 
@@ -121,8 +124,7 @@ impl<I: Injection> Step<'_, I> {
             checks.gone_on(&v.plausibility, past, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let since = self.since(v, last);
-        let asked = self.config.law.asked(&v.law, self.now, since.as_ref());
+        let asked = self.law(v, last);
         match self.inputs.lane {
             Input::Lost => v.coast.lose(asked),
             Input::New(sample) if !is_older(sample) => {
@@ -163,7 +165,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
     fn look(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut Changed,
         fast_enough: Option<bool>,
@@ -208,6 +210,11 @@ impl<I: Injection> Step<'_, I> {
         }
         match column {
             Input::New(c) => {
+                if self.follows_activity() {
+                    let passed = self.now.since(v.heard.column);
+                    self.activity
+                        .turn(&self.config.law, v.plausibility.wheel(), c.wheel_angle, passed);
+                }
                 v.heard.column = self.now;
                 changed.add(Changed::HEARD);
                 changed.add(Changed::COLUMN);
@@ -347,6 +354,30 @@ impl<I: Injection> Step<'_, I> {
         ))
     }
 
+    /// What the law asks for of the sample taken last.
+    #[inline(always)]
+    fn law(&self, v: &Memory, sample: LaneSample) -> Torque {
+        let (law, since) = (&self.config.law, self.since(v, sample));
+        match self.config.fdca.get() {
+            None => law.asked(&v.law, self.now, since.as_ref()),
+            Some(fdca) => {
+                let car = Car {
+                    speed: v.plausibility.speed(),
+                    turning_gain: v.plausibility.turning_gain(),
+                    turning: v.plausibility.turning(),
+                    wheel: v.plausibility.wheel(),
+                };
+                fdca.asked(law, &v.law, self.now, since.as_ref(), &car)
+            }
+        }
+    }
+
+    /// Whether the law is driver activity.
+    #[inline(always)]
+    fn follows_activity(&self) -> bool {
+        self.config.least_share < Ratio::ONE
+    }
+
     /// Whether both speeds reach the slowest that is guided, if they are known.
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
@@ -398,7 +429,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
-    fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
+    fn enter(&mut self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
         v.hot.small.mode = mode as u8;
         let trust = v.coast.trust;
         v.coast = Coast::NEW;
@@ -408,6 +439,7 @@ impl<I: Injection> Step<'_, I> {
             Mode::Active => {
                 (v.law, v.hot.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
                 v.hot.hands.begin();
+                self.activity.forget();
             }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
@@ -445,7 +477,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// The torque, the part of it that is the probe, and what limited it.
     fn torque(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut Changed,
         mode: Mode,
@@ -521,17 +553,21 @@ impl<I: Injection> Step<'_, I> {
 
     /// The law's torque, scaled by the authority: of the last request, or all of it where none is heard any more. Zero without
     /// a lane.
-    fn guidance(&self, v: &mut Memory, changed: &mut Changed) -> Torque {
+    fn guidance(&mut self, v: &mut Memory, changed: &mut Changed) -> Torque {
         let asked = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.knows(&sample) {
                 changed.add(Changed::LAW);
                 self.config.law.take(&mut v.law, sample);
             }
-            self.config
-                .law
-                .asked(&v.law, self.now, self.since(v, sample).as_ref())
+            self.law(v, sample)
         });
-        let asked = self.injection.law(v.coast.bounded(asked));
+        let mut asked = v.coast.bounded(asked);
+        if let (true, Some(column)) = (self.follows_activity(), self.inputs.column.value()) {
+            let least = self.config.least_share;
+            let share = self.activity.share(least, column.driver_torque, self.applied);
+            asked = Torque::from_bits(share_of(share.bits(), asked.bits()));
+        }
+        let asked = self.injection.law(asked);
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
