@@ -16,6 +16,7 @@ mod forgotten;
 mod frame;
 mod fuzz;
 mod law_oracle;
+mod laws;
 mod memory;
 mod modes;
 mod monitor;

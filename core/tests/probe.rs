@@ -175,6 +175,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
             let evidence = Evidence {
                 lane: Some(&lane),
                 column: None,
+                vehicle: None,
                 demand: ms.is_multiple_of(10).then_some(&demand),
                 guidance: &guidance,
                 elapsed_us,
@@ -217,6 +218,7 @@ fn grown(monitor: &Monitor, mut state: MonitorState, demand: &[u8; 8]) -> Monito
         let evidence = Evidence {
             lane: Some(&lane),
             column: None,
+            vehicle: None,
             demand: Some(demand),
             guidance: &guidance,
             elapsed_us: 1_000,

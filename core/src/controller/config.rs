@@ -18,8 +18,8 @@ use crate::law::fdca::Fdca;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
-    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
-    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
 use crate::safety::monitor::{self, Monitor};
@@ -191,15 +191,33 @@ const fn check_law(p: &Params) -> Result<(), ParamError> {
     if p.law != FDCA {
         return Ok(());
     }
-    let [slow, fast] = [fdca_gains(p, p.least_speed_m_per_s), fdca_gains(p, FASTEST_M_PER_S)];
+    let [slow, fast] = [
+        fdca_gains(p, p.least_speed_m_per_s),
+        fdca_gains(p, FASTEST_M_PER_S),
+    ];
     let gain = [0.0, MAX_FDCA_GAIN];
     let turning = [0.0, MAX_TURNING_GAIN];
     let products = [
-        in_range("fdca_sohf * fdca_k_psi", p.fdca_sohf * p.fdca_k_psi, [0.0, 100.0], "1"),
+        in_range(
+            "fdca_sohf * fdca_k_psi",
+            p.fdca_sohf * p.fdca_k_psi,
+            [0.0, 100.0],
+            "1",
+        ),
         in_range("FDCA's gain on e_y' at the fastest", fast[0], gain, "N.m/m"),
         in_range("FDCA's gain on e_theta' at the fastest", fast[1], gain, "N.m/rad"),
-        in_range("FDCA's gain on the rate of turn at the slowest", slow[2], turning, "N.m.s/rad"),
-        in_range("FDCA's gain on the rate of turn at the fastest", fast[2], turning, "N.m.s/rad"),
+        in_range(
+            "FDCA's gain on the rate of turn at the slowest",
+            slow[2],
+            turning,
+            "N.m.s/rad",
+        ),
+        in_range(
+            "FDCA's gain on the rate of turn at the fastest",
+            fast[2],
+            turning,
+            "N.m.s/rad",
+        ),
     ];
     let mut i = 0;
     while i < products.len() {

@@ -11,7 +11,7 @@
 //!
 //! Error: at most 1 mN.m from a float64 evaluation at speeds that guide (`core/tests/laws.rs` asserts it).
 
-use super::{Law, LawState, Since};
+use super::{LaneSample, Law, LawState, Since};
 use crate::quantity::{
     AnglePerLength, FRAC_BITS, Instant, Radians, Ratio, Speed, Torque, TorquePerAcceleration, TorquePerAngle,
     TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TurningRate, TurningRatePerAngle, product,
@@ -63,6 +63,22 @@ impl Fdca {
         aligning: TorquePerAcceleration::ZERO,
     };
 
+    /// The torque that the law asks for now, from the latest sample received; `law` has the filter of the rates.
+    #[must_use]
+    pub fn step(
+        &self,
+        law: &Law,
+        state: &mut LawState,
+        now: Instant,
+        sample: LaneSample,
+        car: &Car,
+    ) -> Torque {
+        if !state.knows(&sample) {
+            law.take(state, sample);
+        }
+        self.asked(law, state, now, None, car)
+    }
+
     /// The torque asked for now, from the sample taken last; `law` has the filter of the rates.
     #[inline(never)]
     pub(crate) fn asked(
@@ -83,7 +99,10 @@ impl Fdca {
     /// The gains at a speed.
     fn at(&self, tau: u32, car: &Car) -> Law {
         let v = car.speed.bits();
-        let stiffness = product(saturate(product(self.aligning.bits(), v)), car.turning_gain.bits());
+        let stiffness = product(
+            saturate(product(self.aligning.bits(), v)),
+            car.turning_gain.bits(),
+        );
         let both = saturate(stiffness.saturating_add(i64::from(self.loha.bits())));
         let gain = |of: i32| saturate(product(both, of).min(MOST));
         let turning_gain = u32::try_from(car.turning_gain.bits()).unwrap_or(0);

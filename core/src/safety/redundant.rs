@@ -76,7 +76,8 @@ impl<T> Optional<T> {
 
     /// The words, if they are in use.
     #[inline(always)]
-    pub(crate) fn get(&self) -> Option<&T> {
+    #[must_use]
+    pub fn get(&self) -> Option<&T> {
         (self.is_used != 0).then_some(&self.words)
     }
 
@@ -90,14 +91,14 @@ impl<T> Optional<T> {
 impl<T: Words> Words for Optional<T> {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         // Either copy has to tell.
-        let words = if matches!(self.is_used, 1 | 0xFFFF_FFFE) {
-            self.words.map_words(change)
-        } else {
-            self.words
-        };
+        let are_used = matches!(self.is_used, 1 | 0xFFFF_FFFE);
         Self {
             is_used: change(self.is_used),
-            words,
+            words: if are_used {
+                self.words.map_words(change)
+            } else {
+                self.words
+            },
         }
     }
 

@@ -95,7 +95,11 @@ fn the_driver_limit_is_the_c_of_a_checkout() {
     let all: Vec<Case> = cases(1).collect();
     let mut answers = Vec::with_capacity(CASES);
     for block in all.chunks(BLOCK) {
-        let bytes: Vec<u8> = block.as_flattened().iter().flat_map(|n| n.to_ne_bytes()).collect();
+        let bytes: Vec<u8> = block
+            .as_flattened()
+            .iter()
+            .flat_map(|n| n.to_ne_bytes())
+            .collect();
         to.write_all(&bytes).unwrap();
         let mut said = vec![0; block.len()];
         from.read_exact(&mut said).unwrap();

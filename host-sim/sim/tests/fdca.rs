@@ -86,9 +86,13 @@ fn record() {
         (80.0, false, [0.05, 4.0, 0.7, 1.2, 0.5]),
     ] {
         let scenario = Scenario::builder().speed_kmh(speed_kmh).build().unwrap();
-        let Make::Part(driver) = DRIVERS[0].make else { panic!() };
+        let Make::Part(driver) = DRIVERS[0].make else {
+            panic!()
+        };
         let mut driver = driver(&scenario, &DRIVERS[0].defaults()).unwrap();
-        let Make::Around(around) = HABITS[0].make else { panic!() };
+        let Make::Around(around) = HABITS[0].make else {
+            panic!()
+        };
         if own_line {
             driver = around(&scenario, &HABITS[0].defaults(), driver);
         }

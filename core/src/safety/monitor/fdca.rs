@@ -182,7 +182,11 @@ impl Fdca {
             (right, left) = (right.min(car.yaw_urps), left.max(car.yaw_urps));
         }
         let turns = |urps: i32| times(car.rate, urps, 20);
-        let late = turns((came_us.saturating_sub(LATE_US) / 1000).max(0).saturating_mul(YAW_ACCELERATION));
+        let late = turns(
+            (came_us.saturating_sub(LATE_US) / 1000)
+                .max(0)
+                .saturating_mul(YAW_ACCELERATION),
+        );
         let low = turns(slowest.saturating_add(right)).saturating_sub(late);
         let high = turns(fastest.saturating_add(left)).saturating_add(late);
         let (mut least, mut most) = (now.saturating_add(low), now.saturating_add(high));
