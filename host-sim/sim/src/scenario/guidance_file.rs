@@ -90,9 +90,10 @@ fn name_in_file(name: &'static str) -> &'static str {
 /// A refusal by the controller's parameters: the file's field or formula, its value and its range.
 pub(super) fn in_words_of_the_file(error: &ParamError) -> RangeError {
     let formula = FORMULAS.iter().find(|(name, _)| *name == error.name);
-    let field = match (formula, error.name.split_once(" * ")) {
+    let field = match (formula, error.name.strip_prefix("k_1 * ")) {
         (Some((_, formula)), _) => (*formula).into(),
-        (None, Some((_, gain))) => format!("guidance: K_1*{gain}"),
+        (None, Some(gain)) => format!("guidance: K_1*{gain}"),
+        (None, None) if error.name.contains(' ') => format!("guidance: {}", error.name),
         (None, None) => format!("guidance.{}", name_in_file(error.name)),
     };
     RangeError {
