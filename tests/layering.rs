@@ -14,13 +14,14 @@ type Arrows = &'static [(&'static str, &'static [&'static str])];
 /// that the bus carries the codes of limits and modes; only the controller and the ECU see them all.
 #[rustfmt::skip]
 const CORE: Arrows = &[
-    // The codes of limits, modes and faults, the estimator's reading, and the names of the parameters that it carries.
-    ("bus", &["controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
-    ("controller", &["controller::config", "controller::injection", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::past", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
+    ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
+    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
     ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
-    ("controller::step", &["controller", "controller::config", "controller::injection", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::past", "safety::plausibility", "safety::ramp"]),
-    ("ecu", &["bus", "controller", "controller::config", "controller::injection", "estimator", "law", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("controller::inputs", &["law", "quantity", "safety::faults", "safety::redundant"]),
+    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
+    ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "law", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("estimator", &["bus", "law::sine", "quantity"]),
     ("law", &["quantity", "safety::redundant"]),
     ("law::probe", &["law::sine", "quantity", "safety::redundant"]),
@@ -33,9 +34,9 @@ const CORE: Arrows = &[
     ("safety::hands", &["quantity", "safety::redundant"]),
     // Nothing of the rest but how its memory is kept.
     ("safety::monitor", &["safety::redundant"]),
-    ("safety::past", &["quantity"]),
+    ("safety::motion_history", &["quantity"]),
     // The law's input, and where the vehicle and its line were.
-    ("safety::plausibility", &["law", "quantity", "safety::past", "safety::redundant", "safety::yaw"]),
+    ("safety::plausibility", &["law", "quantity", "safety::motion_history", "safety::redundant", "safety::yaw"]),
     ("safety::ramp", &["quantity", "safety::redundant"]),
     ("safety::yaw", &["quantity", "safety::redundant"]),
     ("service::download", &["bus", "controller::config", "controller::params", "safety::faults", "safety::modes", "service::stored"]),

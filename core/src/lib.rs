@@ -30,7 +30,7 @@
 //! # An ECU at work
 //!
 //! ```
-//! use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+//! use haptic_core::bus::messages::{Column, Request, LanePreview, Message, Vehicle};
 //! use haptic_core::controller::config::Setup;
 //! use haptic_core::ecu::{Boot, Ecu};
 //! use haptic_core::safety::modes::Mode;
@@ -46,7 +46,7 @@
 //!     let e_y = Metres::from_m(0.5);
 //!     let lane = LanePreview { e_y, e_theta: Radians::ZERO, age: Micros::from_us(0), valid: true };
 //!     let speeds = [Speed::from_m_per_s(20.0); 2];
-//!     let demand = Demand { engage: ms >= 800, authority: Ratio::ONE, probe: false };
+//!     let request = Request { engage: ms >= 800, authority: Ratio::ONE, probe: false };
 //!     // The motor delivers what the last frame told it.
 //!     let motor_torque = last.unwrap_or_default();
 //!     let column = Column { motor_torque, ..Column::default() };
@@ -54,7 +54,7 @@
 //!         (8, lane.encode((ms / 8) as u8)),
 //!         (2, column.encode((ms / 2) as u8)),
 //!         (10, Vehicle { speeds, yaw_rate: None }.encode((ms / 10) as u8)),
-//!         (10, demand.encode((ms / 10) as u8)),
+//!         (10, request.encode((ms / 10) as u8)),
 //!     ];
 //!     for (period, frame) in frames {
 //!         if ms % period == 0 {

@@ -128,7 +128,7 @@ fn friction_explains_a_push_that_is_over_and_no_more() {
                 let (at, torque) = (Instant::from_us(1000 * ms), Torque::from_nm(side * torque));
                 assert!(checks.column(&mut state, at, torque, Radians::ZERO, Torque::ZERO));
             }
-            side * Plausibility::used(&state).1.nm_s()
+            side * Plausibility::used_margins(&state).1.nm_s()
         };
         // The first sample has no past.
         let pushed = left(0, 22, 20.0);

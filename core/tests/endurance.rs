@@ -133,7 +133,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; Fault::C
         watch.check(&rig, &step);
         let own = step.command.faults.common(FaultSet::CRITICAL);
         assert_eq!(
-            own.without(events.reasons),
+            own.difference(events.reasons),
             FaultSet::NONE,
             "{:?}: no reason for it",
             step.command

@@ -30,11 +30,11 @@ fn sets_follow_from_the_classes() {
         FaultSet::CRITICAL,
         FaultSet::LOCKING,
         FaultSet::FADING,
-        FaultSet::of(Class::L),
+        FaultSet::of_class(Class::L),
     ]
     .map(FaultSet::bits);
     assert_eq!(bits, [0x7_80FF, 0x1F00, 0x6000, 0x8_0000, 0x10_0000]);
-    assert_eq!(FaultSet::of(Class::C), FaultSet::CRITICAL);
+    assert_eq!(FaultSet::of_class(Class::C), FaultSet::CRITICAL);
 }
 
 #[test]

@@ -99,7 +99,7 @@ fn of_all_that_is_raised_the_most_urgent_change_decides() {
                 |event: Event| set >> Event::ALL.iter().position(|e| *e == event).unwrap() & 1 == 1;
             let mut raised = Event::ALL.into_iter().filter(|event| is_raised(*event));
             let first = raised.next().unwrap();
-            let mut events = Events::of(first);
+            let mut events = Events::only(first);
             for event in Event::ALL.into_iter().filter(|event| *event != first) {
                 events.insert_if(is_raised(event), event);
             }

@@ -53,7 +53,7 @@ impl Bench {
             lane: lane.as_ref(),
             column: column.as_ref(),
             vehicle: None,
-            demand: None,
+            request: None,
             guidance: &frame,
             elapsed_us: us,
         };

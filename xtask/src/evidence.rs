@@ -54,7 +54,7 @@ const MUTATED: [(&str, &[&str]); 37] = [
     ("safety/hands.rs", &["road", "ecu"]),
     ("law/mod.rs", &["law_oracle", "ecu", "road"]),
     ("law/schedule.rs", &["schedule", "params"]),
-    ("safety/past.rs", &["plausibility", "road"]),
+    ("safety/motion_history.rs", &["plausibility", "road"]),
     ("safety/yaw.rs", &["yaw", "senders"]),
     ("law/probe.rs", &["probe"]),
     ("law/sine.rs", &["probe"]),

@@ -90,13 +90,13 @@ impl Config {
             i += 1;
         }
         match check_law(p) {
-            Ok(()) => Ok(Self::of(p)),
+            Ok(()) => Ok(Self::from_params(p)),
             Err(error) => Err(error),
         }
     }
 
     /// The configuration of parameters that are in range.
-    const fn of(p: &Params) -> Self {
+    const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
         Self {
             law: Law {

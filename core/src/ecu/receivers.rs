@@ -5,11 +5,11 @@
 
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
-    Column as ColumnMessage, Demand, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus,
-    ParameterValue, Rejection, TIMEOUT, Telemetry, Vehicle, Warning,
+    Column, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus, ParameterValue,
+    Rejection, Request, TIMEOUT, Telemetry, Vehicle, Warning,
 };
 use crate::bus::{Frame, Reject};
-use crate::controller::{Column, Input, Inputs, Motion, Request};
+use crate::controller::inputs::{ColumnState, Input, Inputs, Motion};
 use crate::law::LaneSample;
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
 use crate::safety::actuator::Actuator;
@@ -248,7 +248,7 @@ pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
     pub(super) column: Option<[u8; 8]>,
     pub(super) vehicle: Option<[u8; 8]>,
-    pub(super) demand: Option<[u8; 8]>,
+    pub(super) request: Option<[u8; 8]>,
 }
 
 impl Accepted {
@@ -256,7 +256,7 @@ impl Accepted {
         lane: None,
         column: None,
         vehicle: None,
-        demand: None,
+        request: None,
     };
 }
 
@@ -300,7 +300,7 @@ impl From<RequestWords> for Request {
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
     pub(super) lane: Redundant<Slot<LaneSample>>,
-    pub(super) column: Redundant<Slot<Column>>,
+    pub(super) column: Redundant<Slot<ColumnState>>,
     pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
@@ -336,7 +336,7 @@ impl Receivers {
             e_theta: Radians::ZERO,
             at: now,
         };
-        let column = Column {
+        let column = ColumnState {
             driver_torque: Torque::ZERO,
             wheel_angle: Radians::ZERO,
         };
@@ -377,10 +377,9 @@ impl Receivers {
                 }
                 Ok(())
             }),
-            ColumnMessage::ID => self.column.change(|slot| {
-                let c =
-                    ColumnMessage::decode_within(&mut slot.e2e, frame, column_window(now.since(slot.at)))?;
-                let column = Column {
+            Column::ID => self.column.change(|slot| {
+                let c = Column::decode_within(&mut slot.e2e, frame, column_window(now.since(slot.at)))?;
+                let column = ColumnState {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
                 };
@@ -403,15 +402,15 @@ impl Receivers {
                 }
                 heard
             }
-            Demand::ID => self.request.change(|slot| {
-                let demand = Demand::decode(&mut slot.e2e, frame)?;
+            Request::ID => self.request.change(|slot| {
+                let request = Request::decode(&mut slot.e2e, frame)?;
                 let request = RequestWords {
-                    engage: u16::from(demand.engage),
-                    probe: u16::from(demand.probe),
-                    authority: demand.authority,
+                    engage: u16::from(request.engage),
+                    probe: u16::from(request.probe),
+                    authority: request.authority,
                 };
                 slot.put(request, now, REQUEST_PERIOD);
-                accepted.demand = Some(*frame.bytes());
+                accepted.request = Some(*frame.bytes());
                 Ok(())
             }),
             // On a bus nobody hears itself.
@@ -438,7 +437,7 @@ impl Receivers {
 
     /// Whether no receiver is damaged.
     #[inline(always)]
-    pub(super) fn are_whole(&self) -> bool {
+    pub(super) fn are_intact(&self) -> bool {
         self.lane.agrees() && self.column.agrees() && self.motion.agrees() && self.request.agrees()
     }
 
@@ -471,9 +470,7 @@ impl Receivers {
 #[expect(clippy::as_conversions, reason = "at most 14")]
 fn column_window(silence: Micros) -> u8 {
     let periods = silence.us() / COLUMN_PERIOD_US;
-    periods
-        .saturating_add(u32::from(ColumnMessage::MAX_DELTA))
-        .min(14) as u8
+    periods.saturating_add(u32::from(Column::MAX_DELTA)).min(14) as u8
 }
 
 /// Whether an identifier is this ECU's (`core/tests/attacks.rs` holds it to the list of messages).

@@ -11,7 +11,7 @@
 //!
 //! Error: at most 1 mN.m from a float64 evaluation at speeds that guide (`core/tests/laws.rs` asserts it).
 
-use super::{LaneSample, Law, LawState, Since};
+use super::{EgoMotion, LaneSample, Law, LawState};
 use crate::quantity::{
     AnglePerLength, FRAC_BITS, Instant, Radians, Ratio, Speed, Torque, TorquePerAcceleration, TorquePerAngle,
     TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TurningRate, TurningRatePerAngle, product,
@@ -63,7 +63,7 @@ impl Fdca {
         aligning: TorquePerAcceleration::ZERO,
     };
 
-    /// The torque that the law asks for now, from the latest sample received; `law` has the filter of the rates.
+    /// The torque that the law demands now, from the latest sample received; `law` has the filter of the rates.
     #[must_use]
     pub fn step(
         &self,
@@ -73,24 +73,24 @@ impl Fdca {
         sample: LaneSample,
         car: &Car,
     ) -> Torque {
-        if !state.knows(&sample) {
-            law.take(state, sample);
+        if !state.is_latest(&sample) {
+            law.update(state, sample);
         }
-        self.asked(law, state, now, None, car)
+        self.demanded(law, state, now, None, car)
     }
 
-    /// The torque asked for now, from the sample taken last; `law` has the filter of the rates.
+    /// The torque demanded now, from the sample taken last; `law` has the filter of the rates.
     #[inline(never)]
-    pub(crate) fn asked(
+    pub(crate) fn demanded(
         &self,
         law: &Law,
         state: &LawState,
         now: Instant,
-        since: Option<&Since>,
+        ego: Option<&EgoMotion>,
         car: &Car,
     ) -> Torque {
         let gains = self.at(law.tau, car);
-        let lane = gains.asked(state, now, since);
+        let lane = gains.demanded(state, now, ego);
         let path = product(gains.e_theta_rate.bits(), car.turning.bits());
         let held = product(self.loha.bits(), car.wheel.bits());
         Torque::from_wide(i64::from(lane.bits()).saturating_add(path).saturating_sub(held))

@@ -17,7 +17,7 @@ pub mod faults;
 pub mod hands;
 pub mod modes;
 pub mod monitor;
-pub mod past;
+pub mod motion_history;
 pub mod plausibility;
 pub mod ramp;
 pub mod redundant;

@@ -168,7 +168,7 @@ pub(crate) use words;
 /// them on the stack. The black box is for a compiler that sees a whole image and knows where the values lie: far from
 /// the start of what holds them, it would load no two words at once.
 #[inline(never)]
-pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
+pub(crate) fn are_intact<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
     a.agrees_apart() && b.agrees_apart()
 }
 

@@ -57,7 +57,7 @@ impl YawState {
     }
 
     /// Whether wheel angle and speed say something else, by a quarter of the margin.
-    pub(crate) fn is_doubtful(&self) -> bool {
+    pub(crate) fn is_suspect(&self) -> bool {
         self.sum.bits().saturating_abs() > MARGIN.bits() >> 2
     }
 

@@ -245,7 +245,7 @@ impl Watch {
             (Fault::SpeedStep, heard.speeds),
             (Fault::ColumnTimeout, heard.driver.map(|d| d.1)),
             (Fault::SpeedTimeout, heard.speeds),
-            (Fault::CommandTimeout, heard.engage.map(|e| e.1)),
+            (Fault::RequestTimeout, heard.engage.map(|e| e.1)),
         ];
         let silence = silences
             .iter()

@@ -154,7 +154,7 @@ impl View {
         match frame.id() {
             Guidance::ID => self.guidance(&decoded(frame)?, changes),
             Warning::ID => {
-                let told = decoded::<Warning>(frame)?.faults.without(in_torque_frame());
+                let told = decoded::<Warning>(frame)?.faults.difference(in_torque_frame());
                 self.faults(self.faults.common(in_torque_frame()).union(told), changes);
             }
             LanePreview::ID => {
@@ -213,7 +213,7 @@ impl View {
             };
             changes.push(format!("driver warning: {now}"));
         }
-        let faults = self.faults.without(in_torque_frame()).union(guidance.faults);
+        let faults = self.faults.difference(in_torque_frame()).union(guidance.faults);
         self.faults(faults, changes);
     }
 

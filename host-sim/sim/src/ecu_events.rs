@@ -75,7 +75,7 @@ impl EcuEvents {
         self.said.iter().zip(before).flat_map(|(said, before)| {
             let appeared = said
                 .faults
-                .without(before.map_or(FaultSet::NONE, |before| before.faults));
+                .difference(before.map_or(FaultSet::NONE, |before| before.faults));
             let names = Fault::ALL
                 .into_iter()
                 .filter(move |fault| appeared.contains(*fault));
@@ -90,7 +90,7 @@ impl EcuEvents {
     /// The first step from one on in which a fault appeared.
     pub fn first_fault_from(&self, step: u32) -> Option<u32> {
         let steps = self.said.windows(2).filter_map(|pair| {
-            let appeared = pair[1].faults.without(pair[0].faults);
+            let appeared = pair[1].faults.difference(pair[0].faults);
             (appeared != FaultSet::NONE).then(|| (pair[1].time_s / STEP_S).round() as u32)
         });
         steps.into_iter().find(|at| *at >= step)

@@ -229,7 +229,7 @@ impl Watch {
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {
             if self.reported.mode == Mode::Active && guidance.mode != Mode::Active {
-                let named = guidance.faults.without(self.faults);
+                let named = guidance.faults.difference(self.faults);
                 self.reported.declarations.push(Declaration {
                     time_s,
                     faults: names(if named == FaultSet::NONE {

@@ -138,12 +138,12 @@ impl Felt {
                 let mut is_felt = vec![false; whole + 1];
                 let (mut hands, mut last_s) = (HandsState::NEW, time_s[0]);
                 for (k, torque) in driver_nm.iter().enumerate() {
-                    hands.guided(ACTS, Micros::from_us(1));
-                    hands.feel(Torque::from_nm(torque / factor(threshold)));
+                    hands.add_guided_time(ACTS, Micros::from_us(1));
+                    hands.update(Torque::from_nm(torque / factor(threshold)));
                     if part == 1 && threshold == OWN {
                         found.longest_s = found.longest_s.max(time_s[k] - last_s);
                     }
-                    if hands.without().us() == 0 {
+                    if hands.time_hands_off().us() == 0 {
                         // The first row has none to compare it with.
                         is_felt[second(k)] |= k > 0;
                         last_s = time_s[k];

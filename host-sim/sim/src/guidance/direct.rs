@@ -2,7 +2,8 @@
 //! the envelope alone.
 
 use haptic_core::controller::config::Setup;
-use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
+use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
+use haptic_core::controller::{Controller, ControllerState};
 use haptic_core::law::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_core::safety::faults::FaultSet;
@@ -44,7 +45,7 @@ impl Guidance for Direct {
                     at: now.before(Micros::from_ms(observation.lane_age_ms)),
                 })
             }),
-            column: Input::New(Column {
+            column: Input::New(ColumnState {
                 driver_torque: Torque::from_nm(observation.driver_torque_nm),
                 wheel_angle: Radians::from_rad(observation.wheel_angle_rad),
             }),
