@@ -75,6 +75,13 @@ class GuidanceTable(TypedDict, total=False):
     low_speed_share: float
     high_speed_share: float
     least_speed_m_per_s: float
+    law: float
+    fdca_k_y_rad_per_m: float
+    fdca_k_psi: float
+    fdca_lohs: float
+    fdca_sohf: float
+    fdca_loha_nm_per_rad: float
+    activity_lambda_min: float
     probe: bool
     probe_amplitude_nm: float
     probe_frequency_hz: float

@@ -7,7 +7,7 @@
 //!
 //! - r may be the measured yaw rate or, where that is not believed, what wheel angle and speed say, with what the two differed by in
 //!   the long run ([`WHEEL_BIAS_URPS`]). A measured rate that jumps is left out until the frame says that it is not believed.
-//! - Behind a silence of the camera the law keeps the rate that it had, or takes the new one.
+//! - Behind a silence of the camera the law goes on along the bend that it saw, with its own rate of turn, or takes the new rate.
 //! - A sample older than [`super::PROMPT_LANE_US`] may go on at its rates, or the torque stands as it was before.
 //! - A picture that was late when it came goes with the r of then: [`YAW_ACCELERATION`] times its age.
 
@@ -47,6 +47,8 @@ words! {
         /// de_theta'/dt, urad/s: with the step over the last silence, and without.
         theta_urps: i32,
         kept_urps: i32,
+        /// r at the last picture.
+        then_urps: i32,
         /// How far apart the last two pictures were.
         apart_us: i32,
         /// What was asked for when the picture was last prompt.
@@ -77,6 +79,7 @@ impl Car {
         rate: 0,
         theta_urps: 0,
         kept_urps: 0,
+        then_urps: 0,
         apart_us: 0,
         held_mnm: 0,
     };
@@ -144,9 +147,18 @@ impl Fdca {
         // A slow camera is no silence.
         let is_silence = apart_us > UNSEEN_US && apart_us / 3 > car.apart_us / 2;
         car.apart_us = apart_us;
-        if !is_silence {
-            car.kept_urps = filtered(car.kept_urps);
-        }
+        let now_urps = if car.has_yaw == 0 {
+            times(car.turning, car.wheel_urad, 16)
+        } else {
+            car.yaw_urps
+        };
+        car.kept_urps = if is_silence {
+            let turned = now_urps.saturating_sub(car.then_urps);
+            car.kept_urps.saturating_sub(turned)
+        } else {
+            filtered(car.kept_urps)
+        };
+        car.then_urps = now_urps;
         car.theta_urps = if apart_us > GAP_US {
             0
         } else {

@@ -211,6 +211,12 @@ pub(crate) fn drives(
         if scenario.condition() == Condition::Manual || scenario.failure().kind != FailureKind::None {
             return Err(source.bad("scenario.condition = \"manual\": a law of kind \"none\" is no guidance"));
         }
+        let law = scenario.guidance().controller.law;
+        if law != 0.0 {
+            return Err(source.bad(format!(
+                "scenario.guidance.law = {law}: this file has its own laws, which take the place of the ECU's"
+            )));
+        }
         for speed_kmh in speeds_kmh {
             let built = scenario.to_builder().speed_kmh(*speed_kmh).build();
             places.push((
