@@ -11,7 +11,8 @@
 //! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
 //! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
 //! an honest change about. While the host asks for the probe, and for a second after, the band is wider by the probe's
-//! amplitude.
+//! amplitude. Where the parameters choose FDCA, it is computed here a second time, and its band has reasons of its own ([`fdca`]). Driver
+//! activity leaves a share of (9), which lies between it and zero: its band is that of (9).
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
@@ -396,6 +397,7 @@ impl MonitorState {
         let (before, age_us) = (self.lane_state.lane, self.step.age_us);
         let is_new = self.observe(evidence, elapsed_us);
         let car = self.car.get_mut();
+        car.pass(elapsed_us, says_aside(evidence.guidance));
         if let Some(bytes) = evidence.column {
             car.turn_wheel(bytes);
         }

@@ -7,7 +7,9 @@
 //!
 //! - r may be the measured yaw rate or, where that is not believed, what wheel angle and speed say, with what the two differed by in
 //!   the long run ([`WHEEL_BIAS_URPS`]). A measured rate that jumps is left out until the frame says that it is not believed.
-//! - Behind a silence of the camera the law goes on along the bend that it saw, with its own rate of turn, or takes the new rate.
+//! - Behind a silence of the camera the law goes on along the bend that it saw, with its own rate of turn, or takes the new rate. While
+//!   pictures are missing or left aside, and [`UNSETTLED_US`] longer, the torque may also stand as it was before, and the rate of the
+//!   yaw error may be wrong by [`UNSETTLED_URPS`].
 //! - A sample older than [`super::PROMPT_LANE_US`] may go on at its rates, or the torque stands as it was before.
 //! - A picture that was late when it came goes with the r of then: [`YAW_ACCELERATION`] times its age.
 
@@ -51,7 +53,9 @@ words! {
         then_urps: i32,
         /// How far apart the last two pictures were.
         apart_us: i32,
-        /// What was asked for when the picture was last prompt.
+        /// For how long pictures may not be what the law goes by.
+        unsettled_us: i32,
+        /// What was asked for when they last were, and prompt.
         held_mnm: i32,
     }
 }
@@ -66,6 +70,10 @@ const WHEEL_BIAS_URPS: i32 = 25_000;
 const YAW_ACCELERATION: i32 = 1000;
 /// A picture is late from here on, as for the law.
 const LATE_US: i32 = 10_000;
+/// Where pictures were left aside or did not come, the law's rate comes from the lane as it goes on, and for so long a camera's noise
+/// of 1 mrad makes the monitor's differ by so much.
+const UNSETTLED_US: i32 = 200_000;
+const UNSETTLED_URPS: i32 = 100_000;
 /// Two pictures further apart than this share no rate.
 const GAP_US: i32 = 100_000;
 
@@ -81,8 +89,18 @@ impl Car {
         kept_urps: 0,
         then_urps: 0,
         apart_us: 0,
+        unsettled_us: 0,
         held_mnm: 0,
     };
+
+    /// Time passes; `is_aside` says that the law leaves pictures aside.
+    pub(super) fn pass(&mut self, elapsed_us: i32, is_aside: bool) {
+        self.unsettled_us = if is_aside {
+            UNSETTLED_US
+        } else {
+            self.unsettled_us.saturating_sub(elapsed_us).max(0)
+        };
+    }
 
     pub(super) fn turn_wheel(&mut self, column: &[u8; 8]) {
         // 0.01 deg are 174.53 urad.
@@ -153,6 +171,7 @@ impl Fdca {
             car.yaw_urps
         };
         car.kept_urps = if is_silence {
+            car.unsettled_us = UNSETTLED_US;
             let turned = now_urps.saturating_sub(car.then_urps);
             car.kept_urps.saturating_sub(turned)
         } else {
@@ -199,13 +218,15 @@ impl Fdca {
                 .max(0)
                 .saturating_mul(YAW_ACCELERATION),
         );
-        let low = turns(slowest.saturating_add(right)).saturating_sub(late);
-        let high = turns(fastest.saturating_add(left)).saturating_add(late);
+        let unsettled = car.unsettled_us > 0;
+        let beside = late.saturating_add(if unsettled { turns(UNSETTLED_URPS) } else { 0 });
+        let low = turns(slowest.saturating_add(right)).saturating_sub(beside);
+        let high = turns(fastest.saturating_add(left)).saturating_add(beside);
         let (mut least, mut most) = (now.saturating_add(low), now.saturating_add(high));
-        if late_us <= 0 {
+        if late_us <= 0 && !unsettled {
             car.held_mnm = least.saturating_add(most) / 2;
         } else {
-            let late_ms = late_us / 1000;
+            let late_ms = late_us.max(0) / 1000;
             let moved = |per_s: i32| (per_s / 1000).saturating_mul(late_ms);
             let went_on = position(angle(
                 lane.e_y_mm.saturating_add(moved(e_y_mmps)),
