@@ -205,6 +205,18 @@ impl PlausibilityState {
         self.column.wheel = wheel;
     }
 
+    /// The wheel angle that came last.
+    #[must_use]
+    pub const fn wheel(&self) -> Radians {
+        self.column.wheel
+    }
+
+    /// How fast the vehicle turns per wheel angle at this speed.
+    #[must_use]
+    pub const fn turning_gain(&self) -> TurningRatePerAngle {
+        self.motion.turning_gain
+    }
+
     /// The speed in use.
     #[must_use]
     pub const fn speed(&self) -> Speed {
