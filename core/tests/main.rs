@@ -16,6 +16,7 @@ mod forgotten;
 mod frame;
 mod fuzz;
 mod law_oracle;
+mod long_message;
 mod memory;
 mod modes;
 mod monitor;
