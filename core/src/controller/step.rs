@@ -141,13 +141,13 @@ impl<I: Injection> Step<'_, I> {
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
-                    PictureVerdict::SameLine => v.law.relocate(sample),
-                    PictureVerdict::NewLine => {
+                    PictureVerdict::Expected => v.law.relocate(sample),
+                    PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
                         v.plausibility.forget_lane();
                         motion_history.forget_line();
                     }
-                    PictureVerdict::OtherLine => {}
+                    PictureVerdict::Elsewhere => {}
                 }
                 changed.add(ChangedParts::LAW);
                 changed.add(ChangedParts::LANE);

@@ -4,10 +4,7 @@
 //! values lead to.
 
 use crate::bus::e2e::ReceiverState;
-use crate::bus::messages::{
-    Column, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus, ParameterValue,
-    Rejection, Request, TIMEOUT, Telemetry, Vehicle, Warning,
-};
+use crate::bus::messages::{Column, LanePreview, Message, Request, Sender, TIMEOUT, Vehicle, sender_of};
 use crate::bus::{Frame, Reject};
 use crate::controller::inputs::{ColumnState, Input, Inputs, Motion};
 use crate::law::LaneSample;
@@ -411,7 +408,7 @@ impl Receivers {
                 Ok(())
             }),
             // On a bus nobody hears itself.
-            id if is_own(id) => {
+            id if sender_of(id) == Some(Sender::Ecu) => {
                 self.foreign = FOREIGN_STEPS;
                 Some(Err(Reject::OwnIdentifier))
             }
@@ -468,21 +465,6 @@ impl Receivers {
 fn column_window(silence: Micros) -> u8 {
     let periods = silence.us() / COLUMN_PERIOD_US;
     periods.saturating_add(u32::from(Column::MAX_DELTA)).min(14) as u8
-}
-
-/// Whether an identifier is this ECU's (`core/tests/attacks.rs` holds it to the list of messages).
-const fn is_own(id: u16) -> bool {
-    matches!(
-        id,
-        Guidance::ID
-            | Warning::ID
-            | FaultRecord::ID
-            | Telemetry::ID
-            | ParameterStatus::ID
-            | ParameterValue::ID
-            | Rejection::ID
-            | Identity::ID
-    )
 }
 
 #[cfg(test)]

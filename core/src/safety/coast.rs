@@ -63,11 +63,11 @@ words! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PictureVerdict {
     /// The line, where it must be.
-    SameLine,
+    Expected,
     /// A line that is taken in its place.
-    NewLine,
+    Adopted,
     /// A line elsewhere.
-    OtherLine,
+    Elsewhere,
 }
 
 impl Coast {
@@ -129,7 +129,7 @@ impl Coast {
     ) -> PictureVerdict {
         if agrees && self.lost <= MOST_BLIND {
             self.sight = SEES;
-            return PictureVerdict::SameLine;
+            return PictureVerdict::Expected;
         }
         let is_near = sample.e_y.abs() <= NEAR && sample.e_theta.abs() <= ALONG;
         if self.trust == Ratio::ZERO && is_near {
@@ -137,11 +137,11 @@ impl Coast {
                 trust: Ratio::ZERO,
                 ..Self::NEW
             };
-            return PictureVerdict::NewLine;
+            return PictureVerdict::Adopted;
         }
         self.picture_missing(demanded);
         self.sight = APART;
-        PictureVerdict::OtherLine
+        PictureVerdict::Elsewhere
     }
 
     /// Time passes.

@@ -34,9 +34,9 @@ impl LanePreview {
 impl Message for LanePreview {
     const INFO: Info = info::LanePreview;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let age = (self.age.us().saturating_add(Self::AGE_LSB_US / 2) / Self::AGE_LSB_US).min(Self::AGE_MAX);
-        put(to_lsb(self.e_y.bits(), Self::E_Y_LSB, Self::E_Y_MAX), 12, 17)
+        let word = put(to_lsb(self.e_y.bits(), Self::E_Y_LSB, Self::E_Y_MAX), 12, 17)
             | put(
                 to_lsb(self.e_theta.bits(), Self::E_THETA_LSB, Self::E_THETA_MAX),
                 29,
@@ -44,11 +44,13 @@ impl Message for LanePreview {
             )
             | put(i64::from(age), 46, 9)
             | put(i64::from(age >> 9), 56, 2)
-            | put(i64::from(self.valid), 55, 1)
+            | put(i64::from(self.valid), 55, 1);
+        *data = word.to_le_bytes();
     }
 
     #[expect(clippy::as_conversions, reason = "masked to eleven bits")]
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let e_y = narrow(word, 12, 17);
         let e_theta = narrow(word, 29, 17);
         let in_range = is_within(e_y, Self::E_Y_MAX) && is_within(e_theta, Self::E_THETA_MAX);
@@ -91,10 +93,10 @@ impl Column {
 impl Message for Column {
     const INFO: Info = info::Column;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let angle: I64F0 = rounded(self.wheel_angle.fixed().wide_mul(Self::PER_RADIAN));
         let angle = angle.to_bits().clamp(-Self::ANGLE_MAX, Self::ANGLE_MAX);
-        put(
+        let word = put(
             to_lsb(self.driver_torque.bits(), Self::TORQUE_LSB, Self::DRIVER_MAX),
             12,
             18,
@@ -103,10 +105,12 @@ impl Message for Column {
                 to_lsb(self.motor_torque.bits(), Self::TORQUE_LSB, Self::MOTOR_MAX),
                 48,
                 16,
-            )
+            );
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let driver = narrow(word, 12, 18);
         let angle = narrow(word, 30, 18);
         let motor = narrow(word, 48, 16);
@@ -143,16 +147,18 @@ impl Vehicle {
 impl Message for Vehicle {
     const INFO: Info = info::Vehicle;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let [a, b] = self.speeds.map(|v| to_lsb(v.bits(), Self::LSB, Self::MAX));
         let yaw_rate = self.yaw_rate.unwrap_or(TurningRate::ZERO).bits();
-        put(a, 12, 16)
+        let word = put(a, 12, 16)
             | put(b, 28, 16)
             | put(to_lsb(yaw_rate, Self::YAW_RATE_LSB, Self::YAW_RATE_MAX), 44, 14)
-            | put(i64::from(self.yaw_rate.is_some()), 58, 1)
+            | put(i64::from(self.yaw_rate.is_some()), 58, 1);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let raw = [narrow(word, 12, 16), narrow(word, 28, 16)];
         // Guidance backwards makes no sense: a negative speed is a sender's fault.
         let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(&i64::from(*v)));
@@ -172,12 +178,15 @@ const AUTHORITY_MAX: i64 = 1 << AUTHORITY_LSB;
 impl Message for Request {
     const INFO: Info = info::Request;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let authority = to_lsb(self.authority.bits(), AUTHORITY_LSB, AUTHORITY_MAX).max(0);
-        put(i64::from(self.engage), 12, 1) | put(authority, 13, 8) | put(i64::from(self.probe), 21, 1)
+        let word =
+            put(i64::from(self.engage), 12, 1) | put(authority, 13, 8) | put(i64::from(self.probe), 21, 1);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let authority = unsigned(word, 13, 8);
         (authority <= AUTHORITY_MAX).then(|| Self {
             engage: unsigned(word, 12, 1) != 0,
