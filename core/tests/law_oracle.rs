@@ -379,3 +379,21 @@ fn two_samples_share_a_rate_over_100_ms() {
         );
     }
 }
+
+/// What a flipped bit of the past may ask for: 0.04 rad and 0.3 rad/s, to either side.
+#[test]
+fn what_the_vehicle_did_is_bounded_on_both_sides() {
+    for sign in [1.0, -1.0] {
+        for (turned, faster) in [(0.03, 0.2), (0.04, 0.3), (0.05, 0.4), (100.0, 100.0)] {
+            let since = Since::new(
+                Radians::from_rad(sign * turned),
+                TurningRate::from_rad_per_s(sign * faster),
+                Speed::from_m_per_s(20.0),
+                Metres::from_m(6.0),
+            );
+            let bounded = (turned.min(0.04) * sign, faster.min(0.3) * sign);
+            assert_eq!(since.turned, Radians::from_rad(bounded.0));
+            assert_eq!(since.faster, TurningRate::from_rad_per_s(bounded.1));
+        }
+    }
+}

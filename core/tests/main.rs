@@ -20,6 +20,7 @@ mod memory;
 mod modes;
 mod monitor;
 mod motor;
+mod onward;
 mod params;
 mod plausibility;
 mod probe;
