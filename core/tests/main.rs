@@ -33,4 +33,5 @@ mod schedule;
 mod senders;
 mod slcan;
 mod stored;
+mod suspect;
 mod yaw;

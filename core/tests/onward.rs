@@ -67,9 +67,13 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
                     v * e_theta(seen_until) - FAR_S * v * turn
                 };
                 let (e_y, e_theta) = (0.4 + rate * later, e_theta(t));
-                let context = format!("{v} {turn} {bend} {direction}, seen {seen_s} s, {later} s later: {lane:?}");
+                let context =
+                    format!("{v} {turn} {bend} {direction}, seen {seen_s} s, {later} s later: {lane:?}");
                 assert!((lane.e_y.m() - e_y).abs() < 2e-3, "{e_y} m: {context}");
-                assert!((lane.e_theta.rad() - e_theta).abs() < 5e-4, "{e_theta} rad: {context}");
+                assert!(
+                    (lane.e_theta.rad() - e_theta).abs() < 5e-4,
+                    "{e_theta} rad: {context}"
+                );
                 assert_eq!(lane.at, after(t));
             }
         }
@@ -95,7 +99,10 @@ fn what_is_longer_ago_than_is_remembered_was_as_the_oldest_that_is() {
             );
             // Over the 50 ms before; 30 of them at 20 ms ago.
             let expected = if ago < 0.04 { 0.6 } else { 1.0 };
-            assert!((then - expected).abs() < 1e-3, "{ago} s ago: {then} of {rate} rad/s");
+            assert!(
+                (then - expected).abs() < 1e-3,
+                "{ago} s ago: {then} of {rate} rad/s"
+            );
         }
     }
 }
