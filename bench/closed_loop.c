@@ -373,7 +373,7 @@ static double shipping_step(Shipping *e, Link *command, long k, double e_y, doub
                       &f, now_us);
     if (k % 10 == 0) {
         shipping_send(e, hg_vehicle(SPEED, SPEED, e->hosts, &f), &f, now_us);
-        shipping_send(e, hg_demand(1, 1.0, 0, e->hosts++, &f), &f, now_us);
+        shipping_send(e, hg_request(1, 1.0, 0, e->hosts++, &f), &f, now_us);
     }
     if (hg_ecu_step(&e->ecu, now_us, &out) != HG_OK || out.frame_count == 0)
         return e->torque;

@@ -8,7 +8,7 @@
 use cpu_time::ThreadTime;
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::Protection;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
 use haptic_sim::models::sensors;
 use haptic_sim::scenario::Scenario;

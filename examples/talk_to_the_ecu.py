@@ -19,7 +19,7 @@ from lockstep_client import LockStep
 
 DBC = pathlib.Path(__file__).parent.parent / "core" / "haptic.dbc"
 SPEED = 20.0  # m/s
-PERIOD_MS = {"LanePreview": 8, "Column": 2, "Vehicle": 10, "Demand": 10}
+PERIOD_MS = {"LanePreview": 8, "Column": 2, "Vehicle": 10, "Request": 10}
 
 
 def crc8(data):

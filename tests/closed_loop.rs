@@ -5,8 +5,8 @@ use std::path::Path;
 
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Column, Guidance, LanePreview, Message};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::FloatLaw;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::Course;

@@ -1,47 +1,51 @@
 //! The arrows of docs/design.md, checked on the sources: who may import whom.
 //!
-//! Between crates Cargo holds them, and a table here the manifests. Inside core a table names, for every module, the
-//! modules that it may use; an arrow that is not in the table fails, and so does one that nobody uses any more. Imports are read from the text, without
-//! comments: `crate::a`, groups such as `crate::{a::b, c}`, and `super::` chains that reach the crate's root.
+//! Between crates Cargo holds them, and a table here the manifests. Inside core a table names, for every room and every
+//! module of a room, whom it may use; an arrow that is not in the table fails, and so does one that nobody uses. Imports are
+//! read from the text, without comments: `crate::a`, groups such as `crate::{a::b, c}`, and `super::` chains.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Modules at the crate's root that use others: name, and whom it may use.
+/// Who uses others: name, and whom it may use.
 type Arrows = &'static [(&'static str, &'static [&'static str])];
 
-/// Law, envelope, mode machine, bus and monitor do not know each other, but that the bus carries the codes of
-/// limits and modes; only the controller and the ECU see them all.
+/// Parts of core, each a room or a module of a room. Law, envelope, mode machine, bus and monitor do not know each other, but
+/// that the bus carries the codes of limits and modes; only the controller and the ECU see them all.
 #[rustfmt::skip]
 const CORE: Arrows = &[
-    ("actuator", &["quantity"]),
-    ("background", &["bus", "estimator", "quantity"]),
-    // The codes of limits, modes and faults, and the names of the parameters that it carries.
-    ("bus", &["envelope", "estimator", "faults", "modes", "params", "quantity"]),
-    ("config", &["envelope", "estimator", "law", "monitor", "params", "plausibility", "probe", "quantity", "redundant", "schedule"]),
-    ("coast", &["law", "quantity", "redundant"]),
-    ("controller", &["coast", "config", "envelope", "faults", "hands", "injection", "law", "modes", "past", "plausibility", "probe", "quantity", "ramp", "redundant"]),
-    ("download", &["bus", "config", "faults", "modes", "params", "stored"]),
-    ("ecu", &["actuator", "background", "bus", "config", "controller", "envelope", "estimator", "faults", "injection", "law", "modes", "monitor", "plausibility", "quantity", "redundant"]),
-    ("envelope", &["quantity", "redundant"]),
-    ("estimator", &["quantity", "sine"]),
-    ("faults", &["quantity"]),
-    ("hands", &["quantity", "redundant"]),
-    ("injection", &["quantity"]),
-    ("law", &["quantity", "redundant"]),
+    // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
+    ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
+    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    ("controller::config", &["controller::params", "estimator", "law", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("controller::injection", &["quantity"]),
+    ("controller::inputs", &["law", "quantity", "safety::faults", "safety::redundant"]),
+    ("controller::step", &["controller", "controller::config", "controller::injection", "controller::inputs", "law", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp"]),
+    ("ecu", &["bus", "controller", "controller::config", "controller::injection", "controller::inputs", "estimator", "law", "quantity", "safety::actuator", "safety::envelope", "safety::faults", "safety::modes", "safety::monitor", "safety::plausibility", "safety::redundant"]),
+    ("estimator", &["bus", "law::sine", "quantity"]),
+    ("law", &["quantity", "safety::redundant"]),
+    ("law::probe", &["law::sine", "quantity", "safety::redundant"]),
+    ("law::schedule", &["quantity", "safety::redundant"]),
+    ("quantity", &["safety::redundant"]),
+    ("safety::actuator", &["quantity"]),
+    ("safety::coast", &["law", "quantity", "safety::redundant"]),
+    ("safety::envelope", &["quantity", "safety::redundant"]),
+    ("safety::faults", &["quantity"]),
+    ("safety::hands", &["quantity", "safety::redundant"]),
     // Nothing of the rest but how its memory is kept.
-    ("monitor", &["redundant"]),
-    ("past", &["quantity"]),
-    // A rate of change, the law's input, and where the vehicle and its line were.
-    ("plausibility", &["law", "past", "quantity", "redundant", "yaw"]),
-    ("probe", &["quantity", "redundant", "sine"]),
-    ("quantity", &["redundant"]),
-    ("ramp", &["quantity", "redundant"]),
-    ("rejections", &["bus"]),
-    ("schedule", &["quantity", "redundant"]),
-    ("stored", &["config", "params"]),
-    ("yaw", &["quantity", "redundant"]),
+    ("safety::monitor", &["safety::redundant"]),
+    ("safety::motion_history", &["quantity"]),
+    // The law's input, and where the vehicle and its line were.
+    ("safety::plausibility", &["law", "quantity", "safety::motion_history", "safety::redundant", "safety::yaw"]),
+    ("safety::ramp", &["quantity", "safety::redundant"]),
+    ("safety::yaw", &["quantity", "safety::redundant"]),
+    ("service::download", &["bus", "controller::config", "controller::params", "safety::faults", "safety::modes", "service::stored"]),
+    ("service::rejections", &["bus"]),
+    ("service::stored", &["controller::config", "controller::params"]),
 ];
+
+/// Rooms of core whose modules stand by themselves, and have arrows of their own.
+const APART: [&str; 4] = ["controller", "law", "safety", "service"];
 
 /// Which of our packages each package of the workspace may depend on, without its tests.
 #[rustfmt::skip]
@@ -123,71 +127,103 @@ fn tokens(text: &str) -> Vec<String> {
     tokens
 }
 
-/// The first names after a `::`: one, or those of a group.
-fn heads(after: &[String]) -> Vec<&str> {
-    if after.first().is_none_or(|token| token != "{") {
-        return after.first().map(String::as_str).into_iter().collect();
-    }
-    let (mut depth, mut at_head, mut heads) = (0, true, Vec::new());
-    for token in after {
+/// The paths that a tree of imports names: `a::b` one, `{a::b, c}` two.
+fn paths(tree: &[String]) -> Vec<Vec<&str>> {
+    let (mut paths, mut stem, mut stems) = (Vec::new(), Vec::new(), Vec::new());
+    let mut ended = true;
+    for (i, token) in tree.iter().enumerate() {
+        let after_colons = i == 0 || tree[i - 1] == "::";
         match token.as_str() {
-            "{" => depth += 1,
-            "}" if depth == 1 => break,
-            "}" => depth -= 1,
-            "," if depth == 1 => at_head = true,
-            name if depth == 1 && at_head => {
-                heads.push(name);
-                at_head = false;
+            "::" => {}
+            "{" if after_colons => {
+                stems.push(stem.clone());
+                ended = true;
             }
+            "," | "}" if !stems.is_empty() => {
+                if !std::mem::replace(&mut ended, true) {
+                    paths.push(stem);
+                }
+                stem = stems.last().cloned().unwrap_or_default();
+                if token == "}" {
+                    stems.pop();
+                }
+                if stems.is_empty() {
+                    return paths;
+                }
+            }
+            name if after_colons || (!stems.is_empty() && ended) => {
+                stem.push(name);
+                ended = false;
+            }
+            _ if stems.is_empty() => break,
+            // ` as other`.
             _ => {}
         }
     }
-    heads
+    if !ended {
+        paths.push(stem);
+    }
+    paths
 }
 
-/// Modules at the crate's root that a source names; `depth` is how far below the root it lies.
-fn uses(text: &str, depth: usize) -> BTreeSet<String> {
+/// Paths from the crate's root that the source of the module `place` names.
+fn uses(text: &str, place: &[String]) -> BTreeSet<Vec<String>> {
     let tokens = tokens(text);
     let mut used = BTreeSet::new();
-    let mut supers = 0;
+    let mut above: Option<&[String]> = None;
     for (i, token) in tokens.iter().enumerate() {
-        if token == "super" {
-            supers += 1;
-        } else if token != "::" {
-            supers = 0;
+        above = match token.as_str() {
+            "crate" => Some(&[]),
+            "super" => Some(above.unwrap_or(place)).map(|at| &at[..at.len().saturating_sub(1)]),
+            "::" => above,
+            _ => None,
+        };
+        let Some(above) = above.filter(|_| token != "::") else {
+            continue;
+        };
+        let next = |n: usize| tokens.get(i + n).map(String::as_str);
+        if next(1) != Some("::") || next(2) == Some("super") {
+            continue;
         }
-        let to_root = token == "crate" || (token == "super" && supers >= depth);
-        if to_root && tokens.get(i + 1).is_some_and(|next| next == "::") {
-            used.extend(heads(&tokens[i + 2..]).into_iter().map(String::from));
+        for path in paths(&tokens[i + 2..]) {
+            let path = path.into_iter().map(String::from);
+            used.insert(above.iter().cloned().chain(path).collect());
         }
     }
     used
 }
 
-/// Every arrow between modules at the root of a crate.
+/// The part that a path leads to: a room, or a module of a room whose modules stand by themselves.
+fn part(path: &[String], modules: &BTreeSet<Vec<String>>) -> Option<String> {
+    let apart = path.first().is_some_and(|room| APART.contains(&room.as_str()));
+    let known = |length: usize| path.get(..length).filter(|head| modules.contains(*head));
+    let module = if apart { known(2) } else { None };
+    module.or(known(1)).map(|head| head.join("::"))
+}
+
+/// Every arrow between the parts of a crate, without unit tests.
 fn arrows(src: &str) -> BTreeMap<String, BTreeSet<String>> {
     let src = root().join(src);
     let all = sources(&src);
     let module = |path: &Path| {
         let below = path.strip_prefix(&src).unwrap().with_extension("");
-        let parts: Vec<_> = below
-            .iter()
-            .map(|part| part.to_str().unwrap().to_owned())
-            .collect();
-        parts.into_iter().filter(|part| part != "mod").collect::<Vec<_>>()
+        let parts = below.iter().map(|part| part.to_str().unwrap().to_owned());
+        parts.filter(|part| part != "mod").collect::<Vec<_>>()
     };
-    let modules: BTreeSet<_> = all.iter().map(|path| module(path)[0].clone()).collect();
+    let modules: BTreeSet<_> = all.iter().map(|path| module(path)).collect();
     let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for path in &all {
         let place = module(path);
         if ["lib", "main"].contains(&place[0].as_str()) {
             continue;
         }
-        let used = uses(&std::fs::read_to_string(path).unwrap(), place.len());
-        let used = used
-            .into_iter()
-            .filter(|name| *name != place[0] && modules.contains(name));
-        arrows.entry(place[0].clone()).or_default().extend(used);
+        let from = part(&place, &modules).unwrap();
+        let text = std::fs::read_to_string(path).unwrap();
+        let (product, _) = text.split_once("#[cfg(test)]").unwrap_or((&text, ""));
+        let used = uses(product, &place);
+        let used = used.iter().filter_map(|path| part(path, &modules));
+        let used = used.filter(|to| *to != from);
+        arrows.entry(from.clone()).or_default().extend(used);
     }
     arrows.retain(|_, used| !used.is_empty());
     arrows
@@ -285,25 +321,43 @@ fn only_the_command_line_reads_options_and_writes_to_the_terminal() {
 /// The reader itself, on imports in every form.
 #[test]
 fn imports_are_read_in_every_form() {
-    let at = |depth, text: &str| uses(text, depth).into_iter().collect::<Vec<_>>();
-    assert_eq!(at(1, "use crate::law::Law; // crate::monitor"), ["law"]);
+    let at = |place: &[&str], text: &str| {
+        let place: Vec<_> = place.iter().map(|&part| part.to_owned()).collect();
+        let used = uses(text, &place);
+        used.into_iter().map(|path| path.join("::")).collect::<Vec<_>>()
+    };
+    assert_eq!(at(&["a"], "use crate::law::Law; // crate::monitor"), ["law::Law"]);
     assert_eq!(
         at(
-            2,
-            "use crate::{\n    bus::{Frame, e2e},\n    modes,\n    law::Law as L,\n};"
+            &["a", "b"],
+            "use crate::{\n    bus::{Frame, e2e::{self, Check}},\n    modes,\n    law::Law as L,\n};"
         ),
-        ["bus", "law", "modes"]
+        [
+            "bus::Frame",
+            "bus::e2e::Check",
+            "bus::e2e::self",
+            "law::Law",
+            "modes"
+        ]
     );
-    assert_eq!(at(2, "let x = crate::params::Params::PAPER;"), ["params"]);
-    // In `models/driver.rs`, `super` is models and `super::super` the root.
-    assert_eq!(at(2, "use super::plant::Plant;"), [""; 0]);
     assert_eq!(
-        at(2, "use super::super::{studies, cli::Output};"),
-        ["cli", "studies"]
+        at(&["a"], "let x = crate::params::Params::PAPER;"),
+        ["params::Params::PAPER"]
+    );
+    // In `models/driver.rs`, `super` is models and `super::super` the root.
+    let driver = ["models", "driver"];
+    assert_eq!(at(&driver, "use super::plant::Plant;"), ["models::plant::Plant"]);
+    assert_eq!(
+        at(&driver, "use super::super::{studies, cli::Output};"),
+        ["cli::Output", "studies"]
     );
     // In `trace.rs`, `super` is the root.
-    assert_eq!(at(1, "use super::metrics;"), ["metrics"]);
-    assert_eq!(at(1, "use supercrate::metrics; use std::fs;"), [""; 0]);
+    assert_eq!(at(&["trace"], "use super::metrics;"), ["metrics"]);
+    assert_eq!(at(&["trace"], "use supercrate::metrics; use std::fs;"), [""; 0]);
+    assert_eq!(
+        at(&["trace"], "pub(super) fn f(x: crate::log::Log, y: u8) {}"),
+        ["log::Log"]
+    );
 }
 
 /// Lines of a file that a reader still takes in.
@@ -315,12 +369,12 @@ const LONGER: &[(&str, &str)] = &[
     ("bindings/c/src/lib.rs", "one C interface, whose header follows from it"),
     ("host-sim/log/src/formats/mdf.rs", "one format, its reader block by block"),
     ("bindings/python/src/scenario.rs", "one class, attribute by attribute"),
-    ("core/src/controller.rs", "what the controller reads, decides and remembers, beside each other"),
+    ("core/src/controller/mod.rs", "what the controller reads, decides and remembers, beside each other"),
     ("core/src/controller/step.rs", "one step of the controller, read from top to bottom"),
     ("core/src/ecu/receivers.rs", "what each message has to pass before it is used, beside the others"),
-    ("core/src/plausibility.rs", "the checks, with the sums that they keep"),
-    ("core/src/monitor.rs", "the second computation, which stands by itself"),
-    ("core/src/ecu.rs", "one step of the ECU, read from top to bottom"),
+    ("core/src/safety/plausibility.rs", "the checks, with the sums that they keep"),
+    ("core/src/safety/monitor.rs", "the second computation, which stands by itself"),
+    ("core/src/ecu/mod.rs", "one step of the ECU, read from top to bottom"),
     ("firmware/src/boards/mps2.rs", "one file for each board"),
     ("firmware/src/boards/sam_e54_xpro.rs", "one file for each board"),
     ("firmware/src/reset.rs", "the record that crosses a reset, with what writes, reads and repairs it"),

@@ -6,7 +6,7 @@
 
 use haptic_batch::claims::TABLE;
 use haptic_batch::evaluate::{EvaluationResults, evaluate};
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_sim::guidance::{FloatLaw, NoGuidance};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};

@@ -12,9 +12,9 @@ use crate::machine::{Machine, image};
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Identity, Message, Vehicle, WriteOutcome};
 use haptic_core::bus::slcan;
-use haptic_core::download;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::Speed;
+use haptic_core::service::download;
 use haptic_pil::live::{Listener, View};
 use haptic_pil::parameters::Product;
 

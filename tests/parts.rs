@@ -1,6 +1,6 @@
 //! Drivers, vehicles and guidance as parts: the examples, the published parts against the published pair, failures that end.
 
-use haptic_core::modes::Mode;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::road::{Course, Segment};
 use haptic_sim::parts::{Acting, DriverView, PaperDriver, PaperVehicle, Vehicle};
@@ -171,7 +171,7 @@ fn failing(kind: FailureKind, duration_s: Option<f64>) -> Scenario {
 }
 
 /// Whatever is lost in a curve ends guidance by a handover: the motor does not obey, or there was no lane for a second. Once it is
-/// back the driver takes the request back, and asks again after a second in Standby, in the next frame of the demand (10 ms).
+/// back the driver takes the request back, and asks again after a second in Standby, in the next frame of the request (10 ms).
 #[test]
 fn what_was_lost_for_three_seconds_comes_back() {
     for kind in [FailureKind::Torque, FailureKind::Input] {

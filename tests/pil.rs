@@ -8,9 +8,9 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use haptic_lockstep::{Start, StartState};
 use haptic_pil::{Channel, Machine, Pil, PilError, Report, Target, image};
@@ -86,12 +86,12 @@ impl World {
                 }
                 .encode((k / 10) as u8),
             );
-            let demand = Demand {
+            let request = Request {
                 engage: in_cycle > 2500,
                 authority: Ratio::from_si(1.0),
                 probe: in_cycle > 3000,
             };
-            frames.push(demand.encode((k / 10) as u8));
+            frames.push(request.encode((k / 10) as u8));
         }
         for frame in &mut frames {
             if self.random.next().is_multiple_of(200) {

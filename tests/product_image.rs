@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
 use haptic_core::bus::slcan;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
 
@@ -171,7 +171,7 @@ fn frames(k: u32, motor_raw: i16) -> Vec<Frame> {
         );
         let engage = k % 2000 >= 800;
         frames.push(
-            Demand {
+            Request {
                 engage,
                 authority: Ratio::from_si(1.0),
                 probe: false,

@@ -22,11 +22,11 @@ INPUTS = {
     "Column_MotorTorque": "motor_torque_nm",
     "Vehicle_Speed1": "speed_m_per_s",
     "Vehicle_YawRate": "yaw_rate_rad_per_s",
-    "Demand_Authority": "authority",
+    "Request_Authority": "authority",
 }
 # The DBC file has the wheel angle in degrees.
 FACTORS = {"Column_WheelAngle": math.pi / 180}
-FLAGS = {"Demand_Engage": "engage", "Demand_Probe": "probe", "Vehicle_YawRateValid": "yaw_rate_valid"}
+FLAGS = {"Request_Engage": "engage", "Request_Probe": "probe", "Vehicle_YawRateValid": "yaw_rate_valid"}
 
 
 def main(directory):

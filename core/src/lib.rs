@@ -30,11 +30,11 @@
 //! # An ECU at work
 //!
 //! ```
-//! use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-//! use haptic_core::config::Setup;
+//! use haptic_core::bus::messages::{Column, Request, LanePreview, Message, Vehicle};
+//! use haptic_core::controller::config::Setup;
 //! use haptic_core::ecu::{Boot, Ecu};
-//! use haptic_core::modes::Mode;
-//! use haptic_core::params::Params;
+//! use haptic_core::safety::modes::Mode;
+//! use haptic_core::controller::params::Params;
 //! use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed};
 //!
 //! let setup = Setup::new(&Params::PAPER)?;
@@ -46,7 +46,7 @@
 //!     let e_y = Metres::from_m(0.5);
 //!     let lane = LanePreview { e_y, e_theta: Radians::ZERO, age: Micros::from_us(0), valid: true };
 //!     let speeds = [Speed::from_m_per_s(20.0); 2];
-//!     let demand = Demand { engage: ms >= 800, authority: Ratio::ONE, probe: false };
+//!     let request = Request { engage: ms >= 800, authority: Ratio::ONE, probe: false };
 //!     // The motor delivers what the last frame told it.
 //!     let motor_torque = last.unwrap_or_default();
 //!     let column = Column { motor_torque, ..Column::default() };
@@ -54,7 +54,7 @@
 //!         (8, lane.encode((ms / 8) as u8)),
 //!         (2, column.encode((ms / 2) as u8)),
 //!         (10, Vehicle { speeds, yaw_rate: None }.encode((ms / 10) as u8)),
-//!         (10, demand.encode((ms / 10) as u8)),
+//!         (10, request.encode((ms / 10) as u8)),
 //!     ];
 //!     for (period, frame) in frames {
 //!         if ms % period == 0 {
@@ -69,20 +69,20 @@
 //! }
 //! // Equation (9): K_1*a1'*e_y' = 0.25*2*0.5 = 0.25 N.m to the left, to an LSB of the bus.
 //! assert!((last.unwrap_or_default().nm() - 0.25).abs() < 1.0 / 4096.0);
-//! # Ok::<(), haptic_core::params::ParamError>(())
+//! # Ok::<(), haptic_core::controller::params::ParamError>(())
 //! ```
 //!
 //! # What holds in every line
 //!
 //! No allocation, no `unsafe`. From `Ecu::receive` and `Ecu::step` no float and no panic is reachable, which is proved
 //! on the linked image (`cargo xtask gate`). `Ecu::background_step`, called when the torque is already on its way, may
-//! use f32: what it estimates moves nothing. State that must survive a bit flip is kept twice ([`redundant`]). SI
+//! use f32: what it estimates moves nothing. State that must survive a bit flip is kept twice ([`safety::redundant`]). SI
 //! values as `f64` exist for parameters, for the host and for tests, and cross into fixed point in [`quantity`] alone.
 //!
 //! # Where things are listed
 //!
-//! Parameters in [`params`], faults in [`faults`], messages in [`bus::messages`], modes and what follows what in
-//! [`modes`]: each declared once.
+//! Parameters in [`controller::params`], faults in [`safety::faults`], messages in [`bus::messages`], modes and what leads
+//! from one to another in [`safety::modes`]: each declared once.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -99,31 +99,11 @@
     )
 )]
 
-pub mod actuator;
-mod background;
 pub mod bus;
-pub mod coast;
-pub mod config;
 pub mod controller;
-pub mod download;
 pub mod ecu;
-pub mod envelope;
 pub mod estimator;
-pub mod faults;
-pub mod hands;
-mod injection;
 pub mod law;
-pub mod modes;
-pub mod monitor;
-pub mod params;
-pub mod past;
-pub mod plausibility;
-pub mod probe;
 pub mod quantity;
-pub mod ramp;
-pub mod redundant;
-pub mod rejections;
-pub mod schedule;
-mod sine;
-pub mod stored;
-pub mod yaw;
+pub mod safety;
+pub mod service;

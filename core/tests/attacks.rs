@@ -3,20 +3,20 @@
 
 use crate::rig::Rig;
 use haptic_core::bus::messages::{
-    Column, Demand, Guidance, LanePreview, MESSAGES, Message, Sender, Vehicle, WriteOutcome,
+    Column, Guidance, LanePreview, MESSAGES, Message, Request, Sender, Vehicle, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::download::{Conditions, Download, frames, unlock};
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque};
-use haptic_core::rejections::Rejections;
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
+use haptic_core::service::download::{Conditions, Download, frames, unlock};
+use haptic_core::service::rejections::Rejections;
 
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;
-const DEMAND: usize = 3;
+const REQUEST: usize = 3;
 
 /// A torque frame of somebody else: the motor on the bus may have obeyed it.
 #[test]
@@ -137,17 +137,17 @@ fn a_masquerade_succeeds_and_leaves_its_trace_in_the_counts() {
     assert!(rig.applied.abs() < 0.11, "{} N.m", rig.applied);
 }
 
-/// Not treated: whoever sends the next Demand is the host.
+/// Not treated: whoever sends the next Request is the host.
 #[test]
-fn a_forged_demand_engages_within_every_limit() {
+fn a_forged_request_engages_within_every_limit() {
     let mut rig = Rig::paper();
     rig.curve(1.0);
     rig.run(700);
     while !rig.ticks.is_multiple_of(10) {
         rig.tick();
     }
-    let honest = rig.frame(DEMAND);
-    let forged = Demand {
+    let honest = rig.frame(REQUEST);
+    let forged = Request {
         engage: true,
         authority: Ratio::from_si(1.0),
         probe: false,
@@ -155,11 +155,11 @@ fn a_forged_demand_engages_within_every_limit() {
     .encode(honest.data()[1]);
     assert_eq!(rig.send(&forged), Ok(()));
     assert_eq!(rig.send(&honest), Err(Reject::Repeated));
-    rig.silent[DEMAND] = true;
+    rig.silent[REQUEST] = true;
     assert_eq!(rig.tick().command.mode, Mode::Active);
     // From zero, at the wind-up limit; and over with the host's next word.
     assert!(rig.applied <= 0.004);
-    rig.silent[DEMAND] = false;
+    rig.silent[REQUEST] = false;
     let (ms, _) = rig.run_until(20, |step| step.command.mode == Mode::Fade);
     assert!(ms <= 20, "{ms}");
 }

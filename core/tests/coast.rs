@@ -2,9 +2,9 @@
 
 use crate::rig::{Rig, SPEED};
 use crate::road::run_with_camera;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Metres, Micros, Radians, Torque};
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const VEHICLE: usize = 2;

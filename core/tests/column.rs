@@ -3,9 +3,9 @@
 //! The numbers are by hand from the paper's tables 8 and 9: on a straight at 30 m/s a wheel angle of 0.1 rad would turn the
 //! vehicle by 0.1*30*0.022324/(1 + 0.001753*900) = 0.02597 rad/s, against an aligning torque of 0.9874*30*0.02597 = 0.769 N.m.
 
-use haptic_core::config::Config;
-use haptic_core::plausibility::{Plausibility, PlausibilityState};
+use haptic_core::controller::config::Config;
 use haptic_core::quantity::{Instant, Micros, Radians, Speed, Torque, TurningRate};
+use haptic_core::safety::plausibility::{Plausibility, PlausibilityState};
 
 /// Feeds the check every 2 ms for so many seconds: driver torque (N.m) and wheel angle (rad) by time, the guidance's torque,
 /// and a yaw rate (rad/s). When it was declared, s.
@@ -128,7 +128,7 @@ fn friction_explains_a_push_that_is_over_and_no_more() {
                 let (at, torque) = (Instant::from_us(1000 * ms), Torque::from_nm(side * torque));
                 assert!(checks.column(&mut state, at, torque, Radians::ZERO, Torque::ZERO));
             }
-            side * Plausibility::used(&state).1.nm_s()
+            side * Plausibility::used_margins(&state).1.nm_s()
         };
         // The first sample has no past.
         let pushed = left(0, 22, 20.0);

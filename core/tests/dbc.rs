@@ -6,17 +6,17 @@
 use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, ValueType};
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, Identity, LanePreview, MESSAGES, Message, ParameterStatus,
-    ParameterUnlock, ParameterValue, ParameterWrite, Rejection, ResetCause, Telemetry, VERSION, Vehicle,
-    Warning, WriteOutcome,
+    Column, FaultRecord, Guidance, Identity, LanePreview, MESSAGES, Message, ParameterStatus,
+    ParameterUnlock, ParameterValue, ParameterWrite, Rejection, Request, ResetCause, Telemetry, VERSION,
+    Vehicle, Warning, WriteOutcome,
 };
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::envelope::LimitReason;
+use haptic_core::controller::params::PARAMETERS;
 use haptic_core::estimator::Reading;
-use haptic_core::faults::{Fault, FaultSet, Record};
-use haptic_core::modes::Mode;
-use haptic_core::params::PARAMETERS;
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet, Record};
+use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -126,7 +126,7 @@ fn column() {
 }
 
 #[test]
-fn vehicle_and_demand() {
+fn vehicle_and_request() {
     let dbc = dbc();
     for raw in 0..=90 * 256 {
         let (a, b) = (f64::from(raw) / 256.0, f64::from(90 * 256 - raw) / 256.0);
@@ -154,7 +154,7 @@ fn vehicle_and_demand() {
         assert_eq!(decode(sent), sent);
     }
     for raw in 0..=128 {
-        let sent = Demand {
+        let sent = Request {
             engage: raw % 2 == 0,
             authority: Ratio::from_si(f64::from(raw) / 128.0),
             probe: raw % 3 == 0,

@@ -3,11 +3,13 @@
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Message, ParameterStatus, WriteOutcome};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::download::{Conditions, Download, UNLOCK_MS, frames, mode_for_parameters, unlock, value};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
-use haptic_core::stored::{Set, Stored};
+use haptic_core::controller::params::Params;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
+use haptic_core::service::download::{
+    Conditions, Download, UNLOCK_MS, frames, mode_for_parameters, unlock, value,
+};
+use haptic_core::service::stored::{Set, Stored};
 
 /// Every value is a binary32, so that the bus rounds nothing.
 const SET: Params = Params {
@@ -18,7 +20,7 @@ const SET: Params = Params {
     torque_limit_nm: 3.0,
     probe_amplitude_nm: 0.125,
     t_nms_s: 0.25,
-    vehicle: haptic_core::params::VehicleParams {
+    vehicle: haptic_core::controller::params::VehicleParams {
         curvature_gain_per_m: 0.015625,
         stability_factor_s2_per_m2: 0.001953125,
         aligning_gain_nm_s2_per_m: 1.25,

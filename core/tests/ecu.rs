@@ -6,19 +6,19 @@
 use crate::rig::Rig;
 use haptic_core::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::config::Setup;
 use haptic_core::controller::Command;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Micros, Radians, Torque};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;
-const DEMAND: usize = 3;
+const REQUEST: usize = 3;
 /// The resolution of the torque on the bus.
 const BUS_LSB: f64 = 1.0 / 4096.0;
 
@@ -84,7 +84,7 @@ fn silence_of_any_input_hands_over_at_31_ms_linearly_in_2_s() {
         (LANE, Fault::LaneTimeout),
         (COLUMN, Fault::ColumnTimeout),
         (VEHICLE, Fault::SpeedTimeout),
-        (DEMAND, Fault::CommandTimeout),
+        (REQUEST, Fault::RequestTimeout),
     ];
     for (sender, fault) in faults {
         for torque in [1.5, -1.5] {
@@ -147,7 +147,7 @@ fn a_handover_starts_from_the_torque_before_the_silence() {
     let trusted = rig.applied;
     rig.curve(torque + 0.2);
     rig.tick();
-    rig.silent[DEMAND] = true;
+    rig.silent[REQUEST] = true;
     rig.run(30);
     assert!(rig.applied > 1.08, "{}", rig.applied);
     // The reduction limit brings it down to the ramp at 8 mN.m per step.
@@ -228,7 +228,7 @@ fn a_handover_after_an_implausible_lane_starts_from_zero() {
 fn a_handover_holds_no_more_than_the_law_asks_for_while_the_lane_is_there() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::active_in_curve(sign * 1.5);
-        rig.silent[DEMAND] = true;
+        rig.silent[REQUEST] = true;
         rig.run_until(60, |step| step.command.mode == Mode::Handover);
         rig.run(100);
         let line = |ms: f64| 1.5 * (1.0 - ms / 2000.0);
@@ -257,7 +257,7 @@ fn a_handover_goes_faster_while_the_driver_pushes_against_it_and_no_longer() {
     for sign in [1.0, -1.0] {
         let mut rig = Rig::active_in_curve(sign * 1.5);
         let start = rig.applied.abs();
-        rig.silent[DEMAND] = true;
+        rig.silent[REQUEST] = true;
         rig.run_until(60, |step| step.command.mode == Mode::Handover);
         for (driver, times) in [(-0.09, 1.0), (-0.11, 3.0), (0.11, 1.0), (-0.3, 3.0), (0.0, 1.0)] {
             rig.driver = Some(sign * driver);
@@ -299,7 +299,7 @@ fn a_handover_from_an_implausible_column_takes_half_a_second_whether_the_driver_
 
 #[test]
 fn a_silence_of_20_ms_is_no_fault() {
-    for sender in [LANE, COLUMN, VEHICLE, DEMAND] {
+    for sender in [LANE, COLUMN, VEHICLE, REQUEST] {
         let mut rig = Rig::active_in_curve(1.0);
         rig.silent[sender] = true;
         rig.run(16);
@@ -921,7 +921,7 @@ fn the_history_goes_round_with_counts_and_ages() {
             (0, 4, Fault::LaneTimeout, 4),
             (1, 4, Fault::ColumnTimeout, 1),
             (2, 4, Fault::SpeedTimeout, 2),
-            (3, 4, Fault::CommandTimeout, 1),
+            (3, 4, Fault::RequestTimeout, 1),
         ]
     );
     // Lane 5.0 to 5.4 s ago, speed 4.5 to 4.9 s, the others since power-up, 7.2 to 7.6 s: whole seconds.

@@ -3,22 +3,22 @@
 //! fails if none of the tests does.
 
 use crate::rig::Rig;
-use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::bus::Reject;
 use haptic_core::bus::e2e::{Protection, ReceiverState};
 use haptic_core::bus::messages::{Column, Guidance, Identity, Message, Telemetry};
-use haptic_core::config::Setup;
-use haptic_core::controller::Motion;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::inputs::Motion;
 use haptic_core::ecu::Step;
 use haptic_core::ecu::injection::Region;
 use haptic_core::estimator::{Reading, Sample};
-use haptic_core::faults::Fault;
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::actuator::{Actuator, Motor};
+use haptic_core::safety::faults::Fault;
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;
-const DEMAND: usize = 3;
+const REQUEST: usize = 3;
 
 /// `ready` counts while the vehicle is too slow: Active for one step, until the end of the request is noticed.
 #[test]
@@ -122,7 +122,7 @@ fn assert_line(rig: &mut Rig, trusted: f64, length: u32) {
 /// The silence of a sender is left out of what makes outputs suspect.
 #[test]
 fn a_handover_trusts_no_output_of_the_silence_whoever_is_silent() {
-    for (sender, period) in [(COLUMN, 2), (2, 10), (DEMAND, 10)] {
+    for (sender, period) in [(COLUMN, 2), (2, 10), (REQUEST, 10)] {
         let mut rig = Rig::active_in_curve(0.4);
         let mut torque = 0.4;
         let trusted = grow(&mut rig, &mut torque, 0.0026, 1.0, period);

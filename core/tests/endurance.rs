@@ -7,13 +7,13 @@
 
 use crate::rig::Rig;
 use crate::rig::watch::Watch;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::injection::{InjectedEcu, Region};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Metres, Torque};
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -133,7 +133,7 @@ fn operate(seed: u64, cycles: u64, start_us: u32) -> (Watch, u64, [u32; Fault::C
         watch.check(&rig, &step);
         let own = step.command.faults.common(FaultSet::CRITICAL);
         assert_eq!(
-            own.without(events.reasons),
+            own.difference(events.reasons),
             FaultSet::NONE,
             "{:?}: no reason for it",
             step.command

@@ -1,10 +1,10 @@
 //! Every limit of the envelope one step below, at, and one step above its bound, in its own resolution of
 //! 2^-24 N.m, on both sides and around zero; and random sequences against bounds computed in f64.
 
-use haptic_core::config::Config;
-use haptic_core::envelope::{Envelope, EnvelopeState, LimitReason, Situation, WINDOW};
-use haptic_core::params::Params;
+use haptic_core::controller::config::Config;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Instant, Micros, Torque};
+use haptic_core::safety::envelope::{Envelope, EnvelopeState, LimitReason, Situation, WINDOW};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use crate::reliance::drive::{Drive, LSB, rounded};
 use crate::reliance::{Estimate, Seen, block_us, expected, over, share};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::estimator::Sample;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Radians, Torque};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};

@@ -1,7 +1,7 @@
 //! The list of faults against the table in docs/reference/bus.md, and the sets that follow from their classes against
 //! masks written here by hand.
 
-use haptic_core::faults::{Class, Fault, FaultSet};
+use haptic_core::safety::faults::{Class, Fault, FaultSet};
 
 /// Every row of the document's table: bit, name and class.
 fn documented() -> Vec<String> {
@@ -30,11 +30,11 @@ fn sets_follow_from_the_classes() {
         FaultSet::CRITICAL,
         FaultSet::LOCKING,
         FaultSet::FADING,
-        FaultSet::of(Class::L),
+        FaultSet::of_class(Class::L),
     ]
     .map(FaultSet::bits);
     assert_eq!(bits, [0x7_80FF, 0x1F00, 0x6000, 0x8_0000, 0x10_0000]);
-    assert_eq!(FaultSet::of(Class::C), FaultSet::CRITICAL);
+    assert_eq!(FaultSet::of_class(Class::C), FaultSet::CRITICAL);
 }
 
 #[test]

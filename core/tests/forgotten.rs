@@ -1,12 +1,12 @@
 //! What has to be forgotten after a loss, and what a doubt about a speed does to the torque.
 
 use crate::rig::{Rig, SPEED};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Metres, Micros, Radians};
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;

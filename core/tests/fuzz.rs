@@ -13,11 +13,11 @@ use crate::rig::watch::Watch;
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
-    Column, Demand, FaultRecord, Guidance, LanePreview, Message, Vehicle, Warning,
+    Column, FaultRecord, Guidance, LanePreview, Message, Request, Vehicle, Warning,
 };
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::faults::{Fault, FaultSet};
 use haptic_core::quantity::{Metres, Radians};
+use haptic_core::safety::faults::{Fault, FaultSet};
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -76,7 +76,7 @@ fn frame_decoders() {
             decodes_to_itself::<LanePreview>(&frame),
             decodes_to_itself::<Column>(&frame),
             decodes_to_itself::<Vehicle>(&frame),
-            decodes_to_itself::<Demand>(&frame),
+            decodes_to_itself::<Request>(&frame),
             decodes_to_itself::<Guidance>(&frame),
             decodes_to_itself::<Warning>(&frame),
             decodes_to_itself::<FaultRecord>(&frame),

@@ -1,12 +1,13 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
-use haptic_core::config::Config;
-use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
-use haptic_core::faults::FaultSet;
-use haptic_core::law::{LaneSample, Law, LawState, Since};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::controller::config::Config;
+use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
+use haptic_core::controller::params::Params;
+use haptic_core::controller::{Controller, ControllerState};
+use haptic_core::law::{EgoMotion, LaneSample, Law, LawState};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::faults::FaultSet;
+use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
@@ -82,7 +83,7 @@ impl Pair {
         let read_at = now.after(Micros::from_us(age_us));
         let torque = self
             .law
-            .step(&mut self.state, read_at, lane, &Since::NOTHING)
+            .step(&mut self.state, read_at, lane, &EgoMotion::STEADY)
             .nm()
             .clamp(-5.0, 5.0);
         let t_s = self.t_us as f64 * 1e-6;
@@ -199,12 +200,12 @@ fn a_line_chosen_anew_goes_on_at_the_rates_of_the_old_one() {
     };
     for ms in [0, 8] {
         let sample = at(ms, 1.75);
-        let torque = law.step(&mut state, sample.at, sample, &Since::NOTHING).nm();
+        let torque = law.step(&mut state, sample.at, sample, &EgoMotion::STEADY).nm();
         assert!((torque - 0.25 * 2.0 * 1.75).abs() < 1e-4, "{torque}");
     }
     let anew = at(16, -1.75);
     state.relocate(anew);
-    let torque = law.step(&mut state, anew.at, anew, &Since::NOTHING).nm();
+    let torque = law.step(&mut state, anew.at, anew, &EgoMotion::STEADY).nm();
     assert!((torque + 0.25 * 2.0 * 1.75).abs() < 1e-4, "{torque}");
 }
 
@@ -244,11 +245,11 @@ fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
             at,
             ..LaneSample::default()
         };
-        let _ = law.step(&mut state, at, sample, &Since::NOTHING);
+        let _ = law.step(&mut state, at, sample, &EgoMotion::STEADY);
     }
     let mut read = |ms: u32| {
         let now = sample.at.after(Micros::from_ms(ms));
-        law.step(&mut state, now, sample, &Since::NOTHING).nm()
+        law.step(&mut state, now, sample, &EgoMotion::STEADY).nm()
     };
     // K_1*a3' = 10 N.m/rad times 0.1 rad/s times the age.
     for (ms, grown) in [(30, 0.03), (500, 0.5), (501, 0.5), (5_000, 0.5)] {
@@ -273,7 +274,7 @@ fn the_controller_alone_gives_the_law() {
                     e_theta: Radians::ZERO,
                     at: now,
                 }),
-                column: Input::New(Column {
+                column: Input::New(ColumnState {
                     driver_torque: Torque::from_nm(-applied.nm()),
                     wheel_angle: Radians::ZERO,
                 }),
@@ -316,12 +317,12 @@ fn what_the_vehicle_did_since_an_old_sample_is_made_up_for() {
                 e_theta: Radians::from_rad(theta + theta_rate * t_s),
                 at: Instant::from_us((1_000_000 + 8000 * k) as u32),
             };
-            let _ = law.step(&mut state, sample.at, sample, &Since::NOTHING);
+            let _ = law.step(&mut state, sample.at, sample, &EgoMotion::STEADY);
             oracle.step(t_s, 0.0, sample.e_y.m(), sample.e_theta.rad());
         }
         let (turned, faster) = (any(0.03), any(0.2));
         let (speed, near, age_s) = (20.0 + any(15.0), 6.0 + any(4.0), 0.05 + any(0.05));
-        let since = Since::new(
+        let since = EgoMotion::new(
             Radians::from_rad(turned),
             TurningRate::from_rad_per_s(faster),
             Speed::from_m_per_s(speed),
@@ -359,7 +360,7 @@ fn two_samples_share_a_rate_over_100_ms() {
                 e_theta: Radians::ZERO,
                 at,
             };
-            last = law.step(&mut state, at, sample, &Since::NOTHING).nm();
+            last = law.step(&mut state, at, sample, &EgoMotion::STEADY).nm();
         }
         last
     };

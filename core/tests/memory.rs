@@ -3,10 +3,10 @@
 
 use crate::rig::Rig;
 use haptic_core::ecu::injection::Region;
-use haptic_core::faults::Fault;
-use haptic_core::modes::Mode;
 use haptic_core::quantity::Torque;
-use haptic_core::redundant::{Redundant, Words};
+use haptic_core::safety::faults::Fault;
+use haptic_core::safety::modes::Mode;
+use haptic_core::safety::redundant::{Redundant, Words};
 
 fn rigs() -> Vec<Rig> {
     let standby = Rig::paper();

@@ -1,7 +1,7 @@
 //! The transition table of the code against the table and the drawing in docs/explanation/behaviour.md, written
 //! by hand.
 
-use haptic_core::modes::{Event, Events, Mode};
+use haptic_core::safety::modes::{Event, Events, Mode};
 use std::collections::BTreeSet;
 
 const BEHAVIOUR: &str = include_str!("../../docs/explanation/behaviour.md");
@@ -99,7 +99,7 @@ fn of_all_that_is_raised_the_most_urgent_change_decides() {
                 |event: Event| set >> Event::ALL.iter().position(|e| *e == event).unwrap() & 1 == 1;
             let mut raised = Event::ALL.into_iter().filter(|event| is_raised(*event));
             let first = raised.next().unwrap();
-            let mut events = Events::of(first);
+            let mut events = Events::only(first);
             for event in Event::ALL.into_iter().filter(|event| *event != first) {
                 events.insert_if(is_raised(event), event);
             }

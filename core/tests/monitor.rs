@@ -1,8 +1,8 @@
 //! Each rule of the independent monitor at its edge, with frames packed here by hand.
 
-use haptic_core::config::Setup;
-use haptic_core::monitor::{Evidence, Monitor, MonitorState, RULES};
-use haptic_core::params::Params;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
+use haptic_core::safety::monitor::{Evidence, Monitor, MonitorState, RULES};
 
 const STANDBY: u64 = 1;
 const ACTIVE: u64 = 2;
@@ -52,7 +52,7 @@ impl Bench {
         let evidence = Evidence {
             lane: lane.as_ref(),
             column: column.as_ref(),
-            demand: None,
+            request: None,
             guidance: &frame,
             elapsed_us: us,
         };

@@ -1,8 +1,8 @@
 //! The actuator check against motors in f64: honest ones are never declared, and what is missing is told from what is too
 //! much.
 
-use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::quantity::Torque;
+use haptic_core::safety::actuator::{Actuator, Motor};
 
 /// A motor with a dead time in steps, a lag in ms, an error and a ripple.
 struct Honest {

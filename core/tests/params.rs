@@ -1,7 +1,7 @@
 //! Parameters out of range are named with their value and range; the edges of the range are in it.
 
-use haptic_core::config::{Config, Setup};
-use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::controller::config::{Config, Setup};
+use haptic_core::controller::params::{PARAMETERS, Params};
 
 type Set = fn(&mut Params, f64);
 

@@ -4,13 +4,13 @@
 //! The vehicle is steered by a preview driver along a line of given curvature, in small angles about that line.
 //! The closed loop with the whole ECU is in the fault campaign.
 
-use haptic_core::config::Config;
+use haptic_core::controller::config::Config;
 use haptic_core::law::LaneSample;
-use haptic_core::past::Past;
-use haptic_core::plausibility::{
-    Moved, Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
-};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, Torque, TurningRate};
+use haptic_core::safety::motion_history::MotionHistory;
+use haptic_core::safety::plausibility::{
+    LaneMotion, Plausibility, PlausibilityState, lane_step_is_possible, speed_step_is_possible, speeds_agree,
+};
 
 const DT: f64 = 1e-3;
 // Table 8.
@@ -97,7 +97,7 @@ fn drive_with(
 ) -> Drive {
     let config = Config::PAPER;
     let checks: &Plausibility = &config.plausibility;
-    let (mut state, mut past) = (PlausibilityState::NEW, Past::default());
+    let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::default());
     checks.motion(&mut state, Speed::from_m_per_s(speed), None);
     // beta, yaw rate, wheel and its rate; offset and heading against the line.
     let (mut beta, mut r, mut phi, mut phi_rate) = (0.0, 0.0, 0.0_f64, 0.0_f64);
@@ -141,7 +141,7 @@ fn drive_with(
         if let Some(bias) = yaw_rate_bias.filter(|_| k % 10 == 0) {
             let rate = TurningRate::from_rad_per_s(((r + bias) * 4096.0).round() / 4096.0);
             checks.motion(&mut state, Speed::from_m_per_s(speed), Some(rate));
-            past.turn(at, rate);
+            motion_history.record_turning_rate(at, rate);
         }
         if k % 2 == 0 {
             let measured = match sensors {
@@ -170,10 +170,10 @@ fn drive_with(
                 e_theta: Radians::from_rad((e_theta * 65536.0).round() / 65536.0),
                 at,
             };
-            if checks.lane(&mut state, &mut past, sample.at, sample) != Moved::AsItMust {
+            if checks.lane(&mut state, &mut motion_history, sample.at, sample) != LaneMotion::Consistent {
                 drive.lane_declared_s.get_or_insert(t);
             }
-            let (lane, column) = Plausibility::used(&state);
+            let (lane, column) = Plausibility::used_margins(&state);
             drive.lane_used_m = drive.lane_used_m.max(lane.m());
             drive.column_used_nms = drive.column_used_nms.max(column.nm_s().abs());
         }
@@ -265,7 +265,7 @@ fn crossing(
     spoil: impl Fn(f64, f64) -> (f64, f64),
 ) -> f64 {
     let checks = Config::PAPER.plausibility;
-    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
     checks.motion(&mut state, Speed::from_m_per_s(speed), yaw_rate);
     for k in 0..6000 / 8 {
         let t = f64::from(k) * 8e-3 - 2.0;
@@ -277,7 +277,7 @@ fn crossing(
             at: Instant::from_us(u32::MAX - 1_000_000).after(Micros::from_ms(8 * k)),
             ..lane(side * e_y, side * e_theta)
         };
-        if checks.lane(&mut state, &mut past, sample.at, sample) != Moved::AsItMust {
+        if checks.lane(&mut state, &mut motion_history, sample.at, sample) != LaneMotion::Consistent {
             assert!(t >= 0.0, "declared while it was right");
             return t;
         }
@@ -331,7 +331,7 @@ fn more_movement_than_predicted_is_no_proof_of_a_fault() {
         let declared = crossing(20.0, 1.0, None, spoil);
         assert!(
             declared == f64::INFINITY || declared < 0.4,
-            "{declared}: only while the past predicts"
+            "{declared}: only while the motion_history predicts"
         );
     }
 }
@@ -340,7 +340,7 @@ fn more_movement_than_predicted_is_no_proof_of_a_fault() {
 /// the slide began.
 fn sliding(by_m: f64, ms: f64, yaw_rate: Option<TurningRate>) -> Option<f64> {
     let checks = Config::PAPER.plausibility;
-    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
     checks.motion(&mut state, Speed::from_m_per_s(30.0), yaw_rate);
     (0..400).find_map(|k| {
         // The line is known for half a second after 1 s.
@@ -349,8 +349,8 @@ fn sliding(by_m: f64, ms: f64, yaw_rate: Option<TurningRate>) -> Option<f64> {
             at: Instant::from_us(u32::MAX - 1_500_000).after(Micros::from_ms(8 * k)),
             ..lane((t * 1e3 / ms).clamp(0.0, 1.0) * by_m, 0.0)
         };
-        let moved = checks.lane(&mut state, &mut past, sample.at, sample);
-        (moved != Moved::AsItMust).then_some(t)
+        let moved = checks.lane(&mut state, &mut motion_history, sample.at, sample);
+        (moved != LaneMotion::Consistent).then_some(t)
     })
 }
 
@@ -423,7 +423,7 @@ fn lane(e_y: f64, e_theta: f64) -> LaneSample {
 #[test]
 fn what_was_lost_is_not_held_against_what_comes() {
     let checks = Config::PAPER.plausibility;
-    let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+    let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
     checks.motion(&mut state, Speed::from_m_per_s(20.0), Some(TurningRate::ZERO));
     let at = |ms: u32| Instant::from_us(1_000).after(Micros::from_ms(ms));
     let full = |state: &mut PlausibilityState, ms| {
@@ -432,14 +432,14 @@ fn what_was_lost_is_not_held_against_what_comes() {
     let mut standing = |state: &mut PlausibilityState, ms| {
         let sample = lane(0.0, 0.05);
         let sample = LaneSample { at: at(ms), ..sample };
-        checks.lane(state, &mut past, at(ms), sample) == Moved::AsItMust
+        checks.lane(state, &mut motion_history, at(ms), sample) == LaneMotion::Consistent
     };
     // 1 m/s to the side that does not come, from where the line is known for 0.4 s, and 20 N.m that turn nothing: one sample
     // before each margin.
     assert!((0..=896).step_by(8).all(|ms| standing(&mut state, ms)));
     assert!((0..=28).step_by(2).all(|ms| full(&mut state, ms)));
     let used = |state: &PlausibilityState| {
-        let (lane, column) = Plausibility::used(state);
+        let (lane, column) = Plausibility::used_margins(state);
         [lane.m(), column.nm_s()]
     };
     // 1 - exp(-t) metres after 0.496 s, less what is learnt of it, (t - 1 + exp(-t))/16; 20 N.m less 0.5 for 28 ms, less what 1 s of memory forgets.
@@ -483,26 +483,35 @@ fn steps_at_their_edges() {
 #[test]
 fn where_the_line_pointed_earlier_is_between_two_kept_directions() {
     let (turn, line) = (0.1, 0.3);
-    let mut past = Past::new();
-    past.turn(Instant::from_us(0), TurningRate::from_rad_per_s(turn));
+    let mut motion_history = MotionHistory::new();
+    motion_history.record_turning_rate(Instant::from_us(0), TurningRate::from_rad_per_s(turn));
     let at = |ms: u32| Instant::from_us(1000 * ms);
     for ms in (0..=490).step_by(7) {
         let e_theta = (line - turn) * 1e-3 * f64::from(ms);
-        past.see(at(ms), at(ms), Radians::from_rad(e_theta));
+        motion_history.record_line(at(ms), at(ms), Radians::from_rad(e_theta));
     }
     let now = at(490);
     // The last kept is 7 ms old.
     for before_ms in (7..=400).step_by(3) {
-        let found = past.line(now, now, Micros::from_ms(before_ms)).unwrap().rad();
+        let found = motion_history
+            .line_direction(now, now, Micros::from_ms(before_ms))
+            .unwrap()
+            .rad();
         let expected = line * 1e-3 * f64::from(490 - before_ms) - turn * 0.49;
         assert!(
             (found - expected).abs() < 2e-5,
             "{before_ms} ms: {found}, not {expected}"
         );
     }
-    assert_eq!(past.line(now, now, Micros::from_ms(495)), None);
-    past.forget_line();
-    assert_eq!(past.line(now, now, Micros::from_ms(100)), None);
-    past.see(now, now, Radians::from_rad(0.05));
-    assert_eq!(past.line(now, now, Micros::from_ms(1)), None);
+    assert_eq!(
+        motion_history.line_direction(now, now, Micros::from_ms(495)),
+        None
+    );
+    motion_history.forget_line();
+    assert_eq!(
+        motion_history.line_direction(now, now, Micros::from_ms(100)),
+        None
+    );
+    motion_history.record_line(now, now, Radians::from_rad(0.05));
+    assert_eq!(motion_history.line_direction(now, now, Micros::from_ms(1)), None);
 }

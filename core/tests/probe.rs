@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 
 use crate::rig::Rig;
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Demand, Guidance, Message, ResetCause, Telemetry};
-use haptic_core::config::Setup;
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::FaultSet;
-use haptic_core::modes::Mode;
-use haptic_core::monitor::{Evidence, Monitor, MonitorState};
-use haptic_core::params::Params;
+use haptic_core::bus::messages::{Guidance, Message, Request, ResetCause, Telemetry};
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Ratio, Torque};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::FaultSet;
+use haptic_core::safety::modes::Mode;
+use haptic_core::safety::monitor::{Evidence, Monitor, MonitorState};
 
 /// Half an LSB of the torque on the bus, and the arithmetic of the core.
 const ROUNDING: f64 = 0.5 / 4096.0 + 1e-5;
@@ -152,13 +152,13 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
     }
     .encode(0);
     let guidance = bytes(&guidance);
-    let demand = |probe| {
-        let demand = Demand {
+    let request = |probe| {
+        let request = Request {
             engage: true,
             authority: Ratio::ONE,
             probe,
         };
-        bytes(&demand.encode(0))
+        bytes(&request.encode(0))
     };
     let lane = haptic_core::bus::messages::LanePreview {
         valid: true,
@@ -171,11 +171,11 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
         // Up to 0.45 N.m at 4 N.m/s is the envelope's business: here the torque is there from the start.
         let elapsed_us = 1_000;
         (0..5_000).find(|ms| {
-            let demand = demand(*ms < until);
+            let request = request(*ms < until);
             let evidence = Evidence {
                 lane: Some(&lane),
                 column: None,
-                demand: ms.is_multiple_of(10).then_some(&demand),
+                request: ms.is_multiple_of(10).then_some(&request),
                 guidance: &guidance,
                 elapsed_us,
             };
@@ -183,7 +183,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
             let permitted = monitor.step(&mut state, &evidence);
             // The first step grows too fast for the monitor; it is not what this is about.
             if *ms == 0 && !permitted {
-                state = grown(&monitor, state_before, &demand);
+                state = grown(&monitor, state_before, &request);
                 return false;
             }
             !permitted
@@ -196,8 +196,8 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
 }
 
 /// Brings a monitor up to 0.45 N.m at its own pace on a lane error of 1 m, which asks for 0.5 N.m, with the probe asked
-/// for if `demand` does.
-fn grown(monitor: &Monitor, mut state: MonitorState, demand: &[u8; 8]) -> MonitorState {
+/// for if `request` does.
+fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> MonitorState {
     let lane = haptic_core::bus::messages::LanePreview {
         valid: true,
         e_y: haptic_core::quantity::Metres::from_m(1.0),
@@ -217,7 +217,7 @@ fn grown(monitor: &Monitor, mut state: MonitorState, demand: &[u8; 8]) -> Monito
         let evidence = Evidence {
             lane: Some(&lane),
             column: None,
-            demand: Some(demand),
+            request: Some(request),
             guidance: &guidance,
             elapsed_us: 1_000,
         };

@@ -1,7 +1,7 @@
 //! The ways to zero against hand values: linear, never growing, started from what can be trusted.
 
 use haptic_core::quantity::{Instant, Micros, Ratio, Torque, TorqueRate};
-use haptic_core::ramp::{HANDOVER, History, Ramp, handover_of, pace, smaller_of_same_sign};
+use haptic_core::safety::ramp::{HANDOVER, Ramp, TorqueHistory, handover_length, pace, smaller_of_same_sign};
 
 /// The resolution of a torque, N.m.
 const LSB: f64 = 1.0 / 16_777_216.0;
@@ -41,7 +41,11 @@ fn a_handover_goes_on_where_trust_was() {
         (0.2, 1_000_000),
         (0.0, 1_000_000),
     ] {
-        assert_eq!(handover_of(Ratio::from_si(trust)), Micros::from_us(us), "{trust}");
+        assert_eq!(
+            handover_length(Ratio::from_si(trust)),
+            Micros::from_us(us),
+            "{trust}"
+        );
     }
 }
 
@@ -88,9 +92,9 @@ fn the_lesser_of_two_torques() {
 }
 
 /// Outputs of 1, 2, 3 .. mN.m, one per millisecond from just before the clock wraps; the last is `ms` mN.m.
-fn rising(ms: u32) -> (History, Instant) {
+fn rising(ms: u32) -> (TorqueHistory, Instant) {
     let start = Instant::from_us(u32::MAX - 20_000);
-    let mut history = History::default();
+    let mut history = TorqueHistory::default();
     for k in 1..=ms {
         let now = start.after(Micros::from_ms(k));
         history.push(now, nm(f64::from(k) * 1e-3));
@@ -128,7 +132,7 @@ fn trusted_is_the_last_output_kept_before_the_suspect_time() {
 #[test]
 fn a_history_shorter_than_the_suspect_time_trusts_no_torque() {
     assert_eq!(
-        History::new().trusted(Instant::from_us(77), Micros::from_ms(1)),
+        TorqueHistory::new().trusted(Instant::from_us(77), Micros::from_ms(1)),
         Torque::ZERO
     );
     let (history, last) = rising(100);

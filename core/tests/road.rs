@@ -3,11 +3,11 @@
 use crate::rig::Rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
-use haptic_core::faults::Fault;
-use haptic_core::law::{LaneSample, LawState, Since};
-use haptic_core::modes::Mode;
-use haptic_core::past::Past;
+use haptic_core::law::{EgoMotion, LaneSample, LawState};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
+use haptic_core::safety::faults::Fault;
+use haptic_core::safety::modes::Mode;
+use haptic_core::safety::motion_history::MotionHistory;
 
 const LANE: usize = 0;
 
@@ -173,7 +173,7 @@ fn a_hand_or_a_guidance_that_does_nothing_is_never_warned() {
 /// when they come, against equation (9) of the errors and rates of now.
 #[test]
 fn a_late_sample_is_made_up_for() {
-    let law = haptic_core::config::Config::PAPER.law;
+    let law = haptic_core::controller::config::Config::PAPER.law;
     for (hz, kmh, age_ms) in [
         (0.5, 60.0, 50),
         (0.5, 60.0, 100),
@@ -195,14 +195,14 @@ fn a_late_sample_is_made_up_for() {
             0.25 * (2.0 * e_y + 0.05 * e_y_rate + 40.0 * e_theta - rate(t))
         };
         let clock = Instant::from_us(u32::MAX - 900_000);
-        let mut past = Past::new();
+        let mut motion_history = MotionHistory::new();
         let [mut late, mut plain] = [LawState::NEW; 2];
         let mut old = LaneSample::default();
         let [mut worst, mut worst_plain, mut most]: [f64; 3] = [0.0; 3];
         for ms in 0..6000_u32 {
             let (t, now) = (f64::from(ms) * 1e-3, clock.after(Micros::from_ms(ms)));
             if ms % 10 == 0 {
-                past.turn(now, TurningRate::from_rad_per_s(rate(t)));
+                motion_history.record_turning_rate(now, TurningRate::from_rad_per_s(rate(t)));
             }
             if ms % 33 == 0 && ms >= age_ms {
                 let [e_y, e_theta] = errors(t - f64::from(age_ms) * 1e-3);
@@ -212,11 +212,11 @@ fn a_late_sample_is_made_up_for() {
                     at: clock.after(Micros::from_ms(ms - age_ms)),
                 };
             }
-            let without = law.step(&mut plain, now, old, &Since::NOTHING).nm();
+            let without = law.step(&mut plain, now, old, &EgoMotion::STEADY).nm();
             // What the controller makes of the past.
-            let (turned, then) = past.turned(now, old.at);
+            let (turned, then) = motion_history.turned(now, old.at);
             let age_s = f64::from(now.since(old.at).us()) * 1e-6;
-            let since = Since::new(
+            let since = EgoMotion::new(
                 Radians::from_rad(turned.rad() - then.rad_per_s() * age_s),
                 TurningRate::from_rad_per_s(rate(t) - then.rad_per_s()),
                 Speed::from_m_per_s(v),

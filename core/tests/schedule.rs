@@ -1,7 +1,7 @@
 //! The schedule of the torque with speed, against lines in f64.
 
-use haptic_core::config::Config;
-use haptic_core::params::Params;
+use haptic_core::controller::config::Config;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::{Ratio, Speed};
 
 #[test]

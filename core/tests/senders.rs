@@ -9,8 +9,8 @@ use crate::rig::Rig;
 use haptic_core::bus::Reject;
 use haptic_core::bus::messages::Message;
 use haptic_core::ecu::Step;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 const LANE: usize = 0;
 const COLUMN: usize = 1;

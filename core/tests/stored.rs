@@ -1,8 +1,8 @@
 //! Parameter blocks against a CRC and a layout written a second time, and every way a copy can be spoilt.
 
-use haptic_core::config::Setup;
-use haptic_core::params::{Params, VehicleParams};
-use haptic_core::stored::{BYTES, Set, Stored};
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{Params, VehicleParams};
+use haptic_core::service::stored::{BYTES, Set, Stored};
 
 /// CRC-32 bit by bit (ISO-HDLC).
 fn crc32(bytes: &[u8]) -> u32 {
@@ -28,11 +28,11 @@ const fn set(params: Params) -> Set {
 }
 
 fn save(params: &Params, sequence: u32) -> [u8; BYTES] {
-    haptic_core::stored::save(&set(*params), sequence, HARDWARE)
+    haptic_core::service::stored::save(&set(*params), sequence, HARDWARE)
 }
 
 fn load(copies: [&[u8]; 2]) -> Option<Stored> {
-    haptic_core::stored::load(copies, HARDWARE)
+    haptic_core::service::stored::load(copies, HARDWARE)
 }
 
 /// A block by the table in `stored.rs`.
@@ -185,7 +185,7 @@ fn other_versions_and_values_out_of_range_are_no_good() {
 fn what_another_processor_wrote_is_no_good() {
     let copy = save(&params(), 1);
     for other in [0, HARDWARE + 1, HARDWARE ^ 1 << 31] {
-        assert_eq!(haptic_core::stored::load([&copy, &copy], other), None);
+        assert_eq!(haptic_core::service::stored::load([&copy, &copy], other), None);
     }
 }
 

@@ -3,9 +3,9 @@
 //! The bench drives at 60 km/h; table 9's vehicle turns by 0.1 rad/s where its wheel stands at 0.4 rad.
 
 use crate::rig::{Rig, SPEED};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Metres, Radians};
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 const YAW_RATE: FaultSet = FaultSet::NONE.with(Fault::YawRate);
 

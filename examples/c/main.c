@@ -58,7 +58,7 @@ int main(void) {
                 return 1;
             }
             (void)hg_ecu_receive(&ecu, &frame, now_us);
-            if (refused(hg_demand(k >= ENGAGE_AT, 1.0, 0, (uint8_t)(k / 10), &frame))) {
+            if (refused(hg_request(k >= ENGAGE_AT, 1.0, 0, (uint8_t)(k / 10), &frame))) {
                 return 1;
             }
             (void)hg_ecu_receive(&ecu, &frame, now_us);

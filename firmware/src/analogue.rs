@@ -50,10 +50,10 @@ pub fn column(counts: [u16; 4]) -> Option<Column> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_core::config::Setup;
+    use haptic_core::controller::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
-    use haptic_core::modes::Mode;
     use haptic_core::quantity::Instant;
+    use haptic_core::safety::modes::Mode;
 
     /// By hand: 0.3 V a N.m are 372.36 counts, from 1.65 V.
     #[test]

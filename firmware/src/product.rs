@@ -16,11 +16,11 @@
 use embedded_can::nb::Can;
 use embedded_hal::digital::OutputPin;
 use haptic_core::bus::messages::{Column, Message, ResetCause};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::params::Params;
-use haptic_core::rejections::Rejections;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::service::rejections::Rejections;
 
 use crate::boards::{Board, ThisBoard};
 use crate::service::Service;

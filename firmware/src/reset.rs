@@ -17,7 +17,7 @@
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use haptic_core::bus::messages::ResetCause;
 use haptic_core::ecu::{Boot, RESETS_TO_LOCK};
-use haptic_core::faults::{Fault, FaultSet};
+use haptic_core::safety::faults::{Fault, FaultSet};
 
 /// So many resets since power-up lock the ECU, however far apart they are.
 const RESETS_SINCE_POWER_UP_TO_LOCK: u32 = 10;
@@ -250,7 +250,7 @@ mod on_target {
     use core::mem::MaybeUninit;
     use core::sync::atomic::{AtomicBool, Ordering};
 
-    use haptic_core::stored::{self, BYTES, Set};
+    use haptic_core::service::stored::{self, BYTES, Set};
 
     use super::{Boot, COPY, FaultSet, Found, Hardware, Record, ResetCause, Words};
 

@@ -4,12 +4,12 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Identity, Message, Rejection};
 use haptic_core::controller::Command;
-use haptic_core::download::{self, Conditions, Download, mode_for_parameters};
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
-use haptic_core::rejections::Rejections;
-use haptic_core::stored::Set;
+use haptic_core::safety::modes::Mode;
+use haptic_core::service::download::{self, Conditions, Download, mode_for_parameters};
+use haptic_core::service::rejections::Rejections;
+use haptic_core::service::stored::Set;
 use heapless::Vec;
 
 use crate::boards::{Board, ThisBoard};

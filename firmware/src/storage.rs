@@ -2,7 +2,7 @@
 //! the other one is good.
 //!
 //! A copy is a region of two pages, in which `sequential-storage` appends and turns the pages over (layout, wear);
-//! a set is the block of `haptic_core::stored`, with version, number and CRC-32. [`save`] writes the copy that was
+//! a set is the block of `haptic_core::service::stored`, with version, number and CRC-32. [`save`] writes the copy that was
 //! not loaded, reads it back, and only then the other one. So power may go at any moment: the last good set, or
 //! the new one, is there.
 //!
@@ -21,7 +21,7 @@ use core::task::{Context, Poll, Waker};
 
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embedded_storage::nor_flash::NorFlash;
-use haptic_core::stored::{self, BYTES, Set, Stored};
+use haptic_core::service::stored::{self, BYTES, Set, Stored};
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 

@@ -4,8 +4,8 @@
 //! again, and must find the set before the write or the new one, whole. The same is then tried on top of what a
 //! cut left behind, and while pages turn over.
 
-use haptic_core::params::Params;
-use haptic_core::stored::Set;
+use haptic_core::controller::params::Params;
+use haptic_core::service::stored::Set;
 use haptic_firmware::nor::{Nor, PAGE};
 use haptic_firmware::storage::{Found, WriteFailed, load, repair, save};
 

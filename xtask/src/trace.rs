@@ -448,7 +448,7 @@ mod tests {
             ("test core/tests/ecu.rs::a", Some(true)),
             ("test core/tests/ecu.rs::b", Some(false)),
             ("test core/tests/ecu.rs::*", Some(false)),
-            ("test core/src/hands.rs::c", Some(true)),
+            ("test core/src/safety/hands.rs::c", Some(true)),
             ("test firmware/tests/power_loss.rs::d", Some(true)),
             ("test core/tests/ecu.rs::e", Some(false)),
             ("row panic", Some(false)),

@@ -138,7 +138,7 @@ int32_t hg_vehicle(double speed_m_per_s, double second_speed_m_per_s, uint8_t co
 /* The same message of a vehicle that measures its yaw rate, positive to the left. */
 int32_t hg_vehicle_with_yaw_rate(double speed_m_per_s, double second_speed_m_per_s, double yaw_rate_rad_per_s,
                                  uint8_t counter, hg_frame *out);
-int32_t hg_demand(uint8_t engage, double authority, uint8_t probe, uint8_t counter, hg_frame *out);
+int32_t hg_request(uint8_t engage, double authority, uint8_t probe, uint8_t counter, hg_frame *out);
 
 #ifdef __cplusplus
 }

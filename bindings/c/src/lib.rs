@@ -7,11 +7,11 @@
 
 use core::mem::{align_of, size_of};
 
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 
 /// `HG_ECU_SIZE` and `HG_ECU_ALIGN` of the header.
@@ -423,7 +423,7 @@ pub unsafe extern "C" fn hg_vehicle_with_yaw_rate(
 /// # Safety
 /// As of [`hg_lane_preview`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hg_demand(
+pub unsafe extern "C" fn hg_request(
     engage: u8,
     authority: f64,
     probe: u8,
@@ -433,7 +433,7 @@ pub unsafe extern "C" fn hg_demand(
     if !(0.0..=1.0).contains(&authority) {
         return Status::Range as i32;
     }
-    let message = Demand {
+    let message = Request {
         engage: engage != 0,
         authority: Ratio::from_si(authority),
         probe: probe != 0,

@@ -1,11 +1,11 @@
 //! `HapticController`: the shipping ECU with its sensors' frames inside, SI values outside.
 
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::config::Setup;
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::modes::Mode;
-use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::modes::Mode;
 use haptic_sim::guidance::Status;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::unguided::{Cause, Circumstances, Watch};
@@ -275,12 +275,12 @@ impl Model for Controller {
             let speeds = [Speed::from_m_per_s(speed); 2];
             let yaw_rate = (yaw_rate_valid != 0.0).then(|| TurningRate::from_rad_per_s(yaw_rate));
             hear(Vehicle { speeds, yaw_rate }.encode(counter));
-            let demand = Demand {
+            let request = Request {
                 engage: engage != 0.0,
                 authority: Ratio::from_si(authority),
                 probe: probe != 0.0,
             };
-            hear(demand.encode(counter));
+            hear(request.encode(counter));
         }
         let command = self.ecu.step(now).command;
         let _ = self.ecu.background_step();

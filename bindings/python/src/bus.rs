@@ -1,6 +1,6 @@
 //! The senders of the ECU's inputs: frames with counter and CRC, from SI values.
 
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyIterator, PyTuple};
@@ -115,7 +115,7 @@ pub(crate) struct Bus {
 const LANE: usize = 0;
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;
-const DEMAND: usize = 3;
+const REQUEST: usize = 3;
 
 impl Bus {
     fn send<M: Message>(&mut self, sender: usize, message: &M) -> Frame {
@@ -268,13 +268,13 @@ impl Bus {
     /// -------
     /// Frame
     #[pyo3(signature = (engage, *, authority = 1.0, probe = false))]
-    fn demand(&mut self, py: Python<'_>, engage: bool, authority: f64, probe: bool) -> PyResult<Frame> {
-        let demand = Demand {
+    fn request(&mut self, py: Python<'_>, engage: bool, authority: f64, probe: bool) -> PyResult<Frame> {
+        let request = Request {
             engage,
             authority: Ratio::from_si(within(py, "authority", authority, [0.0, 1.0], "")?),
             probe,
         };
-        Ok(self.send(DEMAND, &demand))
+        Ok(self.send(REQUEST, &request))
     }
 
     /// The frames that are due at an instant, each sender at its own pace, from the first call on.
@@ -290,7 +290,7 @@ impl Bus {
     /// speed_m_per_s : float
     ///     As of `vehicle`.
     /// engage, authority, probe : optional
-    ///     As of `demand`.
+    ///     As of `request`.
     /// yaw_rate_rad_per_s : float, optional
     ///     As of `vehicle`.
     ///
@@ -331,7 +331,7 @@ impl Bus {
         }
         if bus.is_due(VEHICLE, Vehicle::INFO.period_ms, elapsed_us) {
             frames.push(bus.vehicle(py, speed_m_per_s, None, yaw_rate_rad_per_s)?);
-            frames.push(bus.demand(py, engage, authority, probe)?);
+            frames.push(bus.request(py, engage, authority, probe)?);
         }
         *self = bus;
         Ok(frames)

@@ -1,12 +1,12 @@
 //! The shipping ECU as a part of somebody else's simulation.
 
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::ecu::Boot;
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::{PARAMETERS, Params};
 use haptic_core::quantity::{Instant, Torque};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 

@@ -1,7 +1,7 @@
 //! What is wrong, as exceptions of Python: `InputError`, and `RangeError` with its field, value and range. The classes
 //! are Python's (`_errors.py`), so that they can be pickled and documented there.
 
-use haptic_core::params::ParamError;
+use haptic_core::controller::params::ParamError;
 use haptic_sim::input::RangeError;
 use haptic_sim::scenario::ScenarioError;
 use pyo3::prelude::*;

@@ -1,6 +1,6 @@
 //! The closed loop step by step.
 
-use haptic_core::faults::FaultSet;
+use haptic_core::safety::faults::FaultSet;
 use haptic_log::trace::CHANNELS;
 use haptic_sim::action::WorldFaults;
 use haptic_sim::guidance::AnyGuidance;

@@ -182,7 +182,7 @@ def test_values_that_no_sensor_gives_are_refused_and_send_nothing():
     for refused in (
         lambda: bus.lane_preview(float("nan"), 0.0),
         lambda: bus.column(0.0, float("inf"), 0.0),
-        lambda: bus.demand(True, authority=1.2),
+        lambda: bus.request(True, authority=1.2),
         lambda: bus.lane_preview(0.0, 0.0, age_us=205_000),
         lambda: bus.lane_preview(0.0, 0.0, age_us=-1),
         lambda: bus.frames(-1, e_y_m=0, e_theta_rad=0, driver_torque_nm=0, wheel_angle_rad=0, motor_torque_nm=0, speed_m_per_s=9),

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use haptic_core::bus::Frame;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Ecu;
 use haptic_core::quantity::Instant;
 

@@ -1,22 +1,23 @@
 //! One step of the controller: the one place that sees the mode machine, the plausibility checks, the law, the
 //! envelope and the ramps together. The order of its stations is its meaning, so they are read in one go.
 
-use super::{Changed, Command, Due, Input, Inputs, Memory, READY, Request};
-use crate::coast::{Coast, GOES_ON, Shows};
-use crate::config::Config;
-use crate::envelope::{EnvelopeState, LimitReason, Situation};
-use crate::faults::{Fault, FaultSet};
-use crate::hands::{END, WARN};
-use crate::injection::Injection;
-use crate::law::{LaneSample, LawState, Since};
-use crate::modes::{Event, Events, Mode};
-use crate::past::Past;
-use crate::plausibility::{Moved, lane_step_is_possible};
-use crate::probe::ProbeState;
+use super::{ChangedParts, Command, Memory, PendingChecks, READY};
+use crate::controller::config::Config;
+use crate::controller::injection::Injection;
+use crate::controller::inputs::{Input, Inputs, Request};
+use crate::law::probe::ProbeState;
+use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
-use crate::ramp::{History, Ramp, handover_of, pace, smaller_of_same_sign};
+use crate::safety::coast::{Coast, EXTRAPOLATION_PERIOD, PictureVerdict};
+use crate::safety::envelope::{EnvelopeState, LimitReason, Situation};
+use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::hands::{END, WARN};
+use crate::safety::modes::{Event, Events, Mode};
+use crate::safety::motion_history::MotionHistory;
+use crate::safety::plausibility::{LaneMotion, lane_step_is_possible};
+use crate::safety::ramp::{Ramp, TorqueHistory, handover_length, pace, smaller_of_same_sign};
 
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
@@ -37,7 +38,7 @@ const PROMPT: Micros = Micros::from_ms(10);
 /// Spans beyond half a wrap of the clock are negative.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
 /// What does not end guidance while the lane goes on.
-const RIDDEN_OUT: FaultSet = FaultSet::NONE
+const BRIDGED: FaultSet = FaultSet::NONE
     .with(Fault::LaneTimeout)
     .with(Fault::LaneInvalid)
     .with(Fault::LaneStep);
@@ -58,42 +59,43 @@ impl<I: Injection> Step<'_, I> {
     pub(super) fn run(
         &mut self,
         v: &mut Memory,
-        changed: &mut Changed,
-        history: &mut History,
-        past: &mut Past,
-        due: &mut Due,
+        changed: &mut ChangedParts,
+        torque_history: &mut TorqueHistory,
+        motion_history: &mut MotionHistory,
+        pending: &mut PendingChecks,
     ) -> Command {
-        let before = Mode::from_code(v.hot.small.mode.into()).unwrap_or(Mode::Fault);
-        let [mut ridden_out, mut said] = [FaultSet::NONE; 2];
+        let before = Mode::from_code(v.fast.packed.mode.into()).unwrap_or(Mode::Fault);
+        let [mut bridged, mut reported] = [FaultSet::NONE; 2];
         if before == Mode::Active && !(v.coast.is_idle() && self.inputs.lane.value().is_some()) {
-            changed.add(Changed::COAST);
-            [ridden_out, said] = self.coast(v, changed, past);
+            changed.add(ChangedParts::COAST);
+            [bridged, reported] = self.coast(v, changed, motion_history);
         }
         let fast_enough = self.is_fast_enough();
-        let lost = self.look(v, changed, fast_enough, past, due);
+        let lost = self.update_inputs(v, changed, fast_enough, motion_history, pending);
         let (late, early) = self.keep_time(v);
-        let mut faults = lost.union(v.faults()).union(self.inputs.faults).union(said);
+        let mut faults = lost.union(v.faults()).union(self.inputs.faults).union(reported);
         faults.insert_if(late > LATE_STEPS || early > EARLY_STEPS, Fault::Deadline);
-        v.hot.kept |= faults.common(FaultSet::CRITICAL).bits();
+        v.fast.kept |= faults.common(FaultSet::CRITICAL).bits();
 
         if before == Mode::Active {
-            v.hot
-                .hands
-                .guided(without(self.applied, Some(v.hot.probe_applied)), self.elapsed);
+            v.fast.hands.add_guided_time(
+                subtract_probe(self.applied, Some(v.fast.probe_applied)),
+                self.elapsed,
+            );
         }
         faults.insert_if(
-            matches!(before, Mode::Active | Mode::Fade) && v.hot.hands.without() >= WARN,
+            matches!(before, Mode::Active | Mode::Fade) && v.fast.hands.time_hands_off() >= WARN,
             Fault::HandsOff,
         );
-        let mode = self.next_mode(v, before, faults.without(ridden_out), fast_enough);
+        let mode = self.next_mode(v, before, faults.difference(bridged), fast_enough);
         if mode != before {
-            changed.add(Changed::LAW);
-            changed.add(Changed::COAST);
-            changed.add(Changed::RAMP);
-            self.enter(v, mode, faults, history);
+            changed.add(ChangedParts::LAW);
+            changed.add(ChangedParts::COAST);
+            changed.add(ChangedParts::RAMP);
+            self.enter(v, mode, faults, torque_history);
         }
         let (torque, probe, limit) = self.torque(v, changed, mode, faults);
-        v.hot.probe_applied = probe.unwrap_or(Torque::ZERO);
+        v.fast.probe_applied = probe.unwrap_or(Torque::ZERO);
         // While it lets go of its line, whoever relies on guidance has to know.
         let warning = (mode == Mode::Active && faults.contains(Fault::LaneStep))
             || matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
@@ -112,63 +114,68 @@ impl<I: Injection> Step<'_, I> {
     /// and what there is to say of the pictures.
     #[cold]
     #[inline(never)]
-    fn coast(&mut self, v: &mut Memory, changed: &mut Changed, past: &mut Past) -> [FaultSet; 2] {
+    fn coast(
+        &mut self,
+        v: &mut Memory,
+        changed: &mut ChangedParts,
+        motion_history: &mut MotionHistory,
+    ) -> [FaultSet; 2] {
         let Some(last) = v.law.last() else {
             return [FaultSet::NONE; 2];
         };
-        let gone_on = |v: &Memory, past: &Past, at| {
+        let extrapolated_lane = |v: &Memory, motion_history: &MotionHistory, at| {
             let checks = &self.config.plausibility;
-            checks.gone_on(&v.plausibility, past, self.now, &last, at)
+            checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let since = self.since(v, last);
-        let asked = self.config.law.asked(&v.law, self.now, since.as_ref());
+        let ego = self.ego_motion(v, last);
+        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
         match self.inputs.lane {
-            Input::Lost => v.coast.lose(asked),
+            Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
-                let agrees = lane_step_is_possible(&gone_on(v, past, sample.at), &sample);
-                match v.coast.see(&sample, agrees, asked) {
-                    Shows::TheLine => v.law.relocate(sample),
-                    Shows::ANewLine => {
+                let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
+                match v.coast.picture_arrived(&sample, agrees, demanded) {
+                    PictureVerdict::SameLine => v.law.relocate(sample),
+                    PictureVerdict::NewLine => {
                         v.law = LawState::NEW;
                         v.plausibility.forget_lane();
-                        past.forget_line();
+                        motion_history.forget_line();
                     }
-                    Shows::Another => {}
+                    PictureVerdict::OtherLine => {}
                 }
-                changed.add(Changed::LAW);
-                changed.add(Changed::LANE);
+                changed.add(ChangedParts::LAW);
+                changed.add(ChangedParts::LANE);
             }
             _ => {}
         }
-        v.coast.pass(self.elapsed);
-        let mut said = FaultSet::NONE;
-        said.insert_if(v.coast.is_apart(), Fault::LaneStep);
-        if !v.coast.goes_on() {
-            return [FaultSet::NONE, said];
+        v.coast.advance(self.elapsed);
+        let mut reported = FaultSet::NONE;
+        reported.insert_if(v.coast.sees_other_line(), Fault::LaneStep);
+        if !v.coast.is_extrapolating() {
+            return [FaultSet::NONE, reported];
         }
-        let passed = self.now.since(v.heard.lane);
+        let passed = self.now.since(v.input_times.lane);
         // A camera may be later than before, or jitter: where the lane went on to waits for a picture to compare.
         let waits = self.inputs.lane.value().is_some_and(is_older);
         // It is of no use yet.
-        said.insert_if(waits && !v.coast.is_apart(), Fault::LaneTimeout);
-        self.lane = if passed < GOES_ON || waits {
+        reported.insert_if(waits && !v.coast.sees_other_line(), Fault::LaneTimeout);
+        self.lane = if passed < EXTRAPOLATION_PERIOD || waits {
             Input::Held(last)
         } else {
             // As old as the pictures were.
-            Input::New(gone_on(v, past, last.at.after(passed)))
+            Input::New(extrapolated_lane(v, motion_history, last.at.after(passed)))
         };
-        [RIDDEN_OUT, said]
+        [BRIDGED, reported]
     }
 
     /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
-    fn look(
+    fn update_inputs(
         &self,
         v: &mut Memory,
-        changed: &mut Changed,
+        changed: &mut ChangedParts,
         fast_enough: Option<bool>,
-        past: &mut Past,
-        due: &mut Due,
+        motion_history: &mut MotionHistory,
+        pending: &mut PendingChecks,
     ) -> FaultSet {
         let Inputs {
             column,
@@ -180,10 +187,10 @@ impl<I: Injection> Step<'_, I> {
         let mut kept = v.faults();
 
         if let Input::New(motion) = motion {
-            let passed = self.now.since(v.heard.motion);
-            v.heard.motion = self.now;
-            changed.add(Changed::HEARD);
-            changed.add(Changed::MOTION);
+            let passed = self.now.since(v.input_times.motion);
+            v.input_times.motion = self.now;
+            changed.add(ChangedParts::INPUT_TIMES);
+            changed.add(ChangedParts::MOTION);
             let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds, passed);
             kept.set(!plausible, Fault::SpeedImplausible);
             let speed = if agree {
@@ -192,57 +199,57 @@ impl<I: Injection> Step<'_, I> {
                 v.plausibility.speed()
             };
             let measured = motion.yaw_rate();
-            let yaw_rate = measured.and_then(|rate| v.plausibility.believed(rate, passed));
+            let yaw_rate = measured.and_then(|rate| v.plausibility.accepted_yaw_rate(rate, passed));
             let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
             kept.set(is_distrusted, Fault::YawRate);
             checks.motion(&mut v.plausibility, speed, yaw_rate);
             v.share = self.config.schedule.share(v.plausibility.speed());
-            past.turn(self.now, v.plausibility.turning());
+            motion_history.record_turning_rate(self.now, v.plausibility.turning());
         }
         if fast_enough != Some(true) {
-            changed.add(Changed::LANE);
-            changed.add(Changed::COLUMN);
+            changed.add(ChangedParts::LANE);
+            changed.add(ChangedParts::COLUMN);
             // Neither model holds at a walking pace, let alone at an unknown one.
             v.plausibility.forget_lane();
             v.plausibility.forget_column();
         }
         match column {
             Input::New(c) => {
-                v.heard.column = self.now;
-                changed.add(Changed::HEARD);
-                changed.add(Changed::COLUMN);
-                v.hot.hands.feel(c.driver_torque);
-                v.plausibility.steer(c.wheel_angle);
+                v.input_times.column = self.now;
+                changed.add(ChangedParts::INPUT_TIMES);
+                changed.add(ChangedParts::COLUMN);
+                v.fast.hands.update(c.driver_torque);
+                v.plausibility.set_wheel_angle(c.wheel_angle);
             }
             Input::Held(_) => {}
             Input::Lost => {
-                changed.add(Changed::COLUMN);
+                changed.add(ChangedParts::COLUMN);
                 v.plausibility.forget_column();
                 kept.set(false, Fault::ColumnImplausible);
             }
         }
         match self.lane {
             Input::New(_) => {
-                v.heard.lane = self.now;
-                changed.add(Changed::HEARD);
+                v.input_times.lane = self.now;
+                changed.add(ChangedParts::INPUT_TIMES);
             }
             Input::Held(_) => {}
             Input::Lost => {
-                changed.add(Changed::LANE);
+                changed.add(ChangedParts::LANE);
                 v.plausibility.forget_lane();
-                past.forget_line();
+                motion_history.forget_line();
                 kept.set(false, Fault::LaneImplausible);
             }
         }
-        self.check(v, changed, past, due, &mut kept);
-        self.make_up_for_age(v, past);
+        self.check(v, changed, motion_history, pending, &mut kept);
+        self.compensate_age(v, motion_history);
         if let Input::New(_) = request {
-            v.heard.request = self.now;
-            changed.add(Changed::HEARD);
+            v.input_times.request = self.now;
+            changed.add(ChangedParts::INPUT_TIMES);
         }
 
-        v.hot.kept = kept.bits();
-        self.lost()
+        v.fast.kept = kept.bits();
+        self.lost_inputs()
     }
 
     /// The checks whose time has come.
@@ -250,14 +257,14 @@ impl<I: Injection> Step<'_, I> {
     fn check(
         &self,
         v: &mut Memory,
-        changed: &mut Changed,
-        past: &mut Past,
-        due: &mut Due,
+        changed: &mut ChangedParts,
+        motion_history: &mut MotionHistory,
+        pending: &mut PendingChecks,
         kept: &mut FaultSet,
     ) {
         let checks = &self.config.plausibility;
-        if let Some(c) = to_check(&self.inputs.column, &mut due.column) {
-            changed.add(Changed::COLUMN);
+        if let Some(c) = to_check(&self.inputs.column, &mut pending.column) {
+            changed.add(ChangedParts::COLUMN);
             let plausible = checks.column(
                 &mut v.plausibility,
                 self.now,
@@ -267,16 +274,17 @@ impl<I: Injection> Step<'_, I> {
             );
             kept.set(!plausible, Fault::ColumnImplausible);
         }
-        if let Some(sample) = to_check(&self.lane, &mut due.lane) {
-            changed.add(Changed::LANE);
-            if v.coast.goes_on() {
+        if let Some(sample) = to_check(&self.lane, &mut pending.lane) {
+            changed.add(ChangedParts::LANE);
+            if v.coast.is_extrapolating() {
                 // No picture, so nothing to compare.
-                v.plausibility.go_on(past, self.now, sample);
+                v.plausibility
+                    .accept_extrapolation(motion_history, self.now, sample);
             } else {
-                let moved = checks.lane(&mut v.plausibility, past, self.now, sample);
-                kept.set(moved == Moved::Otherwise, Fault::LaneImplausible);
-                if moved == Moved::AsTheWheelSays {
-                    changed.add(Changed::MOTION);
+                let moved = checks.lane(&mut v.plausibility, motion_history, self.now, sample);
+                kept.set(moved == LaneMotion::Inconsistent, Fault::LaneImplausible);
+                if moved == LaneMotion::ContradictsYawRate {
+                    changed.add(ChangedParts::MOTION);
                     v.plausibility.distrust_yaw_rate();
                     kept.insert(Fault::YawRate);
                 }
@@ -286,7 +294,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// The inputs that are lost.
     #[inline(always)]
-    fn lost(&self) -> FaultSet {
+    fn lost_inputs(&self) -> FaultSet {
         let Inputs {
             lane,
             column,
@@ -306,40 +314,40 @@ impl<I: Injection> Step<'_, I> {
             motion.value().is_none() && !refused(Fault::SpeedStep),
             Fault::SpeedTimeout,
         );
-        lost.insert_if(request.value().is_none(), Fault::CommandTimeout);
+        lost.insert_if(request.value().is_none(), Fault::RequestTimeout);
         lost
     }
 
     /// What the vehicle turned since the lane sample in use, if that was old when it came.
-    fn make_up_for_age(&self, v: &mut Memory, past: &Past) {
+    fn compensate_age(&self, v: &mut Memory, motion_history: &MotionHistory) {
         let Some(sample) = self.lane.value() else {
             return;
         };
         let age = self.now.since(sample.at);
-        if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
-            (v.hot.turned, v.hot.rate_then) = (Radians::ZERO, TurningRate::ZERO);
+        if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
+            (v.fast.turned, v.fast.rate_then) = (Radians::ZERO, TurningRate::ZERO);
         } else if let Input::New(_) = self.lane {
-            (v.hot.turned, v.hot.rate_then) = past.turned(self.now, sample.at);
+            (v.fast.turned, v.fast.rate_then) = motion_history.turned(self.now, sample.at);
         } else {
             let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
-            v.hot.turned = Radians::from_bits(v.hot.turned.bits().saturating_add(turned));
+            v.fast.turned = Radians::from_bits(v.fast.turned.bits().saturating_add(turned));
         }
     }
 
     /// How its motion since then differs from going on as it did, if that was so.
     #[inline(always)]
-    fn since(&self, v: &Memory, sample: LaneSample) -> Option<Since> {
+    fn ego_motion(&self, v: &Memory, sample: LaneSample) -> Option<EgoMotion> {
         let age = self.now.since(sample.at);
-        if age.us().saturating_sub(self.now.since(v.heard.lane).us()) <= PROMPT.us() {
+        if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
             return None;
         }
-        let went_on = per_second(v.hot.rate_then.bits(), age);
-        let turned = i64::from(v.hot.turned.bits()).saturating_sub(i64::from(went_on));
+        let went_on = per_second(v.fast.rate_then.bits(), age);
+        let turned = i64::from(v.fast.turned.bits()).saturating_sub(i64::from(went_on));
         let faster =
-            i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.hot.rate_then.bits()));
+            i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.fast.rate_then.bits()));
         let speed = v.plausibility.speed();
         let near = product(self.config.plausibility.near_time.bits(), speed.bits());
-        Some(Since::new(
+        Some(EgoMotion::new(
             Radians::from_wide(turned),
             TurningRate::from_wide(faster),
             speed,
@@ -358,37 +366,37 @@ impl<I: Injection> Step<'_, I> {
 
     /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
     fn keep_time(&self, v: &mut Memory) -> (u8, u8) {
-        v.hot.small.late = match self.elapsed {
+        v.fast.packed.late = match self.elapsed {
             e if e > LOST_TIME => LATE_STEPS.saturating_add(1),
-            e if e > LATE => v.hot.small.late.saturating_add(1),
+            e if e > LATE => v.fast.packed.late.saturating_add(1),
             _ => 0,
         };
-        v.hot.small.early = if self.elapsed < EARLY {
-            v.hot.small.early.saturating_add(1)
+        v.fast.packed.early = if self.elapsed < EARLY {
+            v.fast.packed.early.saturating_add(1)
         } else {
             0
         };
-        (v.hot.small.late, v.hot.small.early)
+        (v.fast.packed.late, v.fast.packed.early)
     }
 
     /// The most urgent event that changes the mode decides.
     fn next_mode(&self, v: &mut Memory, mode: Mode, faults: FaultSet, fast_enough: Option<bool>) -> Mode {
         let inputs_ok = !faults.intersects(FaultSet::INPUT);
         let request = self.inputs.request.value().map(|r| r.engage);
-        let rising = request == Some(true) && v.hot.small.requested == 0;
+        let rising = request == Some(true) && v.fast.packed.requested == 0;
         if let Some(high) = request {
-            v.hot.small.requested = u8::from(high);
+            v.fast.packed.requested = u8::from(high);
         }
-        v.hot.ready = if mode == Mode::Standby && inputs_ok && fast_enough == Some(true) {
-            Micros::from_us(v.hot.ready.us().saturating_add(self.elapsed.us())).min(READY)
+        v.fast.ready = if mode == Mode::Standby && inputs_ok && fast_enough == Some(true) {
+            Micros::from_us(v.fast.ready.us().saturating_add(self.elapsed.us())).min(READY)
         } else {
             Micros::from_us(0)
         };
-        let mut raised = Events::of(Event::BootPassed);
-        raised.insert_if(rising && v.hot.ready >= READY, Event::Engage);
+        let mut raised = Events::only(Event::BootPassed);
+        raised.insert_if(rising && v.fast.ready >= READY, Event::Engage);
         // Late steps carry the ramp further than the reduction limit lets the torque follow.
         raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
-        let no_hand = v.hot.hands.without() >= END;
+        let no_hand = v.fast.hands.time_hands_off() >= END;
         let is_over = request == Some(false) || fast_enough == Some(false) || no_hand;
         raised.insert_if(is_over, Event::Disengage);
         raised.insert_if(!inputs_ok, Event::InputLost);
@@ -398,26 +406,28 @@ impl<I: Injection> Step<'_, I> {
     }
 
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
-    fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, history: &History) {
-        v.hot.small.mode = mode as u8;
+    fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, torque_history: &TorqueHistory) {
+        v.fast.packed.mode = mode as u8;
         let trust = v.coast.trust;
         v.coast = Coast::NEW;
-        v.hot.probe = ProbeState::SILENT;
+        v.fast.probe = ProbeState::SILENT;
         match mode {
             // Both may be from before the last wrap of the clock.
             Mode::Active => {
-                (v.law, v.hot.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
-                v.hot.hands.begin();
+                (v.law, v.fast.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
+                v.fast.hands.reset();
             }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
                 // Half a wave of the probe must not stand in the wheel for two seconds, and what the other half
                 // took away does not come back.
-                let applied =
-                    smaller_of_same_sign(self.applied, without(self.applied, Some(v.hot.probe_applied)));
-                let start = history.handover_start(self.now, suspect, applied);
-                v.ramp = Ramp::over(start, handover_of(trust));
+                let applied = smaller_of_same_sign(
+                    self.applied,
+                    subtract_probe(self.applied, Some(v.fast.probe_applied)),
+                );
+                let start = torque_history.handover_start(self.now, suspect, applied);
+                v.ramp = Ramp::over(start, handover_length(trust));
             }
             _ => {}
         }
@@ -425,33 +435,33 @@ impl<I: Injection> Step<'_, I> {
 
     /// How long ago the earliest sample came that must not be trusted.
     fn suspect_since(&self, v: &Memory, faults: FaultSet) -> Micros {
-        let lost_for = |fault, heard| {
+        let lost_for = |fault, last_new| {
             if faults.contains(fault) {
-                self.now.since(heard)
+                self.now.since(last_new)
             } else {
                 Micros::from_us(0)
             }
         };
         faults
             .unseen()
-            .max(lost_for(Fault::LaneTimeout, v.heard.lane))
-            .max(lost_for(Fault::LaneInvalid, v.heard.lane))
-            .max(lost_for(Fault::LaneStep, v.heard.lane))
-            .max(lost_for(Fault::SpeedStep, v.heard.motion))
-            .max(lost_for(Fault::ColumnTimeout, v.heard.column))
-            .max(lost_for(Fault::SpeedTimeout, v.heard.motion))
-            .max(lost_for(Fault::CommandTimeout, v.heard.request))
+            .max(lost_for(Fault::LaneTimeout, v.input_times.lane))
+            .max(lost_for(Fault::LaneInvalid, v.input_times.lane))
+            .max(lost_for(Fault::LaneStep, v.input_times.lane))
+            .max(lost_for(Fault::SpeedStep, v.input_times.motion))
+            .max(lost_for(Fault::ColumnTimeout, v.input_times.column))
+            .max(lost_for(Fault::SpeedTimeout, v.input_times.motion))
+            .max(lost_for(Fault::RequestTimeout, v.input_times.request))
     }
 
     /// The torque, the part of it that is the probe, and what limited it.
     fn torque(
         &self,
         v: &mut Memory,
-        changed: &mut Changed,
+        changed: &mut ChangedParts,
         mode: Mode,
         faults: FaultSet,
     ) -> (Torque, Option<Torque>, LimitReason) {
-        let asked = if matches!(mode, Mode::Active | Mode::Handover) {
+        let demanded = if matches!(mode, Mode::Active | Mode::Handover) {
             self.guidance(v, changed)
         } else {
             Torque::ZERO
@@ -459,7 +469,7 @@ impl<I: Injection> Step<'_, I> {
         let (wanted, probe) = match mode {
             Mode::Active => {
                 let probe = self.probe(v);
-                (with(asked, probe), probe)
+                (add_probe(demanded, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
             Mode::Fade | Mode::Handover => {
@@ -471,11 +481,11 @@ impl<I: Injection> Step<'_, I> {
                     1
                 };
                 let passed = Micros::from_us(self.elapsed.us().saturating_mul(pace));
-                changed.add(Changed::RAMP);
+                changed.add(ChangedParts::RAMP);
                 let ending = smaller_of_same_sign(v.ramp.step(passed), self.applied);
                 // While the lane still comes, no more than the law asks for: the curve may end before the ramp does.
                 if mode == Mode::Handover && self.lane.value().is_some() {
-                    (smaller_of_same_sign(ending, asked), None)
+                    (smaller_of_same_sign(ending, demanded), None)
                 } else {
                     (ending, None)
                 }
@@ -503,7 +513,7 @@ impl<I: Injection> Step<'_, I> {
         } else {
             &self.config.envelope
         };
-        let (torque, limit) = envelope.step(&mut v.hot.envelope, self.now, wanted, &situation);
+        let (torque, limit) = envelope.step(&mut v.fast.envelope, self.now, wanted, &situation);
         match limit {
             LimitReason::None if mode != Mode::Active => (torque, probe, LimitReason::Mode),
             LimitReason::None => (torque, probe, limit),
@@ -516,45 +526,45 @@ impl<I: Injection> Step<'_, I> {
     fn probe(&self, v: &mut Memory) -> Option<Torque> {
         // Without trust left there is no guidance to ride on.
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
-        self.config.probe.step(&mut v.hot.probe, self.elapsed, wanted)
+        self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
     /// The law's torque, scaled by the authority: of the last request, or all of it where none is heard any more. Zero without
     /// a lane.
-    fn guidance(&self, v: &mut Memory, changed: &mut Changed) -> Torque {
-        let asked = self.lane.value().map_or(Torque::ZERO, |sample| {
-            if !v.law.knows(&sample) {
-                changed.add(Changed::LAW);
-                self.config.law.take(&mut v.law, sample);
+    fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
+        let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
+            if !v.law.is_latest(&sample) {
+                changed.add(ChangedParts::LAW);
+                self.config.law.update(&mut v.law, sample);
             }
             self.config
                 .law
-                .asked(&v.law, self.now, self.since(v, sample).as_ref())
+                .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
         });
-        let asked = self.injection.law(v.coast.bounded(asked));
+        let demanded = self.injection.law(v.coast.limited(demanded));
         // A share: more than all or less than nothing is a host's mistake.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
         // Neither is more than one.
         let share = share_of(authority.bits(), v.share.bits());
         let share = share_of(share, v.coast.trust.bits());
-        Torque::from_bits(share_of(share, asked.bits()))
+        Torque::from_bits(share_of(share, demanded.bits()))
     }
 }
 
 /// The value whose check has come: that of the step before. A step that takes a new value has work enough; where there is
 /// one in every step, every other one is checked, for as much time as both.
-fn to_check<T: Copy>(input: &Input<T>, is_due: &mut bool) -> Option<T> {
-    let was_due = core::mem::replace(is_due, matches!(input, Input::New(_)) && !*is_due);
-    input.value().filter(|_| was_due)
+fn to_check<T: Copy>(input: &Input<T>, is_pending: &mut bool) -> Option<T> {
+    let was_pending = core::mem::replace(is_pending, matches!(input, Input::New(_)) && !*is_pending);
+    input.value().filter(|_| was_pending)
 }
 
-fn with(guidance: Torque, probe: Option<Torque>) -> Torque {
+fn add_probe(guidance: Torque, probe: Option<Torque>) -> Torque {
     guidance.plus(probe.unwrap_or(Torque::ZERO))
 }
 
-pub(super) fn without(torque: Torque, probe: Option<Torque>) -> Torque {
-    with(torque, probe.map(Torque::opposite))
+pub(super) fn subtract_probe(torque: Torque, probe: Option<Torque>) -> Torque {
+    add_probe(torque, probe.map(Torque::opposite))
 }
 
 /// As much of `part` as `whole` can hold.
@@ -569,7 +579,7 @@ mod tests {
     /// Each new value is checked once, in the step after it; where there is one in every step, in every other step.
     #[test]
     fn a_value_is_checked_in_the_step_after_it() {
-        let mut due = false;
+        let mut pending = false;
         let inputs = [
             (Input::Lost, None),
             (Input::Held(1), None),
@@ -585,7 +595,7 @@ mod tests {
             (Input::Held(8), None),
         ];
         for (step, (input, checked)) in inputs.into_iter().enumerate() {
-            assert_eq!(to_check(&input, &mut due), checked, "{step}");
+            assert_eq!(to_check(&input, &mut pending), checked, "{step}");
         }
     }
 }

@@ -1,10 +1,10 @@
 //! A step with another law in the place of (9), for simulators that compare laws. All behind the law is the product's: the
-//! probe, the envelope, the mode machine, the monitor ([`crate::monitor::Monitor::of_another_law`]).
+//! probe, the envelope, the mode machine, the monitor ([`crate::safety::monitor::Monitor::of_another_law`]).
 //!
 //! Not here: faults that are injected (`injection`), and any law.
 
 use super::{Ecu, Step};
-use crate::injection::Injection;
+use crate::controller::injection::Injection;
 use crate::quantity::{Instant, Torque};
 
 /// What another law asks for.

@@ -9,9 +9,9 @@
 use core::ops::{Deref, DerefMut};
 
 use super::{Ecu, Step};
-use crate::injection::Injection;
+use crate::controller::injection::Injection;
 use crate::quantity::{Instant, Torque};
-use crate::redundant::{Redundant, Words};
+use crate::safety::redundant::{Redundant, Words};
 
 /// An ECU that can be made to lie. Everything but its step is the product's own.
 #[derive(Debug, Clone)]

@@ -3,19 +3,19 @@
 //! Every receiver is guarded apart, so that a frame costs the check of its own and not of all. Not here: what the
 //! values lead to.
 
-use crate::actuator::Actuator;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
-    Column as ColumnMessage, Demand, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus,
-    ParameterValue, Rejection, TIMEOUT, Telemetry, Vehicle, Warning,
+    Column, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus, ParameterValue,
+    Rejection, Request, TIMEOUT, Telemetry, Vehicle, Warning,
 };
 use crate::bus::{Frame, Reject};
-use crate::controller::{Column, Input, Inputs, Motion, Request};
-use crate::faults::Fault;
+use crate::controller::inputs::{ColumnState, Input, Inputs, Motion};
 use crate::law::LaneSample;
-use crate::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
 use crate::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, per_second};
-use crate::redundant::{Redundant, Words};
+use crate::safety::actuator::Actuator;
+use crate::safety::faults::Fault;
+use crate::safety::plausibility::{BRAKES, SPEEDS_PATIENCE, lane_step_is_possible, speed_step_is_possible};
+use crate::safety::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
 const COLUMN_PERIOD_US: u32 = 2000;
@@ -247,14 +247,14 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
     pub(super) column: Option<[u8; 8]>,
-    pub(super) demand: Option<[u8; 8]>,
+    pub(super) request: Option<[u8; 8]>,
 }
 
 impl Accepted {
     pub(super) const NONE: Self = Self {
         lane: None,
         column: None,
-        demand: None,
+        request: None,
     };
 }
 
@@ -298,7 +298,7 @@ impl From<RequestWords> for Request {
 #[derive(Debug, Clone)]
 pub(super) struct Receivers {
     pub(super) lane: Redundant<Slot<LaneSample>>,
-    pub(super) column: Redundant<Slot<Column>>,
+    pub(super) column: Redundant<Slot<ColumnState>>,
     pub(super) motion: Redundant<Slot<Motion>>,
     pub(super) request: Redundant<Slot<RequestWords>>,
     pub(super) actuator: Actuator,
@@ -334,7 +334,7 @@ impl Receivers {
             e_theta: Radians::ZERO,
             at: now,
         };
-        let column = Column {
+        let column = ColumnState {
             driver_torque: Torque::ZERO,
             wheel_angle: Radians::ZERO,
         };
@@ -375,10 +375,9 @@ impl Receivers {
                 }
                 Ok(())
             }),
-            ColumnMessage::ID => self.column.change(|slot| {
-                let c =
-                    ColumnMessage::decode_within(&mut slot.e2e, frame, column_window(now.since(slot.at)))?;
-                let column = Column {
+            Column::ID => self.column.change(|slot| {
+                let c = Column::decode_within(&mut slot.e2e, frame, column_window(now.since(slot.at)))?;
+                let column = ColumnState {
                     driver_torque: c.driver_torque,
                     wheel_angle: c.wheel_angle,
                 };
@@ -400,15 +399,15 @@ impl Receivers {
                 }
                 heard
             }
-            Demand::ID => self.request.change(|slot| {
-                let demand = Demand::decode(&mut slot.e2e, frame)?;
+            Request::ID => self.request.change(|slot| {
+                let request = Request::decode(&mut slot.e2e, frame)?;
                 let request = RequestWords {
-                    engage: u16::from(demand.engage),
-                    probe: u16::from(demand.probe),
-                    authority: demand.authority,
+                    engage: u16::from(request.engage),
+                    probe: u16::from(request.probe),
+                    authority: request.authority,
                 };
                 slot.put(request, now, REQUEST_PERIOD);
-                accepted.demand = Some(*frame.bytes());
+                accepted.request = Some(*frame.bytes());
                 Ok(())
             }),
             // On a bus nobody hears itself.
@@ -435,7 +434,7 @@ impl Receivers {
 
     /// Whether no receiver is damaged.
     #[inline(always)]
-    pub(super) fn are_whole(&self) -> bool {
+    pub(super) fn are_intact(&self) -> bool {
         self.lane.agrees() && self.column.agrees() && self.motion.agrees() && self.request.agrees()
     }
 
@@ -468,9 +467,7 @@ impl Receivers {
 #[expect(clippy::as_conversions, reason = "at most 14")]
 fn column_window(silence: Micros) -> u8 {
     let periods = silence.us() / COLUMN_PERIOD_US;
-    periods
-        .saturating_add(u32::from(ColumnMessage::MAX_DELTA))
-        .min(14) as u8
+    periods.saturating_add(u32::from(Column::MAX_DELTA)).min(14) as u8
 }
 
 /// Whether an identifier is this ECU's (`core/tests/attacks.rs` holds it to the list of messages).

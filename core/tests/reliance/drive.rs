@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 

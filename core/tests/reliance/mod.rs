@@ -5,7 +5,7 @@ pub(crate) mod drive;
 
 use std::f64::consts::TAU;
 
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 
 /// One sample of the column, SI, each figure a multiple of 2^-24.
 #[derive(Clone, Copy)]

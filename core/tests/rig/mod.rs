@@ -8,13 +8,13 @@
 
 pub(crate) mod watch;
 
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Telemetry, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Telemetry, Vehicle};
 use haptic_core::bus::{Frame, Reject};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::injection::InjectedEcu;
 use haptic_core::ecu::{Boot, Ecu, Step};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::modes::Mode;
 
 /// 60 km/h.
 pub(crate) const SPEED: f64 = 60.0 / 3.6;
@@ -52,7 +52,7 @@ pub(crate) struct Rig {
     pub(crate) driver: Option<f64>,
     /// What the motor delivers of the torque commanded.
     pub(crate) motor: fn(f64) -> f64,
-    /// Which senders are silent: lane, column, vehicle, demand.
+    /// Which senders are silent: lane, column, vehicle, request.
     pub(crate) silent: [bool; 4],
     pub(crate) applied: f64,
     /// The last telemetry.
@@ -155,7 +155,7 @@ impl Rig {
                 yaw_rate: self.yaw_rate.map(TurningRate::from_rad_per_s),
             }
             .encode(counter),
-            _ => Demand {
+            _ => Request {
                 engage: self.engage,
                 authority: Ratio::from_si(self.authority),
                 probe: self.probe,

@@ -3,8 +3,8 @@
 use super::{Heard, Rig};
 use haptic_core::bus::messages::{Guidance, Message};
 use haptic_core::ecu::Step;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use std::collections::VecDeque;
 
 /// The resolution of the torque on the bus, N.m.
@@ -245,7 +245,7 @@ impl Watch {
             (Fault::SpeedStep, heard.speeds),
             (Fault::ColumnTimeout, heard.driver.map(|d| d.1)),
             (Fault::SpeedTimeout, heard.speeds),
-            (Fault::CommandTimeout, heard.engage.map(|e| e.1)),
+            (Fault::RequestTimeout, heard.engage.map(|e| e.1)),
         ];
         let silence = silences
             .iter()

@@ -14,11 +14,11 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::{self, ParamError, Params};
 use haptic_core::ecu::{Boot, Ecu};
-use haptic_core::faults::FaultSet;
-use haptic_core::params::{self, ParamError, Params};
 use haptic_core::quantity::Instant;
+use haptic_core::safety::faults::FaultSet;
 
 /// The simulated time, which ends a tick: the ECU steps when it arrives. Not protected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

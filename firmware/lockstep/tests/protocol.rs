@@ -2,11 +2,11 @@
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::messages::ResetCause;
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
-use haptic_core::faults::Fault;
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
 use haptic_core::quantity::{Instant, Micros};
+use haptic_core::safety::faults::Fault;
+use haptic_core::safety::modes::Mode;
 use haptic_lockstep::{
     PARAMETERS, SimTime, StackUse, Start, StartState, StepCost, from_record, parameter_frames, set_parameter,
     to_record,

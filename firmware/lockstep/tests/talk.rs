@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::{Boot, Ecu};
 use haptic_lockstep::{SimTime, StepCost};
 

@@ -19,7 +19,7 @@ mod target {
 
     use cortex_m_rt::entry;
     use haptic_core::bus::Frame;
-    use haptic_core::config::Setup;
+    use haptic_core::controller::config::Setup;
     use haptic_core::ecu::{Boot, Ecu};
     use haptic_core::quantity::Instant;
 

@@ -17,8 +17,8 @@ mod target {
     use cortex_m::peripheral::SCB;
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::hprintln;
-    use haptic_core::params::Params;
-    use haptic_core::stored::Set;
+    use haptic_core::controller::params::Params;
+    use haptic_core::service::stored::Set;
     use haptic_firmware::boards::{Board, ThisBoard};
     use haptic_firmware::{host, storage};
 

@@ -105,7 +105,7 @@ pub fn left_by_themselves<'a>(runs: impl IntoIterator<Item = (&'a Away, String)>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_core::faults::Fault;
+    use haptic_core::safety::faults::Fault;
 
     const HANDS_OFF: Cause = Cause::Faults(1 << Fault::HandsOff as u32);
 

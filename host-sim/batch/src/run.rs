@@ -1,7 +1,7 @@
 //! One scenario, simulated and measured.
 
 use haptic_core::bus::Frame;
-use haptic_core::config::arm_share;
+use haptic_core::controller::config::arm_share;
 use haptic_core::estimator::T_NMS_RANGE_S;
 use serde::Serialize;
 

@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Scenario};
 use haptic_sim::simulation::Run;

@@ -12,7 +12,7 @@ pub(super) const WARNING: u16 = 0x0D0;
 pub(super) const LANE: u16 = 0x100;
 pub(super) const COLUMN: u16 = 0x110;
 pub(super) const VEHICLE: u16 = 0x120;
-pub(super) const DEMAND: u16 = 0x130;
+pub(super) const REQUEST: u16 = 0x130;
 
 /// Codes of the modes.
 pub(super) const STANDBY: u64 = 1;
@@ -36,7 +36,7 @@ fn constant(id: u16) -> Option<u8> {
         LANE => 0x11,
         COLUMN => 0x22,
         VEHICLE => 0x33,
-        DEMAND => 0x44,
+        REQUEST => 0x44,
         _ => return None,
     })
 }
@@ -153,7 +153,7 @@ impl Status {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+    use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
 
     #[test]
     fn the_crc_has_its_published_check_values() {
@@ -171,7 +171,7 @@ mod tests {
             LanePreview::default().encode(3),
             Column::default().encode(15),
             Vehicle::default().encode(0),
-            Demand {
+            Request {
                 engage: true,
                 authority: haptic_core::quantity::Ratio::ONE,
                 probe: false,
@@ -186,7 +186,7 @@ mod tests {
             for bit in 0..64 {
                 assert!(!is_intact(&with_bit_flipped(frame, bit)), "bit {bit}");
             }
-            for other in [LANE, COLUMN, VEHICLE, DEMAND, GUIDANCE]
+            for other in [LANE, COLUMN, VEHICLE, REQUEST, GUIDANCE]
                 .iter()
                 .filter(|id| **id != frame.id())
             {

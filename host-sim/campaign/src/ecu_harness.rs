@@ -4,9 +4,9 @@
 mod injected;
 
 use haptic_core::bus::Frame;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::injection::InjectedEcu;
-use haptic_core::params::Params;
 use haptic_core::quantity::Instant;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;

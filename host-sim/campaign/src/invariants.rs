@@ -103,7 +103,7 @@ pub(super) struct InvariantChecker {
     last: Option<Last>,
     /// Whether the ECU may be Active from its first cycle on.
     starts_active: bool,
-    /// When the latest sample in use was true, by the ECU's clock: lane, column, vehicle, demand.
+    /// When the latest sample in use was true, by the ECU's clock: lane, column, vehicle, request.
     true_at_us: [Option<u32>; 4],
     /// Whether the camera is known to be late: its first picture then takes its time behind the sample that the ECU began with.
     camera_lags: bool,
@@ -169,7 +169,7 @@ impl InvariantChecker {
                 self.driver_nm = bytes::signed(frame, 12, 18) as f64 / 4096.0;
             }
             bytes::VEHICLE => self.true_at_us[2] = Some(now_us),
-            bytes::DEMAND => {
+            bytes::REQUEST => {
                 self.true_at_us[3] = Some(now_us);
                 let engage = bytes::unsigned(frame, 12, 1) != 0;
                 self.rose |= engage && self.request == Some(false);

@@ -4,7 +4,7 @@
 //! construction is read and forged with `bytes`.
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
@@ -211,7 +211,7 @@ impl Senders {
         }
         if observation.step.is_multiple_of(HOST_PERIOD_MS) {
             let counter = count(3);
-            let message = Demand {
+            let message = Request {
                 engage: self.requests_guidance(requested, injections, acts),
                 authority: Ratio::ONE,
                 probe: self.probe,

@@ -1,9 +1,9 @@
 //! How the ECU of a row starts up: its parameters, the memory that they lie in, and what it remembers of resets.
 
+use haptic_core::controller::params::Params;
 use haptic_core::ecu::Boot;
-use haptic_core::params::Params;
 use haptic_core::quantity::Instant;
-use haptic_core::stored::{BYTES, Set, load, save};
+use haptic_core::service::stored::{BYTES, Set, load, save};
 use haptic_lockstep::StartState;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;

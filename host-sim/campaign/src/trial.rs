@@ -29,7 +29,7 @@ use super::speed_change::SpeedChange;
 use super::table::{FaultCase, PlaceOnRoad};
 use super::trial_record::EcuTrace;
 use super::verdict::judge;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_log::Event;
 use haptic_sim::models::driver::ArmGains;
 use haptic_sim::models::real::WorldParameters;

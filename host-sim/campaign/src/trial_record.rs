@@ -1,7 +1,7 @@
 //! What a trial leaves: for the verdict, and, on request, everything that went into its ECU and came out of it.
 
 use haptic_core::bus::Frame;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::Instant;
 use haptic_sim::ecu_events::EcuEvents;
 

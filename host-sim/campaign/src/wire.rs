@@ -9,11 +9,11 @@ use haptic_core::bus::Frame;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use super::bytes::{self, COLUMN, DEMAND, LANE, VEHICLE};
+use super::bytes::{self, COLUMN, LANE, REQUEST, VEHICLE};
 use super::injection::{Injection, Wire};
 
 /// The senders' messages, in the order of their counters.
-pub(super) const MESSAGES: [u16; 4] = [LANE, COLUMN, VEHICLE, DEMAND];
+pub(super) const MESSAGES: [u16; 4] = [LANE, COLUMN, VEHICLE, REQUEST];
 
 /// A frame at the ECU's door.
 #[derive(Debug, Clone, Copy)]

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use haptic_core::bus::Frame;
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity;
 use haptic_lockstep::{Start, StartState, is_of_a_lock_step_run};
 

@@ -49,7 +49,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
 use haptic_core::bus::Frame;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::Instant;
 use haptic_lockstep::SimTime;
 use haptic_lockstep::{Start, parameter_frames};

@@ -14,11 +14,11 @@ use haptic_core::bus::messages::{
     Column, FaultRecord, Guidance, Info, LanePreview, MESSAGES, Message, Rejection, ResetCause, Telemetry,
     Vehicle, Warning,
 };
-use haptic_core::config::arm_share;
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
-use haptic_core::params::Params;
+use haptic_core::controller::config::arm_share;
+use haptic_core::controller::params::Params;
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use serde::Serialize;
 
 use super::PilError;
@@ -154,7 +154,7 @@ impl View {
         match frame.id() {
             Guidance::ID => self.guidance(&decoded(frame)?, changes),
             Warning::ID => {
-                let told = decoded::<Warning>(frame)?.faults.without(in_torque_frame());
+                let told = decoded::<Warning>(frame)?.faults.difference(in_torque_frame());
                 self.faults(self.faults.common(in_torque_frame()).union(told), changes);
             }
             LanePreview::ID => {
@@ -213,7 +213,7 @@ impl View {
             };
             changes.push(format!("driver warning: {now}"));
         }
-        let faults = self.faults.without(in_torque_frame()).union(guidance.faults);
+        let faults = self.faults.difference(in_torque_frame()).union(guidance.faults);
         self.faults(faults, changes);
     }
 

@@ -1,6 +1,6 @@
 //! The parameters of a product on a bus: which set it has in use, and a new one for it to store.
 //!
-//! The client sends a set as `haptic_core::download` has it and believes it stored when the ECU, started anew, says
+//! The client sends a set as `haptic_core::service::download` has it and believes it stored when the ECU, started anew, says
 //! that a set of another number is in use. The ECU takes a set at standstill only, by the speeds on the bus; where nobody
 //! sends any, as on a bench, the client does, while it sends the set.
 //! Not here: what is in a set, and the way to the bus (`adapter`).
@@ -12,10 +12,10 @@ use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
     Guidance, Identity, Message, ParameterStatus, ParameterValue, Vehicle, WriteOutcome,
 };
-use haptic_core::config::Config;
-use haptic_core::download::{frames, mode_for_parameters, unlock};
-use haptic_core::modes::Mode;
-use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::controller::config::Config;
+use haptic_core::controller::params::{PARAMETERS, Params};
+use haptic_core::safety::modes::Mode;
+use haptic_core::service::download::{frames, mode_for_parameters, unlock};
 
 use super::PilError;
 use super::port::Port;

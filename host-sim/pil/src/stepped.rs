@@ -6,7 +6,7 @@ use std::net::TcpListener;
 use std::process::ChildStdin;
 
 use haptic_core::bus::Frame;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_core::quantity::Instant;
 use haptic_lockstep::SimTime;
 use haptic_lockstep::{StackUse, Start, StepCost, parameter_frames};

@@ -11,11 +11,11 @@ use haptic_core::bus::messages::{
     Vehicle, WriteOutcome,
 };
 use haptic_core::bus::slcan::{self, Line, Parser};
-use haptic_core::download;
-use haptic_core::faults::Fault;
-use haptic_core::modes::Mode;
-use haptic_core::params::{PARAMETERS, Params};
+use haptic_core::controller::params::{PARAMETERS, Params};
 use haptic_core::quantity::Speed;
+use haptic_core::safety::faults::Fault;
+use haptic_core::safety::modes::Mode;
+use haptic_core::service::download;
 use haptic_pil::PilError;
 use haptic_pil::bench::Bench;
 

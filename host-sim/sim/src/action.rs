@@ -41,7 +41,7 @@ impl WorldFaults {
     }
 }
 
-/// What the host asks of the controller in one step, as the demand frame carries it.
+/// What the host asks of the controller in one step, as the request frame carries it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     /// Whether guidance is asked for.

@@ -3,8 +3,8 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance, Message};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 use crate::guidance::Status;
 use crate::models::STEP_S;
@@ -75,7 +75,7 @@ impl EcuEvents {
         self.said.iter().zip(before).flat_map(|(said, before)| {
             let appeared = said
                 .faults
-                .without(before.map_or(FaultSet::NONE, |before| before.faults));
+                .difference(before.map_or(FaultSet::NONE, |before| before.faults));
             let names = Fault::ALL
                 .into_iter()
                 .filter(move |fault| appeared.contains(*fault));
@@ -90,7 +90,7 @@ impl EcuEvents {
     /// The first step from one on in which a fault appeared.
     pub fn first_fault_from(&self, step: u32) -> Option<u32> {
         let steps = self.said.windows(2).filter_map(|pair| {
-            let appeared = pair[1].faults.without(pair[0].faults);
+            let appeared = pair[1].faults.difference(pair[0].faults);
             (appeared != FaultSet::NONE).then(|| (pair[1].time_s / STEP_S).round() as u32)
         });
         steps.into_iter().find(|at| *at >= step)
@@ -112,8 +112,8 @@ impl Default for EcuEvents {
 mod tests {
     use super::*;
     use haptic_core::bus::messages::ResetCause;
-    use haptic_core::envelope::LimitReason;
     use haptic_core::quantity::Torque;
+    use haptic_core::safety::envelope::LimitReason;
 
     #[test]
     fn a_fault_is_told_by_name_once_and_a_mode_when_it_changes() {

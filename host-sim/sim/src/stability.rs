@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::models::driver::{ArmGains, DriverParameters};
 use crate::models::vehicle::VehicleParameters;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 
 /// Who guides, for the loop: the law's parameters and the look-ahead times of its near point.
 #[derive(Debug, Clone, Copy)]

@@ -9,8 +9,8 @@
 
 use std::fmt;
 
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use haptic_log::trace::{Sample, Trace};
 use serde::{Serialize, Serializer};
 

@@ -2,8 +2,8 @@
 
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message, Vehicle};
-use haptic_core::faults::FaultSet;
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::FaultSet;
+use haptic_core::safety::modes::Mode;
 use haptic_log::trace::Sample;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::disturbances::SensorErrors;
@@ -332,7 +332,7 @@ fn a_drive_goes_through_the_least_speed_that_is_guided() {
         });
         if condition != Condition::Manual {
             assert_eq!(modes.len(), 4, "{modes:?}");
-            // Vehicle and Demand come every 10 ms, in which 1.39 m/s2 make 0.014 m/s.
+            // Vehicle and Request come every 10 ms, in which 1.39 m/s2 make 0.014 m/s.
             close(slowest_guided, 5.0, 0.02, "slowest that is guided");
             // A second after 5 m/s, at 1.39 m/s2.
             close(again.unwrap(), 6.39, 0.03, "speed of the second engagement");

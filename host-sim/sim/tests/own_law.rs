@@ -1,6 +1,6 @@
 //! Laws of one's own behind the shipping ECU: the paper's, laws that lie, every law by name; and the documents' page of them.
 
-use haptic_core::modes::Mode;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
 use haptic_sim::guidance::{Guidance, OverBus, OwnLaw};
 use haptic_sim::kind::{Kind, Make, Origin};

@@ -1,7 +1,7 @@
 //! The paper's participants on the command line: how many, or which ones.
 
 use clap::Args;
-use haptic_core::params::PARAMETERS;
+use haptic_core::controller::params::PARAMETERS;
 use haptic_sim::input::{RangeError, in_range};
 use haptic_sim::participants::participants;
 

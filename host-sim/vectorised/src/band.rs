@@ -1,7 +1,7 @@
 //! The band of the shipping ECU's monitor in several runs, a little narrower: whoever is within this one is within that.
 
-use haptic_core::config::LEAST_BAND_NM;
-use haptic_core::monitor::{ASTRAY_MS, RATE_SPAN_US};
+use haptic_core::controller::config::LEAST_BAND_NM;
+use haptic_core::safety::monitor::{ASTRAY_MS, RATE_SPAN_US};
 
 use super::counts::{flag, whole};
 use super::ecu::GUIDED;

@@ -7,9 +7,9 @@
 //! them stays within core's. The other way a run is driven anew without need. A picture is checked with the speed heard last,
 //! which in one of six core knows a message later: at 8 m/s2 that is 0.08 m/s, and less than 0.002 m in the sum.
 
-use haptic_core::params::Params;
-use haptic_core::plausibility::{self, ALIGNING_ERROR, PUSHED, UNREAL};
-use haptic_core::yaw::{self, BIAS_SHIFT};
+use haptic_core::controller::params::Params;
+use haptic_core::safety::plausibility::{self, ALIGNING_ERROR, PUSHED, UNREAL};
+use haptic_core::safety::yaw::{self, BIAS_SHIFT};
 
 use super::counts::{ONE, flag, speed_heard};
 use super::rejected::Reason;

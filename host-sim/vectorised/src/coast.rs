@@ -3,18 +3,18 @@
 //! Where the lane goes on to depends on the last second of pictures and yaw rates alone. So a run whose preview fails watches
 //! them from a little before, one by one; the torque then has the share and the bounds of `haptic-core`'s `coast`.
 
-use haptic_core::coast;
-use haptic_core::config::Config;
+use haptic_core::controller::config::Config;
 use haptic_core::law::LaneSample;
-use haptic_core::past::Past;
-use haptic_core::plausibility::PlausibilityState;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
+use haptic_core::safety::coast;
+use haptic_core::safety::motion_history::MotionHistory;
+use haptic_core::safety::plausibility::PlausibilityState;
 
 use super::counts::{MS, ONE, bits, ms, on_the_bus, per_second, small_bits, whole};
 
 /// Without a picture guidance goes on for so long, ms, by so much at a time.
 pub(super) const BLIND_MS: u32 = ms(coast::MOST_BLIND);
-pub(super) const GOES_ON_MS: u32 = ms(coast::GOES_ON);
+pub(super) const GOES_ON_MS: u32 = ms(coast::EXTRAPOLATION_PERIOD);
 /// How long before the failure it is watched, ms: all that the past keeps, in whole periods of what it keeps of a camera.
 const WATCHED_MS: u32 = 1200;
 const KEPT_MS: u32 = 25;
@@ -25,7 +25,7 @@ const FALL: i32 = bits(coast::BLIND_FALL.si());
 pub(super) struct Coast {
     config: Config,
     state: PlausibilityState,
-    past: Past,
+    motion_history: MotionHistory,
     from: u32,
     /// The step of the time-out.
     lost: u32,
@@ -42,7 +42,7 @@ impl Coast {
         Self {
             config,
             state: PlausibilityState::NEW,
-            past: Past::new(),
+            motion_history: MotionHistory::new(),
             from: failure_step.saturating_sub(WATCHED_MS) / KEPT_MS * KEPT_MS,
             lost,
             heard: 0,
@@ -72,7 +72,7 @@ impl Coast {
         let rate = TurningRate::from_rad_per_s(f64::from(counts) / ONE);
         let checks = &self.config.plausibility;
         checks.motion(&mut self.state, Speed::from_m_per_s(v_m_per_s), Some(rate));
-        self.past.turn(at(step), rate);
+        self.motion_history.record_turning_rate(at(step), rate);
     }
 
     /// A picture, in counts.
@@ -88,7 +88,8 @@ impl Coast {
     }
 
     fn take(&mut self, step: u32, sample: LaneSample) {
-        self.past.see(at(step), sample.at, sample.e_theta);
+        self.motion_history
+            .record_line(at(step), sample.at, sample.e_theta);
         (self.heard, self.last) = (step, sample);
     }
 
@@ -102,9 +103,10 @@ impl Coast {
     /// Where the lane went on to in this step, in counts, and how long that took, ms.
     pub(super) fn go_on(&mut self, step: u32) -> Option<([i32; 2], u32)> {
         let passed = step - self.heard;
-        let gone_on = (passed >= GOES_ON_MS).then(|| {
+        let extrapolated_lane = (passed >= GOES_ON_MS).then(|| {
             let checks = &self.config.plausibility;
-            let sample = checks.gone_on(&self.state, &self.past, at(step), &self.last, at(step));
+            let sample =
+                checks.extrapolated_lane(&self.state, &self.motion_history, at(step), &self.last, at(step));
             self.take(step, sample);
             let counts = [whole(sample.e_y.m() * ONE), whole(sample.e_theta.rad() * ONE)];
             (counts, passed)
@@ -112,7 +114,7 @@ impl Coast {
         if let Some(came) = self.came.take() {
             self.turn(step, came);
         }
-        gone_on
+        extrapolated_lane
     }
 
     /// What is left of what the law asks for, and of the share that acts.

@@ -6,8 +6,9 @@
 //! decided here, makes a run suspect ([`super::checks`]).
 
 use haptic_core::bus::messages::TIMEOUT;
-use haptic_core::params::Params;
-use haptic_core::{envelope, hands, law, plausibility, ramp, schedule};
+use haptic_core::controller::params::Params;
+use haptic_core::law::{self, schedule};
+use haptic_core::safety::{envelope, hands, plausibility, ramp};
 
 use super::band::Band;
 use super::coast::{Coast, GOES_ON_MS};
@@ -94,7 +95,7 @@ pub(super) struct Ecus<const N: usize> {
     ramp_done: [i32; N],
     /// Whether a limit held the torque of the last step. Not beside it: the compiler would take both for one vector.
     limited: [i32; N],
-    past: [[i32; N]; PAST],
+    motion_history: [[i32; N]; PAST],
     /// How many torques were kept so far.
     kept: usize,
     band: Band<N>,
@@ -155,7 +156,7 @@ impl<const N: usize> Ecus<N> {
             suspect: zero(),
             ramp_from: zero(),
             ramp_done: zero(),
-            past: [zero(); PAST],
+            motion_history: [zero(); PAST],
             kept: 0,
             band: Band::new(),
             probes: Probes::new(),
@@ -205,7 +206,7 @@ impl<const N: usize> Ecus<N> {
         ] {
             state[lane] = 0;
         }
-        for torques in &mut self.past {
+        for torques in &mut self.motion_history {
             torques[lane] = 0;
         }
         let has_probe = scenario.guidance().probe;
@@ -246,7 +247,7 @@ impl<const N: usize> Ecus<N> {
     pub(super) fn hand_over(&mut self, lane: usize, step: u32) {
         self.coasts[lane] = None;
         let before = (step - 1) / 5 - (step - GOES_ON_MS - 1) / 5;
-        let trusted = self.past[self.kept.wrapping_sub(1 + before as usize) % PAST][lane];
+        let trusted = self.motion_history[self.kept.wrapping_sub(1 + before as usize) % PAST][lane];
         let applied = self.applied[lane];
         // Half a wave of the probe does not stand for two seconds, and what the other half took does not come back.
         let applied = smaller_of_same_sign(applied, applied.wrapping_sub(self.probes.applied[lane]));
@@ -401,7 +402,7 @@ impl<const N: usize> Ecus<N> {
         self.envelope(&wanted, &mut torque, &mut limited);
         self.probes.hold(&torque, &limited);
         if is_kept {
-            let kept = &mut self.past[self.kept % PAST];
+            let kept = &mut self.motion_history[self.kept % PAST];
             for l in 0..N {
                 kept[l] = torque[l].wrapping_sub(self.probes.applied[l]);
             }

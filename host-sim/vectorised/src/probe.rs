@@ -1,8 +1,8 @@
-//! The probe of several runs, to the same bits as `haptic_core::probe` has it in a run that asks for it from its start.
+//! The probe of several runs, to the same bits as `haptic_core::law::probe` has it in a run that asks for it from its start.
 //!
 //! What its answer tells, the estimator's, moves nothing: a run's samples hold none of it, and the lanes leave it out.
 
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 
 use super::counts::bits;
 

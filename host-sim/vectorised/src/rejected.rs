@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use haptic_core::params::{Params, VehicleParams};
+use haptic_core::controller::params::{Params, VehicleParams};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::real::WorldParameters;
@@ -69,7 +69,7 @@ impl Reason {
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
         ),
-        (Self::ExactSensors, "exact sensors, past the bus"),
+        (Self::ExactSensors, "exact sensors, motion_history the bus"),
         (Self::TooSlow, "slower than is guided"),
         (
             Self::EarlyFailure,

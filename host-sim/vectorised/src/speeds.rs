@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use haptic_core::params::Params;
-use haptic_core::plausibility;
+use haptic_core::controller::params::Params;
+use haptic_core::safety::plausibility;
 
 use super::checks::Checks;
 use super::counts::{ONE, bits, flag, heard, speed_heard};

@@ -1,6 +1,6 @@
 //! Vectorised runs against runs one by one: the shipping ECU is the oracle.
 
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_log::trace::Sample;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};

@@ -1,6 +1,7 @@
 //! What the ECU hears.
 
 use super::{Info, Message, from_lsb, info, is_within, narrow, put, to_bits, to_lsb, unsigned};
+use crate::controller::inputs::Request;
 use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, shift_round};
 
 /// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
@@ -168,35 +169,23 @@ impl Message for Vehicle {
     }
 }
 
-/// What the host wants, every 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Demand {
-    /// Guidance is wanted.
-    pub engage: bool,
-    /// Share of the law's torque, 0 to 1, LSB 2^-7.
-    pub authority: Ratio,
-    /// The probe is wanted on top of it; refused outside Active.
-    pub probe: bool,
-}
+/// LSB of the authority, 2^-7, and what all of the law's torque is in it.
+const AUTHORITY_LSB: u32 = 7;
+const AUTHORITY_MAX: i64 = 1 << AUTHORITY_LSB;
 
-impl Demand {
-    const LSB: u32 = 7;
-    const MAX: i64 = 1 << Self::LSB;
-}
-
-impl Message for Demand {
-    const INFO: Info = info::Demand;
+impl Message for Request {
+    const INFO: Info = info::Request;
 
     fn pack(&self) -> u64 {
-        let authority = to_lsb(self.authority.bits(), Self::LSB, Self::MAX).max(0);
+        let authority = to_lsb(self.authority.bits(), AUTHORITY_LSB, AUTHORITY_MAX).max(0);
         put(i64::from(self.engage), 12, 1) | put(authority, 13, 8) | put(i64::from(self.probe), 21, 1)
     }
 
     fn unpack(word: u64) -> Option<Self> {
         let authority = unsigned(word, 13, 8);
-        (authority <= Self::MAX).then(|| Self {
+        (authority <= AUTHORITY_MAX).then(|| Self {
             engage: unsigned(word, 12, 1) != 0,
-            authority: Ratio::from_wide(from_lsb(authority, Self::LSB)),
+            authority: Ratio::from_wide(from_lsb(authority, AUTHORITY_LSB)),
             probe: unsigned(word, 21, 1) != 0,
         })
     }

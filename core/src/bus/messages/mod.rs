@@ -9,7 +9,8 @@ mod inputs;
 mod outputs;
 mod service;
 
-pub use inputs::{Column, Demand, LanePreview, Vehicle};
+pub use crate::controller::inputs::Request;
+pub use inputs::{Column, LanePreview, Vehicle};
 pub use outputs::{FaultRecord, Guidance, ResetCause, Telemetry, Warning};
 pub use service::{
     Identity, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
@@ -86,7 +87,7 @@ messages! {
     0x100 LanePreview, 0x11, 3, Camera, 8.333_333_333_333_334;
     0x110 Column, 0x22, 3, ColumnModule, 2.0;
     0x120 Vehicle, 0x33, 3, Host, 10.0;
-    0x130 Demand, 0x44, 3, Host, 10.0;
+    0x130 Request, 0x44, 3, Host, 10.0;
     0x140 ParameterWrite, 0x55, 14, Host, 10.0;
     0x148 ParameterUnlock, 0xBB, 14, Host, 1000.0;
     0x300 FaultRecord, 0x77, 14, Ecu, 100.0;

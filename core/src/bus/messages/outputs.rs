@@ -7,11 +7,11 @@
 
 use super::{Info, Message, from_lsb, info, put, signed, to_lsb, unsigned};
 use crate::bus::frame::Frame;
-use crate::envelope::LimitReason;
 use crate::estimator::Reading;
-use crate::faults::{Fault, FaultSet, Record};
-use crate::modes::Mode;
 use crate::quantity::{Ratio, Torque};
+use crate::safety::envelope::LimitReason;
+use crate::safety::faults::{Fault, FaultSet, Record};
+use crate::safety::modes::Mode;
 
 /// Why the ECU last started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

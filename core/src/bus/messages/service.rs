@@ -8,7 +8,7 @@
 
 use super::{Info, Message, info, put, unsigned};
 use crate::bus::e2e::Reject;
-use crate::params::PARAMETERS;
+use crate::controller::params::PARAMETERS;
 
 /// One field of a new set of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,8 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{Guidance as GuidanceMessage, Message};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 use haptic_log::trace::{Sample, Trace};
 use haptic_sim::guidance::{NoGuidance, OverBus};
 use haptic_sim::models::driver::ArmGains;
@@ -229,7 +229,7 @@ impl Watch {
         let guidance = frame.and_then(|frame| GuidanceMessage::decode(&mut self.receiver, frame).ok());
         if let Some(guidance) = guidance {
             if self.reported.mode == Mode::Active && guidance.mode != Mode::Active {
-                let named = guidance.faults.without(self.faults);
+                let named = guidance.faults.difference(self.faults);
                 self.reported.declarations.push(Declaration {
                     time_s,
                     faults: names(if named == FaultSet::NONE {

@@ -1,6 +1,6 @@
 //! One leg: five minutes, one car, one road.
 
-use haptic_core::modes::Mode;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::Scenario;
 use haptic_sim::population::LaneKeeper;
 use haptic_sim::scenario::Speed;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::participants::participants;
 use haptic_sim::scenario::Scenario;

@@ -8,12 +8,12 @@
 //! second speed (the first), a motor's report (the command).
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Column, Demand, LanePreview, Message, Vehicle};
-use haptic_core::config::Setup;
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Ecu;
-use haptic_core::envelope::LimitReason;
-use haptic_core::modes::Mode;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::modes::Mode;
 use haptic_sim::models::sensors;
 use serde::Serialize;
 
@@ -135,7 +135,7 @@ impl Senders<'_> {
             speeds: [Speed::from_m_per_s(now(&rows.speed_m_per_s)); 2],
             yaw_rate: Some(TurningRate::from_rad_per_s(now(&rows.yaw_rate_rad_per_s))),
         };
-        let demand = Demand {
+        let request = Request {
             engage,
             authority: Ratio::ONE,
             probe: false,
@@ -146,7 +146,7 @@ impl Senders<'_> {
             (is_due(step.is_multiple_of(2)), column.encode(b)),
             (is_due(step.is_multiple_of(10)), vehicle.encode(c)),
             // The request is nobody's recording.
-            (step.is_multiple_of(10), demand.encode(d)),
+            (step.is_multiple_of(10), request.encode(d)),
         ];
         for (counter, (due, _)) in self.counters.iter_mut().zip(&due) {
             *counter = counter.wrapping_add(u8::from(*due));
@@ -160,7 +160,7 @@ impl Senders<'_> {
 /// Feeds a recording to an ECU that guides from the start on and is asked again 5 s after each end.
 pub(super) fn fed(rows: &Rows, feed: Feed, file: &str) -> Fed {
     let setup = Setup {
-        monitor: Setup::PAPER.monitor.of_another_law(),
+        monitor: Setup::PAPER.monitor.with_another_law(),
         ..Setup::PAPER
     };
     let mut ecu = Ecu::engaged(&setup, Instant::from_us(0));

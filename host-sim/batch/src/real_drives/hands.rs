@@ -1,13 +1,13 @@
-//! Hands on the wheel: the ECU's own criterion ([`haptic_core::hands`]) on every second of recordings that say who steers.
+//! Hands on the wheel: the ECU's own criterion ([`haptic_core::safety::hands`]) on every second of recordings that say who steers.
 //!
 //! Nothing says where the hands are. Driving by hand is a hand on the wheel for certain; shared driving is not known, and holds hands
 //! too. So "false" here is "felt in shared driving": the area under the curve is how well the criterion tells the two kinds of
 //! driving apart, not hands from none.
 
 use haptic_analysis::identify::Layout;
-use haptic_core::envelope::OVERRIDE_FROM;
-use haptic_core::hands::{ACTS, HandsState};
 use haptic_core::quantity::{Micros, Torque};
+use haptic_core::safety::envelope::OVERRIDE_FROM;
+use haptic_core::safety::hands::{ACTS, HandsState};
 use haptic_log::formats::Format;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -138,12 +138,12 @@ impl Felt {
                 let mut is_felt = vec![false; whole + 1];
                 let (mut hands, mut last_s) = (HandsState::NEW, time_s[0]);
                 for (k, torque) in driver_nm.iter().enumerate() {
-                    hands.guided(ACTS, Micros::from_us(1));
-                    hands.feel(Torque::from_nm(torque / factor(threshold)));
+                    hands.add_guided_time(ACTS, Micros::from_us(1));
+                    hands.update(Torque::from_nm(torque / factor(threshold)));
                     if part == 1 && threshold == OWN {
                         found.longest_s = found.longest_s.max(time_s[k] - last_s);
                     }
-                    if hands.without().us() == 0 {
+                    if hands.time_hands_off().us() == 0 {
                         // The first row has none to compare it with.
                         is_felt[second(k)] |= k > 0;
                         last_s = time_s[k];

@@ -66,7 +66,7 @@ pub(super) fn override_bounds(driver_nm: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptic_core::faults::{Class, Fault};
+    use haptic_core::safety::faults::{Class, Fault};
 
     /// Bits of the fault word in a guidance frame.
     const FAULT_BITS: i64 = 21;

@@ -2,7 +2,7 @@
 //! the harm, it does not claim that the frame is refused.
 
 use super::{FaultCase, STALE_MS, row};
-use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
+use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Change, Hand, Injection, Signal, Wire};
 
 const fn lie(to_m: f64, hides_hand: bool) -> Injection {
@@ -67,7 +67,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row(
         "attack-flood",
         "a flood that lets no frame through for 200 ms",
-        &[wire(Wire::Lost(&[LANE, COLUMN, VEHICLE, DEMAND], None))],
+        &[wire(Wire::Lost(&[LANE, COLUMN, VEHICLE, REQUEST], None))],
     )
     .hands_over(STALE_MS)
     .lasts(200),

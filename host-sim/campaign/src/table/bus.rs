@@ -1,10 +1,10 @@
 //! Faults of the bus: frames lost, late, again, damaged, forged. All of them also run in QEMU.
 
 use super::{BLIND_MS, FaultCase, STALE_MS, row};
-use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
+use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Injection, RequestFault, Wire};
 
-const ALL: &[u16] = &[LANE, COLUMN, VEHICLE, DEMAND];
+const ALL: &[u16] = &[LANE, COLUMN, VEHICLE, REQUEST];
 
 const fn lost(frames: u32) -> Injection {
     Injection::Wire(Wire::Lost(ALL, Some(frames)))
@@ -28,7 +28,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row("silent-lane", "no lane preview", &[wire(Wire::Lost(&[LANE], None))]).hands_over(BLIND_MS).q(),
     row("silent-column", "no column frames", &[wire(Wire::Lost(&[COLUMN], None))]).hands_over(STALE_MS).q(),
     row("silent-vehicle", "no speeds", &[wire(Wire::Lost(&[VEHICLE], None))]).hands_over(STALE_MS).q(),
-    row("silent-host", "no command", &[wire(Wire::Lost(&[DEMAND], None))]).hands_over(STALE_MS).q(),
+    row("silent-host", "no command", &[wire(Wire::Lost(&[REQUEST], None))]).hands_over(STALE_MS).q(),
     row("duplicates", "every frame twice", &[wire(Wire::Twice)]).rejected().q(),
     row("reordering", "every second frame of a message after its successor", &[wire(Wire::Swapped)]).rejected().q(),
     row("replay", "what was sent 1 s ago in place of what is sent: a counter of 16 lets some column frames pass, whose motor torque is then old", &[wire(Wire::Replayed(ALL, 1000))]).hands_over_or_stops(STALE_MS).lasts(1000).q(),

@@ -4,7 +4,7 @@
 //! be seen by a movement that does not come.
 
 use super::{BLIND_MS, ELSEWHERE_MS, FaultCase, SLIP_MS, STALE_MS, row};
-use crate::bytes::{COLUMN, DEMAND, LANE, VEHICLE};
+use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Change, Hand, Injection, RequestFault, Signal, Start, Wire};
 use crate::residual::Seen;
 
@@ -168,13 +168,13 @@ pub(super) const ROWS: &[FaultCase] = &[
     row(
         "authority-beyond-once",
         "authority one LSB above 1, one frame",
-        &[once(DEMAND, 13, 8, 129)],
+        &[once(REQUEST, 13, 8, 129)],
     )
     .rejected(),
     row(
         "authority-beyond",
         "authority one LSB above 1",
-        &[always(DEMAND, 13, 8, 129)],
+        &[always(REQUEST, 13, 8, 129)],
     )
     .hands_over(STALE_MS),
     // The ends of each field, as a sender with a broken computation would send them.
@@ -241,7 +241,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     row(
         "authority-raw-max",
         "authority at the largest raw value",
-        &[always(DEMAND, 13, 8, 255)],
+        &[always(REQUEST, 13, 8, 255)],
     )
     .hands_over(STALE_MS),
     // i32::MIN and MAX in the sender's own numbers: its encoder saturates at the signal's range.

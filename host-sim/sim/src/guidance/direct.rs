@@ -1,11 +1,12 @@
 //! The shipping controller without its bus: full resolution every step, so that what is seen is the law and
 //! the envelope alone.
 
-use haptic_core::config::Setup;
-use haptic_core::controller::{Column, Controller, ControllerState, Input, Inputs, Motion, Request};
-use haptic_core::faults::FaultSet;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
+use haptic_core::controller::{Controller, ControllerState};
 use haptic_core::law::LaneSample;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
+use haptic_core::safety::faults::FaultSet;
 
 use super::{Actuation, Guidance, Observation, Status, is_limited};
 
@@ -44,7 +45,7 @@ impl Guidance for Direct {
                     at: now.before(Micros::from_ms(observation.lane_age_ms)),
                 })
             }),
-            column: Input::New(Column {
+            column: Input::New(ColumnState {
                 driver_torque: Torque::from_nm(observation.driver_torque_nm),
                 wheel_angle: Radians::from_rad(observation.wheel_angle_rad),
             }),

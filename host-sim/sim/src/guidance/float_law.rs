@@ -3,7 +3,7 @@
 
 use super::{Actuation, Guidance, LaneErrors, Observation};
 use crate::models::STEP_S;
-use haptic_core::params::Params;
+use haptic_core::controller::params::Params;
 
 /// The reference controller.
 #[derive(Debug, Clone)]

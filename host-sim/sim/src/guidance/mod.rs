@@ -17,10 +17,10 @@ mod over_bus;
 mod own_law;
 
 use haptic_core::bus::Frame;
-use haptic_core::envelope::LimitReason;
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
 use haptic_core::quantity::Instant;
+use haptic_core::safety::envelope::LimitReason;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 use crate::action::Request;
 

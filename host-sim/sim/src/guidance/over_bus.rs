@@ -7,9 +7,9 @@
 use haptic_core::bus::Frame;
 use haptic_core::bus::e2e::ReceiverState;
 use haptic_core::bus::messages::{
-    Column, Demand, Guidance as GuidanceMessage, LanePreview, Message, Telemetry, Vehicle,
+    Column, Guidance as GuidanceMessage, LanePreview, Message, Request, Telemetry, Vehicle,
 };
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::ecu::{Ecu, Step};
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use heapless::Vec;
@@ -19,7 +19,7 @@ use crate::models::sensors;
 
 /// The column's sensors send every 2 ms.
 const COLUMN_PERIOD_STEPS: u32 = 2;
-/// Speeds and the host's demand come every 10 ms.
+/// Speeds and the host's request come every 10 ms.
 const HOST_PERIOD_STEPS: u32 = 10;
 /// One frame of each sender in a step.
 const MAX_FRAMES: usize = 4;
@@ -86,12 +86,12 @@ impl OverBus {
                 yaw_rate: observation.yaw_rate_rad_per_s.map(TurningRate::from_rad_per_s),
             };
             let _ = self.sent.push(vehicle.encode(counter));
-            let demand = Demand {
+            let request = Request {
                 engage: observation.request.engage,
                 authority: Ratio::from_si(observation.request.authority),
                 probe: observation.request.probe,
             };
-            let _ = self.sent.push(demand.encode(counter));
+            let _ = self.sent.push(request.encode(counter));
         }
     }
 

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use haptic_core::bus::Frame;
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 use haptic_core::quantity::Torque;
 
 use super::{Actuation, Guidance, LaneErrors, Observation, OverBus, Status};
@@ -31,7 +31,7 @@ impl<L: Law> OwnLaw<L> {
     /// A law behind a scenario's ECU.
     pub fn new(scenario: &Scenario, law: L) -> Self {
         let setup = Setup {
-            monitor: scenario.setup().monitor.of_another_law(),
+            monitor: scenario.setup().monitor.with_another_law(),
             ..*scenario.setup()
         };
         let tau_s = 1.0 / (TAU * scenario.controller_params().rate_corner_hz);

@@ -13,7 +13,7 @@ pub struct HandsAnswer {
 }
 
 impl HandsAnswer {
-    /// Its size, N.m: well above the change that an ECU takes for a hand (`haptic_core::hands::FELT`), and far below an
+    /// Its size, N.m: well above the change that an ECU takes for a hand (`haptic_core::safety::hands::FELT`), and far below an
     /// override.
     const SIZE_NM: f64 = 0.2;
     const LASTS_S: f64 = 1.0;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use haptic_core::config::Setup;
+use haptic_core::controller::config::Setup;
 
 use super::guidance_file::in_words_of_the_file;
 use super::{

@@ -1,11 +1,11 @@
 //! The table `guidance` of a scenario file: the controller's parameters by their names in the one list of
-//! [`haptic_core::params`], and beside them the camera's look-ahead and the host's request for a probe.
+//! [`haptic_core::controller::params`], and beside them the camera's look-ahead and the host's request for a probe.
 //!
 //! A new parameter of the controller is a field here by itself. Not here: ranges, which the scenario checks.
 
 use std::fmt;
 
-use haptic_core::params::{PARAMETERS, ParamError, Params};
+use haptic_core::controller::params::{PARAMETERS, ParamError, Params};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 

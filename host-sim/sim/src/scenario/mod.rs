@@ -15,8 +15,8 @@ mod speed;
 mod tests;
 mod values;
 
-use haptic_core::config::Setup;
-use haptic_core::params::Params;
+use haptic_core::controller::config::Setup;
+use haptic_core::controller::params::Params;
 
 pub use builder::{ScenarioBuilder, ScenarioError};
 pub use condition::{Condition, Sensors};

@@ -1,6 +1,6 @@
 //! The values that a person chooses, and what the controller knows of them.
 
-use haptic_core::params::{Params, VehicleParams};
+use haptic_core::controller::params::{Params, VehicleParams};
 
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Sensors, Speed};
 use crate::models::disturbances::SensorErrors;

@@ -1,6 +1,6 @@
 //! What a scenario decides for every step: speed, failures, and whether guidance is asked for.
 
-use haptic_core::modes::Mode;
+use haptic_core::safety::modes::Mode;
 
 use crate::action::{Action, Request, WorldFaults};
 use crate::models::STEPS_PER_SECOND;

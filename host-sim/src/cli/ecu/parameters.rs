@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use haptic_core::bus::messages::{Identity, ParameterStatus};
-use haptic_core::params::{PARAMETERS, Parameter, Params};
+use haptic_core::controller::params::{PARAMETERS, Parameter, Params};
 use haptic_pil::PilError;
 use haptic_pil::parameters::Product;
 use haptic_report::document::{Cell, Table};

@@ -7,8 +7,8 @@ mod rates;
 
 use std::sync::Arc;
 
-use haptic_core::actuator::{Actuator, Motor};
 use haptic_core::quantity::Torque;
+use haptic_core::safety::actuator::{Actuator, Motor};
 
 use super::ALIVE;
 use super::counts::{ONE, bits, on_the_bus};

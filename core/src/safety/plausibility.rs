@@ -4,9 +4,9 @@
 //! `de_y'/dt = v*theta_n - L_n*psi_dot`, with the line's direction at the near point against the vehicle's, `theta_n`, and
 //! the rate of turn, `psi_dot`. With a measured yaw rate both are known: the near point is now where the far point was
 //! `t'_f - t'_n` ago, so that `theta_n` is the far point's direction of then, less what the vehicle has turned since
-//! ([`crate::past`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
+//! ([`crate::safety::past`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
 //! yaw rate's zero; a slow estimate takes them away, bounded so that a lie cannot hide in it. Without a yaw rate that is
-//! believed ([`crate::yaw`]) the rate of turn comes from wheel angle and speed by the steady-state bicycle model, and from what
+//! believed ([`crate::safety::yaw`]) the rate of turn comes from wheel angle and speed by the steady-state bicycle model, and from what
 //! the yaw rate was more in the long run. A gust, a bank or a tyre spoils it, so the margins are 2.5 times as wide.
 //!
 //! The change predicted and the change seen are both summed with a memory of 1 s; the preview is declared implausible
@@ -24,24 +24,24 @@
 //! far inside the margin. A constant torque (a bank, a pull, the sensor's zero) is estimated slowly, and bounded.
 //!
 //! **Steps.** A sample that jumps further than a vehicle can is rejected like a bad frame; if the jump persists, the input goes
-//! stale, and in Active the lane seen last goes on ([`crate::coast`]).
+//! stale, and in Active the lane seen last goes on ([`crate::safety::coast`]).
 //!
 //! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
 //! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
 
 use crate::law::LaneSample;
-use crate::past::Past;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
     leak, per_second, product, product_below, product_within, saturate, signed_quotient, upper_product,
     wide_product,
 };
-use crate::redundant::words;
-use crate::yaw::{BIAS_SHIFT, YawState};
+use crate::safety::motion_history::MotionHistory;
+use crate::safety::redundant::words;
+use crate::safety::yaw::{BIAS_SHIFT, YawState};
 
 words! {
-    /// The vehicle as the checks know it; immutable once validated by [`crate::params`].
+    /// The vehicle as the checks know it; immutable once validated by [`crate::controller::params`].
     pub struct Plausibility {
         /// K_t/l: front wheel angle per wheel angle, over the wheelbase.
         pub(crate) curvature_gain: CurvaturePerAngle,
@@ -157,7 +157,7 @@ impl PlausibilityState {
     }
 
     /// The yaw rate to believe of one that comes so long after the last.
-    pub(crate) fn believed(&mut self, measured: TurningRate, passed: Micros) -> Option<TurningRate> {
+    pub(crate) fn accepted_yaw_rate(&mut self, measured: TurningRate, passed: Micros) -> Option<TurningRate> {
         let by_wheel = self.turning_by_wheel();
         let m = &mut self.motion;
         let last = (m.has_yaw_rate != 0).then_some(m.yaw_rate);
@@ -176,7 +176,7 @@ impl PlausibilityState {
     }
 
     /// Takes a wheel angle that is not checked yet.
-    pub(crate) fn steer(&mut self, wheel: Radians) {
+    pub(crate) fn set_wheel_angle(&mut self, wheel: Radians) {
         self.column.wheel = wheel;
     }
 
@@ -212,8 +212,13 @@ impl PlausibilityState {
     }
 
     /// Takes where the lane went on to without a picture.
-    pub(crate) fn go_on(&mut self, past: &mut Past, now: Instant, sample: LaneSample) {
-        past.see(now, sample.at, sample.e_theta);
+    pub(crate) fn accept_extrapolation(
+        &mut self,
+        motion_history: &mut MotionHistory,
+        now: Instant,
+        sample: LaneSample,
+    ) {
+        motion_history.record_line(now, sample.at, sample.e_theta);
         self.lane.last = sample;
     }
 
@@ -334,7 +339,7 @@ impl Plausibility {
             };
             let aligning = aligning_at(state.turning());
             // A yaw rate that pictures and wheel angle deny may be as wrong as it is large.
-            let pushed = if state.lane.is_alive != 0 && state.motion.yaw.is_doubtful() {
+            let pushed = if state.lane.is_alive != 0 && state.motion.yaw.is_suspect() {
                 MOST_ALIGNING
             } else {
                 PUSHED
@@ -394,11 +399,11 @@ impl Plausibility {
     pub fn lane(
         &self,
         state: &mut PlausibilityState,
-        past: &mut Past,
+        motion_history: &mut MotionHistory,
         now: Instant,
         sample: LaneSample,
-    ) -> Moved {
-        past.see(now, sample.at, sample.e_theta);
+    ) -> LaneMotion {
+        motion_history.record_line(now, sample.at, sample.e_theta);
         let measured = state.motion.has_yaw_rate != 0;
         // By wheel angle and speed a bank, a gust or a tyre is a movement that does not come.
         let (margin, unreal, most) = if measured {
@@ -409,7 +414,7 @@ impl Plausibility {
         let dt = sample.at.since(state.lane.last.at);
         if state.lane.is_known != 0 && dt.us() != 0 {
             let seen = sample.e_y.bits().saturating_sub(state.lane.last.e_y.bits());
-            let rate = self.line_rate(state, past, now, state.lane.last.at);
+            let rate = self.line_rate(state, motion_history, now, state.lane.last.at);
             // Where the line is not known for long enough, nothing is predicted.
             let predicted = rate.map_or(seen, |rate| per_second(rate, dt));
             let bias = state.lane.bias.bits();
@@ -429,7 +434,7 @@ impl Plausibility {
         let missing = state.missing(predicted);
         let is_missing = missing > margin.bits() && predicted.saturating_abs() > margin.bits() >> 1;
         if !is_missing && missing.saturating_abs() <= unreal {
-            return Moved::AsItMust;
+            return LaneMotion::Consistent;
         }
         // A yaw rate that is too large predicts so much less: over the time from near to far point, and at the near point. What it
         // does so comes up to 0.4 s later, so that a quarter of what is missing is enough.
@@ -439,15 +444,21 @@ impl Plausibility {
         let explained = if is_too_much { less.saturating_neg() } else { less };
         if measured && state.lane.is_alive != 0 && explained > missing.saturating_abs() >> 2 {
             (state.lane.predicted, state.lane.seen) = (Metres::ZERO, Metres::ZERO);
-            return Moved::AsTheWheelSays;
+            return LaneMotion::ContradictsYawRate;
         }
-        Moved::Otherwise
+        LaneMotion::Inconsistent
     }
 
     /// How fast the near-point error must move at an instant, 2^-24 m/s, by the measured yaw rate.
-    fn line_rate(&self, state: &PlausibilityState, past: &Past, now: Instant, at: Instant) -> Option<i32> {
-        let near = past.line(now, at, self.between)?;
-        let turning = past.heading(now, at).rate;
+    fn line_rate(
+        &self,
+        state: &PlausibilityState,
+        motion_history: &MotionHistory,
+        now: Instant,
+        at: Instant,
+    ) -> Option<i32> {
+        let near = motion_history.line_direction(now, at, self.between)?;
+        let turning = motion_history.heading(now, at).rate;
         let along = saturate(product(state.motion.speed.bits(), near.bits()));
         let reach = saturate(product(self.near_time.bits(), state.motion.speed.bits()));
         Some(along.saturating_sub(product_below(reach, turning.bits())))
@@ -463,18 +474,18 @@ impl Plausibility {
     /// The lane at an instant after a sample of it, along the line that the far point has passed and by the rate of turn: what
     /// a picture would show that does not come.
     #[must_use]
-    pub fn gone_on(
+    pub fn extrapolated_lane(
         &self,
         state: &PlausibilityState,
-        past: &Past,
+        motion_history: &MotionHistory,
         now: Instant,
         last: &LaneSample,
         at: Instant,
     ) -> LaneSample {
-        let rate = self.line_rate(state, past, now, last.at);
+        let rate = self.line_rate(state, motion_history, now, last.at);
         let rate = rate.unwrap_or_else(|| self.bend_rate(state, last.e_theta));
         let moved = per_second(rate, at.since(last.at));
-        let turned = past.onward(now, last.at, at);
+        let turned = motion_history.direction_change(now, last.at, at);
         LaneSample {
             e_y: Metres::from_bits(last.e_y.bits().saturating_add(moved)),
             e_theta: Radians::from_bits(last.e_theta.bits().saturating_add(turned.bits())),
@@ -484,7 +495,7 @@ impl Plausibility {
 
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
-    pub fn used(state: &PlausibilityState) -> (Metres, AngularImpulse) {
+    pub fn used_margins(state: &PlausibilityState) -> (Metres, AngularImpulse) {
         let missing = state.missing(state.lane.predicted.bits());
         (Metres::from_bits(missing), state.column.sum)
     }
@@ -492,13 +503,13 @@ impl Plausibility {
 
 /// How the near-point error moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moved {
+pub enum LaneMotion {
     /// As everything says.
-    AsItMust,
+    Consistent,
     /// As wheel angle and speed say, and not as the yaw rate does.
-    AsTheWheelSays,
+    ContradictsYawRate,
     /// As nothing says.
-    Otherwise,
+    Inconsistent,
 }
 
 /// What of an interval is nearest to zero: zero itself if it is inside.
@@ -528,7 +539,7 @@ mod tests {
         for speed in [8.0, 20.0, 35.0] {
             let mut state = PlausibilityState::NEW;
             CHECKS.motion(&mut state, Speed::from_m_per_s(speed), None);
-            state.steer(Radians::from_rad(-0.2));
+            state.set_wheel_angle(Radians::from_rad(-0.2));
             // The bicycle model in steady state.
             let steady = CURVATURE_GAIN_PER_M * speed / (1.0 + STABILITY_FACTOR_S2_PER_M2 * speed * speed);
             let turning = f64::from(state.turning().bits()) / f64::from(1 << FRAC_BITS);
@@ -541,7 +552,7 @@ mod tests {
 
     #[test]
     fn a_sample_that_comes_twice_says_nothing_new() {
-        let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+        let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
         CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), None);
         let at = |ms: u32, e_y: f64| LaneSample {
             e_y: Metres::from_m(e_y),
@@ -549,12 +560,17 @@ mod tests {
             at: Instant::from_us(1000 * ms),
         };
         for sample in [at(10, 0.0), at(20, 0.01)] {
-            let moved = CHECKS.lane(&mut state, &mut past, sample.at, sample);
-            assert_eq!(moved, Moved::AsItMust);
+            let moved = CHECKS.lane(&mut state, &mut motion_history, sample.at, sample);
+            assert_eq!(moved, LaneMotion::Consistent);
         }
         let before = state;
-        let moved = CHECKS.lane(&mut state, &mut past, Instant::from_us(21_000), at(20, 0.01));
-        assert_eq!(moved, Moved::AsItMust);
+        let moved = CHECKS.lane(
+            &mut state,
+            &mut motion_history,
+            Instant::from_us(21_000),
+            at(20, 0.01),
+        );
+        assert_eq!(moved, LaneMotion::Consistent);
         assert_eq!(state, before);
     }
 
@@ -576,7 +592,7 @@ mod tests {
     /// A line that drifts aside by 0.1 m/s where the yaw rate says nothing of it.
     #[test]
     fn a_drift_of_the_line_is_learnt_within_sixteen_seconds() {
-        let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+        let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
         CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), Some(TurningRate::ZERO));
         for step in 0..1600_u32 {
             let now = Instant::from_us(10_000 * step);
@@ -586,8 +602,8 @@ mod tests {
                 e_theta: Radians::ZERO,
                 at: now,
             };
-            let moved = CHECKS.lane(&mut state, &mut past, now, sample);
-            assert_eq!(moved, Moved::AsItMust);
+            let moved = CHECKS.lane(&mut state, &mut motion_history, now, sample);
+            assert_eq!(moved, LaneMotion::Consistent);
             // A first-order lag of 16 s, once the line is known for 0.4 s.
             let learnt = 0.1 * (1.0 - (-(seconds - 0.4).max(0.0) / 16.0).exp());
             let found = state.lane.bias.m_per_s();
@@ -627,12 +643,12 @@ mod tests {
         for (yaw_rate, margin, unreal) in [(Some(TurningRate::ZERO), 0.4, 0.8), (None, 1.0, 2.0)] {
             let [margin, unreal] = [margin, unreal].map(|m| Metres::from_m(m).bits());
             let judged = |predicted: i32, seen: i32| {
-                let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+                let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
                 CHECKS.motion(&mut state, Speed::from_m_per_s(20.0), yaw_rate);
                 state.lane.predicted = Metres::from_bits(predicted);
                 state.lane.seen = Metres::from_bits(seen);
                 let sample = LaneSample::default();
-                CHECKS.lane(&mut state, &mut past, sample.at, sample) == Moved::AsItMust
+                CHECKS.lane(&mut state, &mut motion_history, sample.at, sample) == LaneMotion::Consistent
             };
             for sign in [1, -1] {
                 assert!(judged(sign * 3 * margin / 2, sign * margin / 2));
@@ -649,14 +665,14 @@ mod tests {
     #[test]
     fn a_lane_that_moves_as_the_wheel_says_is_not_blamed() {
         for (sum_rad, is_alive, moved) in [
-            (0.011, 1, Moved::AsTheWheelSays),
+            (0.011, 1, LaneMotion::ContradictsYawRate),
             // The same picture again, less than a quarter, and the wrong way.
-            (0.011, 0, Moved::Otherwise),
-            (0.009, 1, Moved::Otherwise),
-            (-0.04, 1, Moved::Otherwise),
+            (0.011, 0, LaneMotion::Inconsistent),
+            (0.009, 1, LaneMotion::Inconsistent),
+            (-0.04, 1, LaneMotion::Inconsistent),
         ] {
             for sign in [1.0, -1.0] {
-                let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+                let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
                 CHECKS.motion(
                     &mut state,
                     Speed::from_m_per_s(20.0),
@@ -667,7 +683,7 @@ mod tests {
                 state.lane.is_alive = is_alive;
                 let sample = LaneSample::default();
                 assert_eq!(
-                    CHECKS.lane(&mut state, &mut past, sample.at, sample),
+                    CHECKS.lane(&mut state, &mut motion_history, sample.at, sample),
                     moved,
                     "{sum_rad}, {is_alive}"
                 );

@@ -3,7 +3,7 @@
 //!
 //! It starts and ends without a jump: its amplitude grows linearly from zero over the first period, and falls
 //! likewise over the period after its end. Its slope stays within `2*pi*frequency*amplitude`, and 1.3 % more
-//! while it ends, so that with 3.5 N.m/s at most ([`crate::params`] checks it) it stays under the envelope's
+//! while it ends, so that with 3.5 N.m/s at most ([`crate::controller::params`] checks it) it stays under the envelope's
 //! 4 N.m/s.
 //!
 //! Error: at most 0.3 uN.m from a float64 sine of the same phase. A late step advances the phase by 2 ms at
@@ -12,12 +12,12 @@
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
 //! word on the sum), and what the answer tells ([`crate::estimator`]).
 
+use crate::law::sine::sine;
 use crate::quantity::{Micros, Torque, saturate, shift_round};
-use crate::redundant::words;
-use crate::sine::sine;
+use crate::safety::redundant::words;
 
 words! {
-    /// Amplitude and frequency; immutable once validated by [`crate::params`].
+    /// Amplitude and frequency; immutable once validated by [`crate::controller::params`].
     pub struct Probe {
         /// Amplitude; zero means that there is no probe.
         pub(crate) amplitude: Torque,

@@ -81,18 +81,18 @@ macro_rules! words {
         #[repr(C)]
         $vis struct $name { $($(#[$field_doc])* $field_vis $field: $type,)* }
 
-        impl $crate::redundant::Words for $name {
+        impl $crate::safety::redundant::Words for $name {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
-                Self { $($field: $crate::redundant::Words::map_words(self.$field, change),)* }
+                Self { $($field: $crate::safety::redundant::Words::map_words(self.$field, change),)* }
             }
 
             #[inline(always)]
             fn agreement(&self, other: &Self) -> u32 {
                 let mut all = u32::MAX;
                 $(
-                    all &= $crate::redundant::Words::agreement(&self.$field, &other.$field);
+                    all &= $crate::safety::redundant::Words::agreement(&self.$field, &other.$field);
                     #[cfg(target_pointer_width = "32")]
-                    if $crate::redundant::ends_block(core::mem::offset_of!(Self, $field), size_of::<$type>())
+                    if $crate::safety::redundant::ends_block(core::mem::offset_of!(Self, $field), size_of::<$type>())
                         && all != u32::MAX
                     {
                         return 0;
@@ -109,7 +109,7 @@ pub(crate) use words;
 /// them on the stack. The black box is for a compiler that sees a whole image and knows where the values lie: far from
 /// the start of what holds them, it would load no two words at once.
 #[inline(never)]
-pub(crate) fn are_whole<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
+pub(crate) fn are_intact<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
     a.agrees_apart() && b.agrees_apart()
 }
 

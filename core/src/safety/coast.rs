@@ -1,7 +1,7 @@
 //! How far the lane is trusted while its camera sees nothing, or another line.
 //!
 //! In Active a lane that is silent, invalid or elsewhere does not end guidance at once. The lane seen last goes on along what
-//! was seen of the road ([`crate::plausibility::Plausibility::gone_on`]), and the share of the law's torque that acts, the
+//! was seen of the road ([`crate::safety::plausibility::Plausibility::gone_on`]), and the share of the law's torque that acts, the
 //! *trust*, falls:
 //!
 //! | what comes | trust | for at most |
@@ -17,7 +17,7 @@
 
 use crate::law::LaneSample;
 use crate::quantity::{Metres, Micros, Radians, Ratio, Torque, per_second};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// A camera that sees nothing for longer is lost.
 pub const MOST_BLIND: Micros = Micros::from_ms(1000);
@@ -37,7 +37,7 @@ const RISE: i32 = Ratio::from_si(1.0).bits();
 /// quite 1 N.m/s, by which the monitor's band grows. A vehicle that is thrown aside must not end in its veto.
 pub const AWAY_PER_US: i32 = 16;
 /// The lane goes on by so much at a time.
-pub const GOES_ON: Micros = Micros::from_ms(10);
+pub const EXTRAPOLATION_PERIOD: Micros = Micros::from_ms(10);
 
 /// Pictures come and agree.
 const SEES: u32 = 0;
@@ -54,20 +54,20 @@ words! {
         blind: Micros,
         /// Since the last picture that agreed, and what the law asked for then.
         lost: Micros,
-        asked: Torque,
+        demanded: Torque,
         sight: u32,
     }
 }
 
 /// What a new picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shows {
+pub(crate) enum PictureVerdict {
     /// The line, where it must be.
-    TheLine,
+    SameLine,
     /// A line that is taken in its place.
-    ANewLine,
+    NewLine,
     /// A line elsewhere.
-    Another,
+    OtherLine,
 }
 
 impl Coast {
@@ -76,7 +76,7 @@ impl Coast {
         trust: Ratio::ONE,
         blind: Micros::from_us(0),
         lost: Micros::from_us(0),
-        asked: Torque::ZERO,
+        demanded: Torque::ZERO,
         sight: SEES,
     };
 
@@ -87,40 +87,49 @@ impl Coast {
     }
 
     /// Whether the lane seen last goes on in place of pictures.
-    pub(crate) const fn goes_on(&self) -> bool {
+    pub(crate) const fn is_extrapolating(&self) -> bool {
         let is_short = self.lost.us() <= MOST_APART.us();
-        is_short && (self.is_apart() || (self.sight == BLIND && self.blind.us() <= MOST_BLIND.us()))
+        is_short && (self.sees_other_line() || (self.sight == BLIND && self.blind.us() <= MOST_BLIND.us()))
     }
 
     /// Whether pictures show a line elsewhere.
-    pub(crate) const fn is_apart(&self) -> bool {
+    pub(crate) const fn sees_other_line(&self) -> bool {
         self.sight == APART
     }
 
     /// What may be asked for of what the lane that goes on asks for.
-    pub(crate) fn bounded(&self, asked: Torque) -> Torque {
+    pub(crate) fn limited(&self, demanded: Torque) -> Torque {
         if self.sight == SEES {
-            return asked;
+            return demanded;
         }
         let lost_us = self.lost.min(MOST_BLIND).us().cast_signed();
         let away = Torque::from_bits(lost_us.saturating_mul(AWAY_PER_US));
-        asked
-            .max(self.asked.plus(away.opposite()))
-            .min(self.asked.plus(away))
+        demanded
+            .max(self.demanded.plus(away.opposite()))
+            .min(self.demanded.plus(away))
     }
 
     /// No picture is in use; `asked` is what the law asks for now.
-    pub(crate) fn lose(&mut self, asked: Torque) {
-        self.asked = if self.sight == SEES { asked } else { self.asked };
+    pub(crate) fn picture_missing(&mut self, demanded: Torque) {
+        self.demanded = if self.sight == SEES {
+            demanded
+        } else {
+            self.demanded
+        };
         self.sight = BLIND;
     }
 
     /// Takes a new picture, which agrees with the line as it went on or not. How that went on for longer than [`MOST_BLIND`] says
     /// nothing: 3 mrad/s of yaw rate are half a metre within 3 s.
-    pub(crate) fn see(&mut self, sample: &LaneSample, agrees: bool, asked: Torque) -> Shows {
+    pub(crate) fn picture_arrived(
+        &mut self,
+        sample: &LaneSample,
+        agrees: bool,
+        demanded: Torque,
+    ) -> PictureVerdict {
         if agrees && self.lost <= MOST_BLIND {
             self.sight = SEES;
-            return Shows::TheLine;
+            return PictureVerdict::SameLine;
         }
         let is_near = sample.e_y.bits().unsigned_abs() <= NEAR.bits().unsigned_abs()
             && sample.e_theta.bits().unsigned_abs() <= ALONG.bits().unsigned_abs();
@@ -129,15 +138,15 @@ impl Coast {
                 trust: Ratio::ZERO,
                 ..Self::NEW
             };
-            return Shows::ANewLine;
+            return PictureVerdict::NewLine;
         }
-        self.lose(asked);
+        self.picture_missing(demanded);
         self.sight = APART;
-        Shows::Another
+        PictureVerdict::OtherLine
     }
 
     /// Time passes.
-    pub(crate) fn pass(&mut self, elapsed: Micros) {
+    pub(crate) fn advance(&mut self, elapsed: Micros) {
         let (us, blind, lost) = (elapsed.us(), self.blind.us(), self.lost.us());
         let (per_s, blind, lost) = match self.sight {
             SEES => (RISE, blind.saturating_sub(us >> 1), 0),

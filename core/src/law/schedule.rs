@@ -6,7 +6,7 @@
 //! that every bound on the law holds for it too, the monitor's among them.
 
 use crate::quantity::{Ratio, Speed, product};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 words! {
     /// Shares at the ends, as lines from the middle.

@@ -1,13 +1,13 @@
 //! The one list of the controller's parameters, in SI: names, units, ranges, defaults, and their order.
 //!
 //! One more parameter is one more line of [`parameters!`](self) below. From it follow the struct, the defaults, the
-//! checks, the names and numbers on the bus ([`crate::download`]), the copy in memory ([`crate::stored`]) and the
+//! checks, the names and numbers on the bus ([`crate::service::download`]), the copy in memory ([`crate::service::stored`]) and the
 //! parameters of a lock-step run. What else wants a decision says so itself: `core/tests/params.rs` asks for its row
 //! in `docs/parameters.md`, `core/tests/dbc.rs` for its name in `core/haptic.dbc`, `core/tests/stored.rs` for a new
-//! version of the stored layout, and the compiler warns in [`crate::config`] while nothing uses it.
+//! version of the stored layout, and the compiler warns in [`crate::controller::config`] while nothing uses it.
 //!
 //! A rejected parameter is named with its value, unit and range. Not here: what the parameters decide, and ranges of
-//! their products ([`crate::config`]).
+//! their products ([`crate::controller::config`]).
 
 #![expect(
     clippy::as_conversions,
@@ -198,7 +198,7 @@ impl core::error::Error for ParamError {}
 
 impl Params {
     /// Checks every parameter against its range. The ends of a range are in it, also as the nearest f32, which is what
-    /// the bus carries. [`crate::config::Config::new`] checks products of them too.
+    /// the bus carries. [`crate::controller::config::Config::new`] checks products of them too.
     ///
     /// # Errors
     /// The first parameter that is not a number within its range.

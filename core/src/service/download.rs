@@ -17,11 +17,11 @@ use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{
     Message, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, WriteOutcome,
 };
-use crate::config::Setup;
-use crate::faults::{Fault, FaultSet};
-use crate::modes::Mode;
-use crate::params::{PARAMETERS, Params};
-use crate::stored::{Set, Stored};
+use crate::controller::config::Setup;
+use crate::controller::params::{PARAMETERS, Params};
+use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::modes::Mode;
+use crate::service::stored::{Set, Stored};
 
 const VALUES: usize = PARAMETERS.len();
 /// No field has this index.

@@ -16,8 +16,8 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use crate::config::Setup;
-use crate::params::{PARAMETERS, Params};
+use crate::controller::config::Setup;
+use crate::controller::params::{PARAMETERS, Params};
 
 /// Length of a copy.
 pub const BYTES: usize = 16 + 8 * VALUES + 4;

@@ -6,7 +6,7 @@
 //! ever grows.
 
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, share_of, signed_quotient};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
@@ -48,7 +48,7 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
 /// How long a handover lasts beside a lane of which so much was trusted. Without a picture trust falls on the line of a
 /// handover, which goes on where that was; but nobody takes over in less than [`GONE_ON`].
 #[must_use]
-pub fn handover_of(trust: Ratio) -> Micros {
+pub fn handover_length(trust: Ratio) -> Micros {
     let left = share_of(trust.bits(), HANDOVER.us().cast_signed());
     Micros::from_us(left.cast_unsigned()).max(GONE_ON)
 }
@@ -114,7 +114,7 @@ impl Ramp {
 /// Not kept twice: wherever a flipped bit puts the start of a handover, it lies between zero and the torque
 /// applied. Fixed arrays, so that a flip can do nothing else.
 #[derive(Debug, Clone)]
-pub struct History {
+pub struct TorqueHistory {
     fine: Outputs,
     coarse: Outputs,
 }
@@ -166,7 +166,7 @@ impl Outputs {
     }
 }
 
-impl History {
+impl TorqueHistory {
     /// Nothing applied yet.
     #[must_use]
     pub const fn new() -> Self {
@@ -214,7 +214,7 @@ pub fn smaller_of_same_sign(a: Torque, b: Torque) -> Torque {
     }
 }
 
-impl Default for History {
+impl Default for TorqueHistory {
     fn default() -> Self {
         Self::new()
     }

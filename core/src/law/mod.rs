@@ -15,12 +15,16 @@
 //!
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
+pub mod probe;
+pub mod schedule;
+pub(crate) mod sine;
+
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
     TorquePerTurningRate, TurningRate, per_second, per_second_times, product, quotient, saturate,
     shift_round,
 };
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 words! {
     /// Lane errors at the guidance's own points (t'_n = 0.3 s, t'_f = 0.7 s), ISO 8855: positive asks for a
@@ -37,7 +41,7 @@ words! {
 }
 
 words! {
-/// Coefficients of the law; immutable once validated by [`crate::params`].
+/// Coefficients of the law; immutable once validated by [`crate::controller::params`].
 pub struct Law {
     /// K_1*a1'.
     pub(crate) e_y: TorquePerLength,
@@ -81,7 +85,7 @@ impl LawState {
 
 /// What the vehicle did since a sample that was old when it came: how its motion differs from going on as it did then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Since {
+pub struct EgoMotion {
     /// The heading that it turned beyond its rate of turn at the sample.
     pub turned: Radians,
     /// How much faster it turns now.
@@ -92,9 +96,9 @@ pub struct Since {
     pub near: Metres,
 }
 
-impl Since {
+impl EgoMotion {
     /// It went on as it did.
-    pub const NOTHING: Self = Self {
+    pub const STEADY: Self = Self {
         turned: Radians::ZERO,
         faster: TurningRate::ZERO,
         speed: Speed::ZERO,
@@ -122,16 +126,16 @@ impl LawState {
     /// The state from which [`Law::torque`], which lets the errors go on at their rates, finds the errors and rates of now.
     /// Both errors turn with the vehicle; the near point moves aside by the way that it is ahead, and drifts at the speed
     /// times the heading, of which a third of the age counts where the heading grew with the square of the time.
-    fn moved_on(&self, age: Micros, since: &Since) -> Self {
-        let turned = i64::from(since.turned.bits());
-        let aside = product(since.near.bits(), since.turned.bits());
+    fn moved_with(&self, age: Micros, ego: &EgoMotion) -> Self {
+        let turned = i64::from(ego.turned.bits());
+        let aside = product(ego.near.bits(), ego.turned.bits());
         // What the yaw error's own rate makes of the lateral error's, and the heading beyond it.
         let going = per_second_times(i64::from(self.e_theta_rate) << 4, age);
-        let drift = product(since.speed.bits(), saturate(turned.saturating_sub(going)));
-        let drifted = per_second_times(product(since.speed.bits(), since.turned.bits()), age) / 3;
-        let bent = per_second_times(product(since.speed.bits(), saturate(going)), age) / 2;
-        let slower_y = drift.saturating_add(product(since.near.bits(), since.faster.bits()));
-        let slower_theta = i64::from(since.faster.bits());
+        let drift = product(ego.speed.bits(), saturate(turned.saturating_sub(going)));
+        let drifted = per_second_times(product(ego.speed.bits(), ego.turned.bits()), age) / 3;
+        let bent = per_second_times(product(ego.speed.bits(), saturate(going)), age) / 2;
+        let slower_y = drift.saturating_add(product(ego.near.bits(), ego.faster.bits()));
+        let slower_theta = i64::from(ego.faster.bits());
         let error = |error: i32, away: i64, slower: i64| {
             // The rates that are taken away below did not act all the time.
             let ahead = per_second_times(slower, age);
@@ -148,7 +152,7 @@ impl LawState {
     }
 
     /// Whether the sample is the one taken last.
-    pub(crate) fn knows(&self, sample: &LaneSample) -> bool {
+    pub(crate) fn is_latest(&self, sample: &LaneSample) -> bool {
         self.has_last != 0 && self.last == *sample
     }
 
@@ -178,15 +182,15 @@ impl Law {
     /// The torque that the law asks for now, from the latest sample received; `since` is what the vehicle did since that
     /// sample that its rates do not say.
     #[must_use]
-    pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, since: &Since) -> Torque {
-        if !state.knows(&sample) {
-            self.take(state, sample);
+    pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, ego: &EgoMotion) -> Torque {
+        if !state.is_latest(&sample) {
+            self.update(state, sample);
         }
-        self.asked(state, now, Some(since))
+        self.demanded(state, now, Some(ego))
     }
 
     /// Takes a sample: the rates of the errors.
-    pub(crate) fn take(&self, state: &mut LawState, sample: LaneSample) {
+    pub(crate) fn update(&self, state: &mut LawState, sample: LaneSample) {
         let dt = sample.at.since(state.last.at);
         if state.has_last == 0 || dt > GAP {
             *state = LawState::NEW;
@@ -204,18 +208,18 @@ impl Law {
 
     /// The torque now, from the sample taken last.
     #[inline(always)]
-    pub(crate) fn asked(&self, state: &LawState, now: Instant, since: Option<&Since>) -> Torque {
+    pub(crate) fn demanded(&self, state: &LawState, now: Instant, ego: Option<&EgoMotion>) -> Torque {
         let age = now.since(state.last.at);
-        match since {
+        match ego {
             None => self.torque(state, age),
-            Some(since) => self.asked_late(state, age, since),
+            Some(ego) => self.demanded_from_old_sample(state, age, ego),
         }
     }
 
     /// The same from a sample that was old when it came. A function of its own, out of the way of the usual case.
     #[inline(never)]
-    fn asked_late(&self, state: &LawState, age: Micros, since: &Since) -> Torque {
-        self.torque(&state.moved_on(age, since), age)
+    fn demanded_from_old_sample(&self, state: &LawState, age: Micros, ego: &EgoMotion) -> Torque {
+        self.torque(&state.moved_with(age, ego), age)
     }
 
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two

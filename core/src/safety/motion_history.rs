@@ -59,7 +59,7 @@ impl Heading {
 
 /// The rings.
 #[derive(Debug, Clone)]
-pub struct Past {
+pub struct MotionHistory {
     headings: [Heading; RING],
     newest: usize,
     /// Directions of the line at the far point, in the frame of the headings.
@@ -69,7 +69,7 @@ pub struct Past {
     known_lines: usize,
 }
 
-impl Past {
+impl MotionHistory {
     /// Nothing known.
     #[must_use]
     pub const fn new() -> Self {
@@ -84,7 +84,7 @@ impl Past {
 
     /// The rate of turn from now on.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
-    pub fn turn(&mut self, now: Instant, rate: TurningRate) {
+    pub fn record_turning_rate(&mut self, now: Instant, rate: TurningRate) {
         let psi = self.headings[self.newest % RING].psi_at(now);
         self.newest = self.newest.wrapping_add(1);
         self.headings[self.newest % RING] = Heading { at: now, psi, rate };
@@ -114,7 +114,7 @@ impl Past {
 
     /// The direction of the line at the far point, `e_theta` from the vehicle's heading at `at`.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
-    pub fn see(&mut self, now: Instant, at: Instant, e_theta: Radians) {
+    pub fn record_line(&mut self, now: Instant, at: Instant, e_theta: Radians) {
         let direction = self.heading(now, at).psi_at(at).wrapping_add(e_theta.bits());
         if self.known_lines == 0 || at.since(self.lines[self.last_line % RING].0) >= APART {
             self.last_line = self.last_line.wrapping_add(1);
@@ -127,7 +127,7 @@ impl Past {
     /// was then. `None` where that is longer ago than the line is known.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
-    pub fn line(&self, now: Instant, at: Instant, before: Micros) -> Option<Radians> {
+    pub fn line_direction(&self, now: Instant, at: Instant, before: Micros) -> Option<Radians> {
         let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
         let wanted = at.before(before);
         let age = now.since(wanted);
@@ -164,7 +164,7 @@ impl Past {
     /// later one if the line goes on to bend as it did.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
-    pub fn onward(&self, now: Instant, from: Instant, to: Instant) -> Radians {
+    pub fn direction_change(&self, now: Instant, from: Instant, to: Instant) -> Radians {
         let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
         let (newest, direction) = place(0);
         let (oldest, before) = place(self.known_lines.saturating_sub(1).min(BEND));
@@ -181,7 +181,7 @@ impl Past {
     }
 }
 
-impl Default for Past {
+impl Default for MotionHistory {
     fn default() -> Self {
         Self::new()
     }

@@ -10,7 +10,7 @@
 //! Not here: what the warning leads to ([`crate::controller`]).
 
 use crate::quantity::{Micros, Torque};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// A change of the driver torque that only a hand makes: beyond the sensor's noise and the inertia of the wheel's rim.
 pub const FELT: Torque = Torque::from_nm(0.08);
@@ -27,42 +27,42 @@ words! {
     /// What was felt, and for how long no more.
     pub struct HandsState {
         /// The driver torque that a change is counted from.
-        felt: Torque,
+        reference: Torque,
         /// Time in which the guidance acted since.
-        without: Micros,
+        time_hands_off: Micros,
     }
 }
 
 impl HandsState {
     /// A hand on the wheel.
     pub const NEW: Self = Self {
-        felt: Torque::ZERO,
-        without: Micros::from_us(0),
+        reference: Torque::ZERO,
+        time_hands_off: Micros::from_us(0),
     };
 
     /// Takes a driver torque that came since the last step.
-    pub fn feel(&mut self, driver: Torque) {
-        if driver.abs() > HELD || driver.plus(self.felt.opposite()).abs() > FELT {
-            (self.felt, self.without) = (driver, Micros::from_us(0));
+    pub fn update(&mut self, driver: Torque) {
+        if driver.abs() > HELD || driver.plus(self.reference.opposite()).abs() > FELT {
+            (self.reference, self.time_hands_off) = (driver, Micros::from_us(0));
         }
     }
 
     /// Another `elapsed` in which the guidance applied a torque, the probe not counted.
-    pub fn guided(&mut self, guidance: Torque, elapsed: Micros) {
+    pub fn add_guided_time(&mut self, guidance: Torque, elapsed: Micros) {
         if guidance.abs() >= ACTS {
-            self.without = Micros::from_us(self.without.us().saturating_add(elapsed.us()));
+            self.time_hands_off = Micros::from_us(self.time_hands_off.us().saturating_add(elapsed.us()));
         }
     }
 
     /// Guidance begins: whoever asked for it is there.
-    pub fn begin(&mut self) {
-        self.without = Micros::from_us(0);
+    pub fn reset(&mut self) {
+        self.time_hands_off = Micros::from_us(0);
     }
 
     /// For how long no hand was felt.
     #[must_use]
-    pub const fn without(&self) -> Micros {
-        self.without
+    pub const fn time_hands_off(&self) -> Micros {
+        self.time_hands_off
     }
 }
 
@@ -70,14 +70,14 @@ impl HandsState {
 mod tests {
     use super::*;
 
-    fn without_ms(state: &HandsState) -> u32 {
-        state.without().us() / 1000
+    fn hands_off_ms(state: &HandsState) -> u32 {
+        state.time_hands_off().us() / 1000
     }
 
     fn let_go(felt: Torque) -> HandsState {
         let mut state = HandsState::NEW;
-        state.feel(felt);
-        state.guided(ACTS, Micros::from_ms(500));
+        state.update(felt);
+        state.add_guided_time(ACTS, Micros::from_ms(500));
         state
     }
 
@@ -88,15 +88,15 @@ mod tests {
             let signed = |torque: Torque| if sign < 0 { torque.opposite() } else { torque };
             // From an offset on: as much as FELT beside it is none, a bit more is one.
             let mut state = let_go(signed(Torque::from_nm(0.2)));
-            state.feel(signed(Torque::from_nm(0.2).plus(FELT)));
-            assert_eq!(without_ms(&state), 500);
-            state.feel(signed(Torque::from_nm(0.2).plus(FELT).plus(bit)));
-            assert_eq!(without_ms(&state), 0);
+            state.update(signed(Torque::from_nm(0.2).plus(FELT)));
+            assert_eq!(hands_off_ms(&state), 500);
+            state.update(signed(Torque::from_nm(0.2).plus(FELT).plus(bit)));
+            assert_eq!(hands_off_ms(&state), 0);
             // The same torque all the time.
             for (torque, left) in [(HELD, 500), (HELD.plus(bit), 0)] {
                 let mut state = let_go(signed(torque));
-                state.feel(signed(torque));
-                assert_eq!(without_ms(&state), left, "{torque:?}");
+                state.update(signed(torque));
+                assert_eq!(hands_off_ms(&state), left, "{torque:?}");
             }
         }
     }
@@ -104,11 +104,11 @@ mod tests {
     #[test]
     fn only_a_guidance_that_acts_counts_and_each_begins_anew() {
         let mut state = let_go(Torque::ZERO);
-        state.guided(ACTS.plus(Torque::from_bits(-1)), Micros::from_ms(500));
-        assert_eq!(without_ms(&state), 500);
-        state.guided(ACTS.opposite(), Micros::from_ms(500));
-        assert_eq!(without_ms(&state), 1000);
-        state.begin();
-        assert_eq!(without_ms(&state), 0);
+        state.add_guided_time(ACTS.plus(Torque::from_bits(-1)), Micros::from_ms(500));
+        assert_eq!(hands_off_ms(&state), 500);
+        state.add_guided_time(ACTS.opposite(), Micros::from_ms(500));
+        assert_eq!(hands_off_ms(&state), 1000);
+        state.reset();
+        assert_eq!(hands_off_ms(&state), 0);
     }
 }

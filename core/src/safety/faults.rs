@@ -87,7 +87,7 @@ faults! {
     /// B: the two speeds differ by 2 m/s or more.
     6 SpeedImplausible: B, 800;
     /// B: no usable command for 30 ms.
-    7 CommandTimeout: B, 0;
+    7 RequestTimeout: B, 0;
     /// C: steps late or missing.
     8 Deadline: C, 0;
     /// C: the monitor disagreed with a command.
@@ -135,16 +135,16 @@ impl FaultSet {
     /// No fault.
     pub const NONE: Self = Self(0);
     /// Every input fault (class B).
-    pub const INPUT: Self = Self::of(Class::B);
+    pub const INPUT: Self = Self::of_class(Class::B);
     /// Every fault of class C.
-    pub const CRITICAL: Self = Self::of(Class::C);
+    pub const CRITICAL: Self = Self::of_class(Class::C);
     /// What forbids to leave Boot.
-    pub const LOCKING: Self = Self::of(Class::Locked);
+    pub const LOCKING: Self = Self::of_class(Class::Locked);
     /// What ends guidance with a fade.
-    pub const FADING: Self = Self::of(Class::A);
+    pub const FADING: Self = Self::of_class(Class::A);
     /// Every fault that has a name.
     const NAMED: u32 =
-        Self::FADING.0 | Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0 | Self::of(Class::L).0;
+        Self::FADING.0 | Self::INPUT.0 | Self::CRITICAL.0 | Self::LOCKING.0 | Self::of_class(Class::L).0;
 
     /// Every fault of a class.
     #[must_use]
@@ -154,7 +154,7 @@ impl FaultSet {
         clippy::arithmetic_side_effects,
         reason = "the index stays below the count"
     )]
-    pub const fn of(class: Class) -> Self {
+    pub const fn of_class(class: Class) -> Self {
         let (mut set, mut i) = (0, 0);
         while i < Fault::COUNT {
             if Fault::ALL[i].class() as u8 == class as u8 {
@@ -234,7 +234,7 @@ impl FaultSet {
 
     /// What is here and not in `other`.
     #[must_use]
-    pub const fn without(self, other: Self) -> Self {
+    pub const fn difference(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
@@ -261,7 +261,7 @@ pub struct Record {
 ///
 /// Not kept twice: it moves nothing. Fixed arrays, so that a flipped bit can only spoil a count or an age.
 #[derive(Debug, Clone)]
-pub struct History {
+pub struct FaultHistory {
     /// How often, by fault.
     counts: [u8; Fault::COUNT],
     /// In which second, by fault. A step counts one second on, and no age.
@@ -277,7 +277,7 @@ pub struct History {
 
 const SECOND: Micros = Micros::from_ms(1000);
 
-impl History {
+impl FaultHistory {
     /// No fault so far.
     #[must_use]
     pub const fn new(now: Instant) -> Self {
@@ -293,7 +293,7 @@ impl History {
 
     /// Takes the faults present in this step.
     pub fn step(&mut self, now: Instant, present: FaultSet) {
-        let appeared = present.without(self.present);
+        let appeared = present.difference(self.present);
         self.present = present;
         self.ever = self.ever.union(present);
         if now.since(self.second) >= SECOND {

@@ -19,7 +19,7 @@ mod arithmetic;
 
 use core::fmt;
 
-use crate::redundant::Words;
+use crate::safety::redundant::Words;
 pub(crate) use arithmetic::{
     leak, per_second, per_second_times, product, product_below, product_within, quotient, saturate, share_of,
     shift_round, signed_quotient, upper_product, wide_product,

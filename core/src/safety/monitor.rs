@@ -15,7 +15,7 @@
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -38,14 +38,14 @@ words! {
 words! {
     /// What the monitor remembers: what changes in most steps, and what a picture changes.
     pub struct MonitorState {
-        pub(crate) now: Now,
-        pub(crate) picture: Picture,
+        pub(crate) step: StepState,
+        pub(crate) lane_state: LaneState,
     }
 }
 
 words! {
     /// What most steps change.
-    pub(crate) struct Now {
+    pub(crate) struct StepState {
         torque_mnm: i32,
         driver_mnm: i32,
         /// Since the lane sample was true.
@@ -61,7 +61,7 @@ words! {
 
 words! {
     /// What a new lane sample changes.
-    pub(crate) struct Picture {
+    pub(crate) struct LaneState {
         lane: Lane,
         /// How old it was when it came.
         came_us: i32,
@@ -90,7 +90,7 @@ pub struct Evidence<'a> {
     /// Bytes of the latest column frame in use, if a new one arrived.
     pub column: Option<&'a [u8; 8]>,
     /// Bytes of the latest command frame in use, if a new one arrived.
-    pub demand: Option<&'a [u8; 8]>,
+    pub request: Option<&'a [u8; 8]>,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
@@ -134,7 +134,7 @@ pub const RATE_SPAN_US: i32 = 50_000;
 impl MonitorState {
     /// Nothing seen, permission granted.
     pub const NEW: Self = Self {
-        now: Now {
+        step: StepState {
             torque_mnm: 0,
             driver_mnm: 0,
             age_us: 0,
@@ -142,7 +142,7 @@ impl MonitorState {
             astray_ms: 0,
             withdrawn: 0,
         },
-        picture: Picture {
+        lane_state: LaneState {
             lane: Lane {
                 e_y_mm: 0,
                 e_theta_urad: 0,
@@ -169,12 +169,12 @@ impl Monitor {
             .unwrap_or(i32::MAX)
             .min(1_000_000);
         if state.observe(evidence, elapsed_us) {
-            self.weigh(state);
+            self.update_demand(state);
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
-        let changes_sign = (torque ^ state.now.torque_mnm).is_negative();
-        let old = if changes_sign { 0 } else { state.now.torque_mnm };
+        let changes_sign = (torque ^ state.step.torque_mnm).is_negative();
+        let old = if changes_sign { 0 } else { state.step.torque_mnm };
         let grown = torque.saturating_abs().saturating_sub(old.saturating_abs());
         let within = |per_ms: i32| {
             let so_long = if elapsed_us <= 1000 {
@@ -190,27 +190,27 @@ impl Monitor {
             0
         };
         let left = if changes_sign { 0 } else { torque.saturating_abs() };
-        let fallen = state.now.torque_mnm.saturating_abs().saturating_sub(left);
+        let fallen = state.step.torque_mnm.saturating_abs().saturating_sub(left);
         let may_fall = fallen <= within(self.fall_mnm_per_ms)
             || mode > LAST_WITH_TORQUE
             || (mode == HANDOVER && fallen <= within(self.fall_mnm_per_ms.saturating_mul(DISTRUSTED)))
             || left.saturating_add(OVERRIDE_SLACK_MNM)
-                >= self.bound(state.now.torque_mnm, state.now.driver_mnm);
+                >= self.bound(state.step.torque_mnm, state.step.driver_mnm);
         let agrees = torque.saturating_abs() <= self.limit_mnm.saturating_add(TOLERANCE_MNM)
             && grown <= allowed
             && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
-            && self.leaves_the_driver_in_charge(torque, state.now.driver_mnm)
+            && self.leaves_the_driver_in_charge(torque, state.step.driver_mnm)
             && (mode != ACTIVE || self.follows_the_lane(state, torque));
-        state.now.torque_mnm = torque;
-        state.now.withdrawn |= i32::from(!agrees);
-        state.now.withdrawn == 0
+        state.step.torque_mnm = torque;
+        state.step.withdrawn |= i32::from(!agrees);
+        state.step.withdrawn == 0
     }
 
     /// The monitor of a simulator's ECU with another law than (9): the band around (9) is as wide as the absolute limit, and
     /// so refuses nothing that the limit does not. The other rules are the product's.
     #[must_use]
-    pub const fn of_another_law(self) -> Self {
+    pub const fn with_another_law(self) -> Self {
         Self {
             band_mnm: self.limit_mnm,
             ..self
@@ -240,32 +240,32 @@ impl Monitor {
     }
 
     /// What a new lane sample asks for.
-    fn weigh(&self, state: &mut MonitorState) {
+    fn update_demand(&self, state: &mut MonitorState) {
         let [per_m, per_rad, per_mps, per_radps] = self.gains_mnm;
         let (e_y_mmps, e_theta_urps) = state.rates();
-        let asked = |per_length: i32, length: i32, per_angle: i32, angle: i32| {
+        let demanded = |per_length: i32, length: i32, per_angle: i32, angle: i32| {
             per_length
                 .saturating_mul(length)
                 .saturating_div(1000)
                 .saturating_add(per_angle.saturating_mul(angle / 100) / 10_000)
         };
-        state.picture.position_mnm = asked(
+        state.lane_state.position_mnm = demanded(
             per_m,
-            state.picture.lane.e_y_mm,
+            state.lane_state.lane.e_y_mm,
             per_rad,
-            state.picture.lane.e_theta_urad,
+            state.lane_state.lane.e_theta_urad,
         );
-        state.picture.rate_mnm = asked(per_mps, e_y_mmps, per_radps, e_theta_urps);
+        state.lane_state.rate_mnm = demanded(per_mps, e_y_mmps, per_radps, e_theta_urps);
     }
 
     #[inline(always)]
     fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
-        if state.now.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
+        if state.step.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
         }
         // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
-        let late_us = state.now.age_us.saturating_sub(PROMPT_LANE_US);
-        let (position, rate) = (state.picture.position_mnm, state.picture.rate_mnm);
+        let late_us = state.step.age_us.saturating_sub(PROMPT_LANE_US);
+        let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
         let both = position.saturating_add(rate);
         // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
         let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
@@ -283,7 +283,7 @@ impl Monitor {
             let both = position.saturating_add(rate);
             (low, high) = (low.min(position).min(both), high.max(position).max(both));
         }
-        let probe = if state.now.probe_left_us > 0 {
+        let probe = if state.step.probe_left_us > 0 {
             self.probe_mnm
         } else {
             0
@@ -293,13 +293,13 @@ impl Monitor {
             .saturating_add(probe)
             .saturating_add(late_us.max(0) / 1000);
         let (low, high) = (low.saturating_sub(band), high.saturating_add(band));
-        let falling = torque.saturating_abs() < state.now.torque_mnm.saturating_abs();
+        let falling = torque.saturating_abs() < state.step.torque_mnm.saturating_abs();
         if (low..=high).contains(&torque) {
-            state.now.astray_ms = 0;
+            state.step.astray_ms = 0;
         } else if !falling {
-            state.now.astray_ms = state.now.astray_ms.saturating_add(1);
+            state.step.astray_ms = state.step.astray_ms.saturating_add(1);
         }
-        state.now.astray_ms <= ASTRAY_MS
+        state.step.astray_ms <= ASTRAY_MS
     }
 
     /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
@@ -313,12 +313,12 @@ impl Monitor {
             0 => (torque, mode) = (self.limit_mnm.saturating_add(20), FADE),
             1 => grown = torque,
             2 => mode = STANDBY,
-            3 => state.now.driver_mnm = -20_000,
-            4 => state.now.age_us = 2_000_000,
+            3 => state.step.driver_mnm = -20_000,
+            4 => state.step.age_us = 2_000_000,
             5 => (torque, grown) = (0, -400),
-            _ => (torque, state.now.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
+            _ => (torque, state.step.astray_ms) = (self.band_mnm.saturating_add(100), ASTRAY_MS),
         }
-        state.now.torque_mnm = torque.saturating_sub(grown);
+        state.step.torque_mnm = torque.saturating_sub(grown);
         // The least count that is cut to so many mN.m again.
         let count = torque
             .saturating_mul(4096)
@@ -334,8 +334,8 @@ impl MonitorState {
     /// Takes what came; `true` for a new lane sample.
     #[inline(always)]
     fn observe(&mut self, evidence: &Evidence<'_>, elapsed_us: i32) -> bool {
-        self.now.age_us = self.now.age_us.saturating_add(elapsed_us);
-        let unseen_us = self.now.age_us.saturating_sub(self.picture.came_us);
+        self.step.age_us = self.step.age_us.saturating_add(elapsed_us);
+        let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
         let lane = evidence
             .lane
             .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
@@ -347,23 +347,23 @@ impl MonitorState {
             let age_us = (field(bytes, 46, 10) & 0x1FF)
                 .saturating_add((field(bytes, 56, 3) & 3).saturating_mul(512))
                 .saturating_mul(100);
-            let apart_us = self.now.age_us.saturating_sub(age_us);
+            let apart_us = self.step.age_us.saturating_sub(age_us);
             // After a gap there is no rate.
-            if self.now.age_us > OLDEST_LANE_US {
-                (self.picture.before, self.picture.older_us) = (new, 0);
-            } else if self.picture.older_us > RATE_SPAN_US {
-                (self.picture.before, self.picture.older_us) = (self.picture.lane, apart_us);
+            if self.step.age_us > OLDEST_LANE_US {
+                (self.lane_state.before, self.lane_state.older_us) = (new, 0);
+            } else if self.lane_state.older_us > RATE_SPAN_US {
+                (self.lane_state.before, self.lane_state.older_us) = (self.lane_state.lane, apart_us);
             } else {
-                self.picture.older_us = self.picture.older_us.saturating_add(apart_us);
+                self.lane_state.older_us = self.lane_state.older_us.saturating_add(apart_us);
             }
-            (self.picture.lane, self.picture.came_us, self.now.age_us) = (new, age_us, age_us);
+            (self.lane_state.lane, self.lane_state.came_us, self.step.age_us) = (new, age_us, age_us);
         }
         if let Some(bytes) = evidence.column {
-            self.now.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
+            self.step.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
         }
-        self.now.probe_left_us = self.now.probe_left_us.saturating_sub(elapsed_us).max(0);
-        if evidence.demand.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
-            self.now.probe_left_us = PROBE_END_US;
+        self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
+        if evidence.request.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
+            self.step.probe_left_us = PROBE_END_US;
         }
         lane.is_some()
     }
@@ -374,8 +374,8 @@ impl MonitorState {
         reason = "the span is at least a millisecond"
     )]
     fn rates(&self) -> (i32, i32) {
-        let (lane, before) = (&self.picture.lane, &self.picture.before);
-        let span_ms = (self.picture.older_us / 1000).max(1);
+        let (lane, before) = (&self.lane_state.lane, &self.lane_state.before);
+        let span_ms = (self.lane_state.older_us / 1000).max(1);
         let e_y_mmps = lane
             .e_y_mm
             .saturating_sub(before.e_y_mm)

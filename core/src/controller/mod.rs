@@ -3,129 +3,31 @@
 //!
 //! Not here: bytes and their checks, the monitor, the motor ([`crate::ecu`]).
 
+pub mod config;
+pub(crate) mod injection;
+pub mod inputs;
+pub mod params;
 mod step;
 
-use crate::coast::Coast;
-use crate::config::Config;
-use crate::envelope::{EnvelopeState, LimitReason};
-use crate::faults::{Fault, FaultSet};
-use crate::hands::HandsState;
-use crate::injection::{Injection, NoInjection};
-use crate::law::{LaneSample, LawState};
-use crate::modes::Mode;
-use crate::past::Past;
-use crate::plausibility::PlausibilityState;
-use crate::probe::ProbeState;
-use crate::quantity::{Instant, Micros, Radians, Ratio, Speed, Torque, TurningRate};
-use crate::ramp::{History, Ramp};
-use crate::redundant::{Redundant, Words, are_whole, words};
-use step::{Step, without};
+use crate::controller::config::Config;
+use crate::controller::injection::{Injection, NoInjection};
+use crate::controller::inputs::Inputs;
+use crate::law::LawState;
+use crate::law::probe::ProbeState;
+use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
+use crate::safety::coast::Coast;
+use crate::safety::envelope::{EnvelopeState, LimitReason};
+use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::hands::HandsState;
+use crate::safety::modes::Mode;
+use crate::safety::motion_history::MotionHistory;
+use crate::safety::plausibility::PlausibilityState;
+use crate::safety::ramp::{Ramp, TorqueHistory};
+use crate::safety::redundant::{Redundant, Words, are_intact, words};
+use step::{Step, subtract_probe};
 
 /// Inputs must be valid for this long in Standby before a request can engage.
 pub const READY: Micros = Micros::from_ms(500);
-/// One input: the latest value that passed the bus's checks, and since when.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Input<T> {
-    /// No usable value: never heard, stale, or refused for longer than the time-out.
-    Lost,
-    /// A value that is not older than the time-out.
-    Held(T),
-    /// A value that came since the last step.
-    New(T),
-}
-
-impl<T: Copy> Input<T> {
-    /// The value, new or held.
-    #[must_use]
-    pub const fn value(&self) -> Option<T> {
-        match self {
-            Self::Lost => None,
-            Self::Held(value) | Self::New(value) => Some(*value),
-        }
-    }
-}
-
-words! {
-    /// Driver torque and wheel angle.
-    #[derive(Default)]
-    pub struct Column {
-        /// T_d on the wheel.
-        pub driver_torque: Torque,
-        /// phi.
-        pub wheel_angle: Radians,
-    }
-}
-
-words! {
-    /// How the vehicle moves, as its own sensors have it.
-    #[derive(Default)]
-    pub struct Motion {
-        /// Two sources of its speed.
-        pub speeds: [Speed; 2],
-        /// The measured yaw rate; counts only where there is one.
-        pub yaw_rate: TurningRate,
-        /// 1 where there is a measured yaw rate.
-        pub has_yaw_rate: u32,
-    }
-}
-
-impl Motion {
-    /// Speeds, and the yaw rate if it is measured.
-    #[must_use]
-    pub fn new(speeds: [Speed; 2], yaw_rate: Option<TurningRate>) -> Self {
-        Self {
-            speeds,
-            yaw_rate: yaw_rate.unwrap_or(TurningRate::ZERO),
-            has_yaw_rate: u32::from(yaw_rate.is_some()),
-        }
-    }
-
-    /// The yaw rate, if it is measured.
-    #[must_use]
-    pub fn yaw_rate(&self) -> Option<TurningRate> {
-        (self.has_yaw_rate != 0).then_some(self.yaw_rate)
-    }
-}
-
-/// What the host requests.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Request {
-    /// Guidance is wanted. A rising edge engages, a low level ends.
-    pub engage: bool,
-    /// Share of the law's torque to apply, 0 to 1; saturates there.
-    pub authority: Ratio,
-    /// The probe is wanted on top of it.
-    pub probe: bool,
-}
-
-/// What the controller reads every millisecond.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Inputs {
-    /// Lane errors.
-    pub lane: Input<LaneSample>,
-    /// The column's sensors.
-    pub column: Input<Column>,
-    /// Two sources of the vehicle's speed, and its yaw rate.
-    pub motion: Input<Motion>,
-    /// What the host requests.
-    pub request: Input<Request>,
-    /// Faults found outside: on the bus, by the monitor, at the output.
-    pub faults: FaultSet,
-}
-
-impl Inputs {
-    /// Nothing heard. No constant, which a step would copy whole.
-    #[inline(always)]
-    pub(crate) fn lost() -> Self {
-        Self {
-            lane: Input::Lost,
-            column: Input::Lost,
-            motion: Input::Lost,
-            request: Input::Lost,
-            faults: FaultSet::NONE,
-        }
-    }
-}
 
 /// What the controller decides every millisecond.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -147,9 +49,9 @@ pub struct Command {
 words! {
     /// Everything that a flipped bit must not change unseen. What a step may leave as it is are parts of their own.
     pub(crate) struct Memory {
-        hot: Hot,
+        fast: FastState,
         /// When each input was last new: how far back its loss reaches. Guidance ends before the clock wraps.
-        heard: Heard,
+        input_times: InputTimes,
         law: LawState,
         plausibility: PlausibilityState,
         /// The share of the law's torque that acts at the speed in use; 0 before there is one.
@@ -161,8 +63,8 @@ words! {
 
 words! {
     /// What most steps change.
-    struct Hot {
-        small: Small,
+    struct FastState {
+        packed: PackedState,
         last_step: Instant,
         /// How long the inputs have been valid in Standby.
         ready: Micros,
@@ -181,11 +83,11 @@ words! {
 
 /// The parts beside [`Hot`] that a step changed, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Changed(u32);
+struct ChangedParts(u32);
 
-impl Changed {
+impl ChangedParts {
     const NOTHING: Self = Self(0);
-    const HEARD: Self = Self(1);
+    const INPUT_TIMES: Self = Self(1);
     const LAW: Self = Self(2);
     const MOTION: Self = Self(4);
     const LANE: Self = Self(8);
@@ -205,7 +107,7 @@ impl Changed {
 /// The samples in use that have not gone through their checks. Not kept twice: a flip costs one check, whose sums the
 /// next one makes up for, or brings one more of the same sample, which changes nothing but how long it counts.
 #[derive(Debug, Clone, Copy, Default)]
-struct Due {
+struct PendingChecks {
     lane: bool,
     column: bool,
 }
@@ -213,7 +115,7 @@ struct Due {
 /// What is small shares a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C, align(4))]
-struct Small {
+struct PackedState {
     /// A [`Mode`] code.
     mode: u8,
     /// 1 while the last request was high.
@@ -223,13 +125,13 @@ struct Small {
     early: u8,
 }
 
-impl Small {
+impl PackedState {
     const fn word(self) -> u32 {
         u32::from_ne_bytes([self.mode, self.requested, self.late, self.early])
     }
 }
 
-impl Words for Small {
+impl Words for PackedState {
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
         let [mode, requested, late, early] = change(self.word()).to_ne_bytes();
         Self {
@@ -246,7 +148,7 @@ impl Words for Small {
 }
 
 words! {
-    struct Heard {
+    struct InputTimes {
         lane: Instant,
         column: Instant,
         motion: Instant,
@@ -258,8 +160,8 @@ impl Memory {
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
     const fn new(mode: Mode, now: Instant) -> Self {
         Self {
-            hot: Hot {
-                small: Small {
+            fast: FastState {
+                packed: PackedState {
                     mode: mode as u8,
                     // A request that is high from the start is no rising edge.
                     requested: 1,
@@ -276,7 +178,7 @@ impl Memory {
                 hands: HandsState::NEW,
                 envelope: EnvelopeState::new(now),
             },
-            heard: Heard {
+            input_times: InputTimes {
                 lane: now,
                 column: now,
                 motion: now,
@@ -291,7 +193,7 @@ impl Memory {
     }
 
     fn faults(&self) -> FaultSet {
-        FaultSet::from_bits(self.hot.kept)
+        FaultSet::from_bits(self.fast.kept)
     }
 }
 
@@ -299,9 +201,9 @@ impl Memory {
 #[derive(Debug, Clone)]
 pub struct ControllerState {
     pub(crate) memory: Redundant<Memory>,
-    history: History,
-    past: Past,
-    due: Due,
+    torque_history: TorqueHistory,
+    motion_history: MotionHistory,
+    pending: PendingChecks,
 }
 
 impl ControllerState {
@@ -320,9 +222,9 @@ impl ControllerState {
     pub(crate) fn with(mode: Mode, now: Instant) -> Self {
         Self {
             memory: Redundant::new(Memory::new(mode, now)),
-            history: History::new(),
-            past: Past::new(),
-            due: Due::default(),
+            torque_history: TorqueHistory::new(),
+            motion_history: MotionHistory::new(),
+            pending: PendingChecks::default(),
         }
     }
 
@@ -331,7 +233,7 @@ impl ControllerState {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         let mut memory = Memory::new(Mode::Fault, now);
-        memory.hot.kept = faults.bits();
+        memory.fast.kept = faults.bits();
         self.memory.set(memory);
         Command {
             torque: Torque::ZERO,
@@ -379,7 +281,7 @@ impl Controller {
 
     /// Whether configuration and state are whole.
     #[inline(always)]
-    pub(crate) fn is_whole(&self, state: &ControllerState) -> bool {
+    pub(crate) fn is_intact(&self, state: &ControllerState) -> bool {
         self.config.agrees_apart() && state.memory.agrees_apart()
     }
 
@@ -388,13 +290,13 @@ impl Controller {
     pub(crate) fn step_with<I: Injection>(
         &self,
         state: &mut ControllerState,
-        found_whole: bool,
+        is_known_intact: bool,
         now: Instant,
         applied: Torque,
         inputs: &Inputs,
         injection: &I,
     ) -> Command {
-        if !found_whole && !are_whole(&self.config, &state.memory) {
+        if !is_known_intact && !are_intact(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
         let memory = state.memory.value_mut();
@@ -404,43 +306,51 @@ impl Controller {
             applied,
             inputs,
             lane: inputs.lane,
-            elapsed: now.since(memory.hot.last_step),
+            elapsed: now.since(memory.fast.last_step),
             injection,
         };
-        memory.hot.last_step = now;
-        let mut changed = Changed::NOTHING;
-        let (history, past) = (&mut state.history, &mut state.past);
-        let command = step.run(memory, &mut changed, history, past, &mut state.due);
+        memory.fast.last_step = now;
+        let mut changed = ChangedParts::NOTHING;
+        let (torque_history, motion_history) = (&mut state.torque_history, &mut state.motion_history);
+        let command = step.run(
+            memory,
+            &mut changed,
+            torque_history,
+            motion_history,
+            &mut state.pending,
+        );
         seal(&mut state.memory, changed);
-        state.history.push(now, without(command.torque, command.probe));
+        state
+            .torque_history
+            .push(now, subtract_probe(command.torque, command.probe));
         command
     }
 }
 
 /// Copies what a step changed. A function of its own, as the comparison is.
 #[inline(never)]
-fn seal(memory: &mut Redundant<Memory>, changed: Changed) {
-    memory.seal_part(|v| &mut v.hot);
-    if changed.has(Changed::HEARD) {
-        memory.seal_part(|v| &mut v.heard);
+fn seal(memory: &mut Redundant<Memory>, changed: ChangedParts) {
+    memory.seal_part(|v| &mut v.fast);
+    if changed.has(ChangedParts::INPUT_TIMES) {
+        memory.seal_part(|v| &mut v.input_times);
     }
-    if changed.has(Changed::LAW) {
+    if changed.has(ChangedParts::LAW) {
         memory.seal_part(|v| &mut v.law);
     }
-    if changed.has(Changed::MOTION) {
+    if changed.has(ChangedParts::MOTION) {
         memory.seal_part(|v| &mut v.plausibility.motion);
         memory.seal_part(|v| &mut v.share);
     }
-    if changed.has(Changed::LANE) {
+    if changed.has(ChangedParts::LANE) {
         memory.seal_part(|v| &mut v.plausibility.lane);
     }
-    if changed.has(Changed::COLUMN) {
+    if changed.has(ChangedParts::COLUMN) {
         memory.seal_part(|v| &mut v.plausibility.column);
     }
-    if changed.has(Changed::COAST) {
+    if changed.has(ChangedParts::COAST) {
         memory.seal_part(|v| &mut v.coast);
     }
-    if changed.has(Changed::RAMP) {
+    if changed.has(ChangedParts::RAMP) {
         memory.seal_part(|v| &mut v.ramp);
     }
 }

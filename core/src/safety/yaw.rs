@@ -1,12 +1,12 @@
 //! Whether the yaw rate is believed.
 //!
-//! The lane is judged by it ([`crate::plausibility`]), so it is judged itself: no vehicle turns as fast, or changes its turning as
+//! The lane is judged by it ([`crate::safety::plausibility`]), so it is judged itself: no vehicle turns as fast, or changes its turning as
 //! fast, as the first two bounds say; and where wheel angle and speed say that the vehicle goes by the bicycle model, what differs
 //! from that model, but for a constant that is learnt slowly, is summed with a memory of 1 s. What fails is not believed until it
 //! has agreed for a while, and guidance goes on without.
 
 use crate::quantity::{FRAC_BITS, Micros, Radians, Speed, TurningRate, leak, per_second, product};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// Largest honest change of the yaw rate between two messages: a swerve has 4 rad/s2, which is 0.1 rad/s in 25 ms.
 pub const STEP: TurningRate = TurningRate::from_rad_per_s(0.15);
@@ -57,7 +57,7 @@ impl YawState {
     }
 
     /// Whether wheel angle and speed say something else, by a quarter of the margin.
-    pub(crate) fn is_doubtful(&self) -> bool {
+    pub(crate) fn is_suspect(&self) -> bool {
         self.sum.bits().saturating_abs() > MARGIN.bits() >> 2
     }
 

@@ -135,7 +135,7 @@ impl Events {
     /// One event.
     #[must_use]
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
-    pub const fn of(event: Event) -> Self {
+    pub const fn only(event: Event) -> Self {
         Self(1 << event as u32)
     }
 

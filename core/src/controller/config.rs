@@ -1,7 +1,7 @@
 //! The parameters checked, and turned into the immutable configuration of every block.
 //!
 //! Everything is `const`, so that a firmware image checks its built-in set at compile time and carries no float code
-//! for it. Not here: the list of parameters with their ranges ([`crate::params`]).
+//! for it. Not here: the list of parameters with their ranges ([`crate::controller::params`]).
 
 #![expect(
     clippy::as_conversions,
@@ -11,19 +11,19 @@
     reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
 )]
 
-use crate::envelope::Envelope;
+use crate::controller::params::{ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
-use crate::monitor::Monitor;
-use crate::params::{ParamError, Params, in_range};
-use crate::plausibility::Plausibility;
-use crate::probe::Probe;
+use crate::law::probe::Probe;
+use crate::law::schedule::Schedule;
 use crate::quantity::{
     CurvaturePerAngle, Micros, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
     TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
-use crate::redundant::words;
-use crate::schedule::Schedule;
+use crate::safety::envelope::Envelope;
+use crate::safety::monitor::Monitor;
+use crate::safety::plausibility::Plausibility;
+use crate::safety::redundant::words;
 
 words! {
     /// The checked configuration of every block of the controller.
@@ -84,11 +84,11 @@ impl Config {
             }
             i += 1;
         }
-        Ok(Self::of(p))
+        Ok(Self::from_params(p))
     }
 
     /// The configuration of parameters that are in range.
-    const fn of(p: &Params) -> Self {
+    const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
         Self {
             law: Law {

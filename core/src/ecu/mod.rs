@@ -10,21 +10,22 @@ use core::hint::black_box;
 
 use heapless::Vec;
 
-use crate::actuator::Motor;
-use crate::background::Background;
 use crate::bus::e2e::ReceiverState;
 use crate::bus::messages::{FaultRecord, Guidance, Message, ResetCause, Warning};
 use crate::bus::{Frame, Reject};
-use crate::config::{Config, Setup};
-use crate::controller::{Column, Command, Controller, ControllerState, Input, Inputs};
-use crate::envelope::LimitReason;
+use crate::controller::config::{Config, Setup};
+use crate::controller::injection::{Injection, NoInjection};
+use crate::controller::inputs::{ColumnState, Input, Inputs};
+use crate::controller::{Command, Controller, ControllerState};
 use crate::estimator::Sample;
-use crate::faults::{Fault, FaultSet, History};
-use crate::injection::{Injection, NoInjection};
-use crate::modes::Mode;
-use crate::monitor::{Evidence, Monitor, MonitorState};
+use crate::estimator::background::Background;
 use crate::quantity::{Instant, Torque};
-use crate::redundant::{Redundant, words};
+use crate::safety::actuator::Motor;
+use crate::safety::envelope::LimitReason;
+use crate::safety::faults::{Fault, FaultHistory, FaultSet};
+use crate::safety::modes::Mode;
+use crate::safety::monitor::{Evidence, Monitor, MonitorState};
+use crate::safety::redundant::{Redundant, words};
 use receivers::{Accepted, Receivers};
 
 /// How the ECU came up: what the firmware knows before the first step.
@@ -97,7 +98,7 @@ pub struct Ecu {
     monitor: Redundant<Monitor>,
     memory: Redundant<Memory>,
     receivers: Receivers,
-    history: History,
+    history: FaultHistory,
     reset: ResetCause,
     /// In which step the warnings of a mode began.
     warned_at: Option<(u32, Mode)>,
@@ -160,7 +161,7 @@ impl Ecu {
             monitor: Redundant::new(setup.monitor),
             memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),
-            history: History::new(now),
+            history: FaultHistory::new(now),
             reset: boot.reset,
             warned_at: None,
             is_test_due: false,
@@ -191,19 +192,19 @@ impl Ecu {
         if injection.lane_never_ages() {
             self.receivers.renew_lane(now);
         }
-        let whole = self.is_whole();
+        let intact = self.is_intact();
         let mut inputs = Inputs::lost();
-        if whole || (self.memory.get().is_some() && self.receivers.are_whole()) {
+        if intact || (self.memory.get().is_some() && self.receivers.are_intact()) {
             self.receivers.take(now, &mut inputs);
         } else {
-            self.begin_anew(now);
+            self.reset_state(now);
         }
         let last = &self.memory.value().step;
         let (applied, steps) = (last.applied, last.count);
         let elapsed_us = now.since(last.at).us();
         let mut faults = FaultSet::from_bits(last.faults);
         // One whose limits are damaged permits nothing.
-        let monitor = if whole {
+        let monitor = if intact {
             Some(self.monitor.value())
         } else {
             self.monitor.get()
@@ -217,9 +218,9 @@ impl Ecu {
         }
         faults.insert_if(monitor.is_none(), Fault::Memory);
         inputs.faults = inputs.faults.union(faults);
-        let mut command = self
-            .controller
-            .step_with(&mut self.state, whole, now, applied, &inputs, injection);
+        let mut command =
+            self.controller
+                .step_with(&mut self.state, intact, now, applied, &inputs, injection);
         command.torque = Guidance::rounded(command.torque);
         let mut guidance = self.guidance(&command, steps);
 
@@ -227,7 +228,7 @@ impl Ecu {
         let evidence = Evidence {
             lane: accepted.lane.as_ref(),
             column: accepted.column.as_ref(),
-            demand: accepted.demand.as_ref(),
+            request: accepted.request.as_ref(),
             guidance: guidance.bytes(),
             elapsed_us,
         };
@@ -274,18 +275,18 @@ impl Ecu {
 
     /// Whether all that is kept twice is whole. A function of its own, for the reasons of `redundant::are_whole`.
     #[inline(never)]
-    fn is_whole(&self) -> bool {
+    fn is_intact(&self) -> bool {
         self.memory.agrees_apart()
             && self.monitor.agrees_apart()
-            && self.receivers.are_whole()
-            && self.controller.is_whole(&self.state)
+            && self.receivers.are_intact()
+            && self.controller.is_intact(&self.state)
     }
 
     /// The redundant state is damaged: nothing of it can be used. What comes in its place knows nothing but the
     /// memory fault, which latches.
     #[cold]
     #[inline(never)]
-    fn begin_anew(&mut self, now: Instant) {
+    fn reset_state(&mut self, now: Instant) {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
         self.state = ControllerState::new(now);
@@ -363,9 +364,9 @@ impl Ecu {
 fn seal(memory: &mut Redundant<Memory>, is_new_picture: bool) {
     let memory = black_box(memory);
     memory.seal_part(|v| &mut v.step);
-    memory.seal_part(|v| &mut v.monitor.now);
+    memory.seal_part(|v| &mut v.monitor.step);
     if is_new_picture {
-        memory.seal_part(|v| &mut v.monitor.picture);
+        memory.seal_part(|v| &mut v.monitor.lane_state);
     }
 }
 
@@ -383,7 +384,7 @@ fn has_test_come(is_due: &mut bool, steps: u32, inputs: &Inputs) -> bool {
 
 /// A new sample of the column, for the estimator.
 #[inline(always)]
-fn sample(column: &Input<Column>, now: Instant, applied: Torque) -> Option<Sample> {
+fn sample(column: &Input<ColumnState>, now: Instant, applied: Torque) -> Option<Sample> {
     match column {
         Input::New(column) => Some(Sample {
             at: now,
@@ -404,7 +405,7 @@ fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injectio
         let evidence = Evidence {
             lane: None,
             column: None,
-            demand: None,
+            request: None,
             guidance: &guidance,
             elapsed_us: 1000,
         };

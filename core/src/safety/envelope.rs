@@ -13,7 +13,7 @@
 //! | driver override | from 0.8 N.m of opposing driver torque the bound shrinks by 3 N.m per N.m |
 
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, per_second, product};
-use crate::redundant::words;
+use crate::safety::redundant::words;
 
 /// Which limit held the torque back.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -58,7 +58,7 @@ impl LimitReason {
 }
 
 words! {
-    /// Limits of the torque; immutable once validated by [`crate::params`].
+    /// Limits of the torque; immutable once validated by [`crate::controller::params`].
     pub struct Envelope {
         /// L.
         pub(crate) absolute: Torque,

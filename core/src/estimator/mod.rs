@@ -37,9 +37,10 @@
 )]
 
 mod average;
+pub(crate) mod background;
 
+use crate::law::sine::{ONE, QUARTER, sine};
 use crate::quantity::{Instant, Radians, Ratio, Torque};
-use crate::sine::{ONE, QUARTER, sine};
 use average::{Average, Change, Work};
 
 /// What the estimator knows of the probe and the driver's arm; immutable.
