@@ -386,7 +386,7 @@ fn two_samples_share_a_rate_over_100_ms() {
 fn what_the_vehicle_did_is_bounded_on_both_sides() {
     for sign in [1.0, -1.0] {
         for (turned, faster) in [(0.03, 0.2), (0.04, 0.3), (0.05, 0.4), (100.0, 100.0)] {
-            let since = Since::new(
+            let since = EgoMotion::new(
                 Radians::from_rad(sign * turned),
                 TurningRate::from_rad_per_s(sign * faster),
                 Speed::from_m_per_s(20.0),

@@ -1,10 +1,10 @@
 //! Where the lane goes on to without a picture, and what is known of how the vehicle turned, against the kinematics in f64.
 
-use haptic_core::config::Config;
+use haptic_core::controller::config::Config;
 use haptic_core::law::LaneSample;
-use haptic_core::past::Past;
-use haptic_core::plausibility::PlausibilityState;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Speed, TurningRate};
+use haptic_core::safety::motion_history::MotionHistory;
+use haptic_core::safety::plausibility::PlausibilityState;
 
 /// t'_n and t'_f, s.
 const NEAR_S: f64 = 0.3;
@@ -34,7 +34,7 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
         (25.0, -0.08, 0.05, 0.03),
     ] {
         for seen_s in [0.2, 0.6] {
-            let (mut state, mut past) = (PlausibilityState::NEW, Past::new());
+            let (mut state, mut motion) = (PlausibilityState::NEW, MotionHistory::new());
             let measured = TurningRate::from_rad_per_s(turn);
             checks.motion(&mut state, Speed::from_m_per_s(v), Some(measured));
             // The far point's direction from the vehicle's.
@@ -43,7 +43,7 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
             for ms in 0..=(seen_s * 1e3) as u32 {
                 let t = f64::from(ms) * 1e-3;
                 if ms % 10 == 0 {
-                    past.turn(after(t), measured);
+                    motion.record_turning_rate(after(t), measured);
                 }
                 if ms % 8 == 0 {
                     last = LaneSample {
@@ -51,13 +51,13 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
                         e_theta: Radians::from_rad(e_theta(t)),
                         at: after(t),
                     };
-                    past.see(after(t), after(t), last.e_theta);
+                    motion.record_line(after(t), after(t), last.e_theta);
                 }
             }
             let seen_until = f64::from((seen_s * 1e3) as u32 / 8 * 8) * 1e-3;
             for later in [0.01, 0.1, 0.4] {
                 let t = seen_until + later;
-                let lane = checks.gone_on(&state, &past, after(t), &last, after(t));
+                let lane = checks.extrapolated_lane(&state, &motion, after(t), &last, after(t));
                 let between = FAR_S - NEAR_S;
                 let rate = if seen_until >= between {
                     // The heading of then is so much less.
@@ -85,13 +85,13 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
 #[test]
 fn what_is_longer_ago_than_is_remembered_was_as_the_oldest_that_is() {
     for rate in [0.1, -0.1] {
-        let mut past = Past::new();
+        let mut motion = MotionHistory::new();
         for ms in (0..=1000).step_by(2) {
             let rate = if ms < 960 { rate } else { 0.0 };
-            past.turn(after(f64::from(ms) * 1e-3), TurningRate::from_rad_per_s(rate));
+            motion.record_turning_rate(after(f64::from(ms) * 1e-3), TurningRate::from_rad_per_s(rate));
         }
         for ago in [0.02, 0.05, 0.06, 0.1, 0.3, 0.5] {
-            let (turned, before) = past.turned(after(1.0), after(1.0 - ago));
+            let (turned, before) = motion.turned(after(1.0), after(1.0 - ago));
             let (share, then) = (turned.rad() / rate, before.rad_per_s() / rate);
             assert!(
                 (share - f64::max(ago - 0.04, 0.0)).abs() < 1e-4,

@@ -2,8 +2,8 @@
 //! that an output tells when it left.
 
 use crate::rig::{Rig, SPEED};
-use haptic_core::faults::{Fault, FaultSet};
-use haptic_core::modes::Mode;
+use haptic_core::safety::faults::{Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 /// A torque to one side that grows by so much a step, within the 4 N.m/s of the envelope and the 1.2 N.m in 250 ms of its
 /// window, and the torques applied.
