@@ -400,6 +400,43 @@ fn a_torque_on_its_way_back_is_not_astray() {
     }
 }
 
+/// However often, 20 steps outside are allowed again after one inside.
+#[test]
+fn steps_outside_are_counted_since_the_last_inside() {
+    for sign in [1, -1] {
+        let (outside, inside) = (sign * counts(301).0, sign * counts(299).0);
+        let mut bench = Bench::at(5.0, inside);
+        for _ in 0..5 {
+            for torque in [inside].into_iter().chain([outside; 20]) {
+                assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, ACTIVE), 1000));
+            }
+        }
+        assert!(!bench.show(Some(lane(0, 0, 0)), None, guidance(outside, ACTIVE), 1000));
+    }
+}
+
+/// 8 m/s towards the line of 0.54 s ago. For 0.32 s beyond 40 ms the position goes on: 2.56 m are 1280 mN.m, with 100 for the
+/// rate and a band of 300 and of 500 for the time.
+#[test]
+fn a_sample_is_carried_for_320_ms_at_most() {
+    for sign in [1, -1] {
+        let permitted = |mnm: i64| {
+            let torque = sign * counts(mnm).0;
+            let mut bench = Bench::at(5.0, torque);
+            for k in -30..=0 {
+                let sample = lane(sign * k * 524, 0, 0);
+                assert!(bench.show(Some(sample), None, guidance(torque, FADE), 8000));
+            }
+            for _ in 0..540 {
+                assert!(bench.torque(torque, FADE));
+            }
+            (0..60).take_while(|_| bench.torque(torque, ACTIVE)).count()
+        };
+        assert_eq!(permitted(2180 - 10), 60);
+        assert_eq!(permitted(2180 + 30), 20);
+    }
+}
+
 /// 2 N.m to the wrong side of a lane that asks for 0.5 N.m, falling by a milli-newton-metre in one step of 16.
 #[test]
 fn a_dither_does_not_hide_a_torque_that_is_astray() {
