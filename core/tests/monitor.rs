@@ -14,9 +14,14 @@ fn guidance(torque: i64, mode: u64) -> [u8; 8] {
     (((torque as u64) & 0xFFFF) << 12 | mode << 32).to_le_bytes()
 }
 
-/// e_y in 2^-13 m from bit 12, e_theta in 2^-16 rad from bit 29, age in 0.1 ms from bit 46, valid bit 55.
+/// e_y in 2^-13 m from bit 12, e_theta in 2^-16 rad from bit 29, age in 0.1 ms from bit 46, valid bit 55, and how often 512 come to
+/// the age from bit 56.
 fn lane(e_y: i64, e_theta: i64, age: u64) -> [u8; 8] {
-    let word = ((e_y as u64) & 0x1_FFFF) << 12 | ((e_theta as u64) & 0x1_FFFF) << 29 | age << 46 | 1 << 55;
+    let word = ((e_y as u64) & 0x1_FFFF) << 12
+        | ((e_theta as u64) & 0x1_FFFF) << 29
+        | (age & 0x1FF) << 46
+        | 1 << 55
+        | (age >> 9) << 56;
     word.to_le_bytes()
 }
 
@@ -203,7 +208,14 @@ fn against_the_driver() {
 #[test]
 fn old_lane_data_in_active() {
     // 360 ms, and 1.4 s in which the lane goes on.
-    for (age, last_good_ms) in [(0, 1760), (100, 1750), (400, 1720)] {
+    for (age, last_good_ms) in [
+        (0, 1760),
+        (100, 1750),
+        (400, 1720),
+        (512, 1708),
+        (1500, 1610),
+        (2047, 1555),
+    ] {
         let mut bench = Bench::at(5.0, 40);
         assert!(bench.show(Some(lane(0, 0, age)), None, guidance(40, ACTIVE), 1000));
         for _ in 0..last_good_ms {
