@@ -55,8 +55,20 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
                 }
             }
             let seen_until = f64::from((seen_s * 1e3) as u32 / 8 * 8) * 1e-3;
-            for later in [0.01, 0.1, 0.4] {
+            for (later, stops) in [
+                (0.01, false),
+                (0.1, false),
+                (0.4, false),
+                (0.1, true),
+                (0.4, true),
+            ] {
                 let t = seen_until + later;
+                // It may turn no more from the last picture on.
+                let (mut state, mut motion) = (state, motion.clone());
+                let turn_since = if stops { 0.0 } else { turn };
+                let measured = TurningRate::from_rad_per_s(turn_since);
+                checks.motion(&mut state, Speed::from_m_per_s(v), Some(measured));
+                motion.record_turning_rate(after(seen_until + 1e-6), measured);
                 let lane = checks.extrapolated_lane(&state, &motion, after(t), &last, after(t));
                 let between = FAR_S - NEAR_S;
                 let rate = if seen_until >= between {
@@ -64,9 +76,12 @@ fn the_lane_goes_on_as_line_and_vehicle_turn() {
                     let near = e_theta(seen_until - between) - turn * between;
                     v * near - NEAR_S * v * turn
                 } else {
-                    v * e_theta(seen_until) - FAR_S * v * turn
+                    v * e_theta(seen_until) - FAR_S * v * turn_since
                 };
-                let (e_y, e_theta) = (0.4 + rate * later, e_theta(t));
+                let (e_y, e_theta) = (
+                    0.4 + rate * later,
+                    e_theta(seen_until) + (bend - turn_since) * later,
+                );
                 let context =
                     format!("{v} {turn} {bend} {direction}, seen {seen_s} s, {later} s later: {lane:?}");
                 assert!((lane.e_y.m() - e_y).abs() < 2e-3, "{e_y} m: {context}");
