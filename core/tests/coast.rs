@@ -348,3 +348,22 @@ fn a_probe_ends_where_trust_does() {
         assert_eq!(rig.applied, 0.0);
     }
 }
+
+/// Pictures that come back with the line 0.1 m beside where it went on to: K_1*a1' of it, as if it had always been there. As a
+/// rate within one picture it would ask for as much again.
+#[test]
+fn where_pictures_come_back_is_no_rate() {
+    for sign in [1.0, -1.0] {
+        let mut rig = beside(0.0);
+        rig.silent[LANE] = true;
+        rig.run(100);
+        rig.silent[LANE] = false;
+        rig.lane.e_y = Metres::from_m(0.1 * sign);
+        let most = (0..100).map(|_| {
+            rig.tick();
+            rig.applied * sign
+        });
+        let most = most.fold(0.0, f64::max);
+        assert!((0.045..0.0505).contains(&most), "{most}");
+    }
+}

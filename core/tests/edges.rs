@@ -454,3 +454,24 @@ fn a_yaw_rate_is_there_if_it_was_measured() {
     assert_eq!(Motion::new(speeds, Some(rate)).yaw_rate(), Some(rate));
     assert_eq!(Motion::new(speeds, None).yaw_rate(), None);
 }
+
+/// Steps that nobody asked for, and late ones, are a fault in a row only.
+#[test]
+fn steps_out_of_time_are_counted_in_a_row() {
+    for (tolerated, us) in [(3, 400), (1, 2600)] {
+        let mut rig = Rig::active_in_curve(0.4);
+        for _ in 0..20 {
+            for _ in 0..tolerated {
+                let step = rig.tick_after(us);
+                assert_eq!(step.command.mode, Mode::Active, "{us} us");
+            }
+            let step = rig.run(20);
+            assert_eq!(step.command.mode, Mode::Active, "{us} us");
+        }
+        for _ in 0..tolerated {
+            rig.tick_after(us);
+        }
+        let step = rig.tick_after(us);
+        assert!(step.command.faults.contains(Fault::Deadline), "{us} us");
+    }
+}

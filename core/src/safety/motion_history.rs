@@ -41,6 +41,17 @@ impl Heading {
         rate: TurningRate::ZERO,
     };
 
+    /// The same at an instant before it, if it turned as fast before: for half a second at most.
+    #[cold]
+    fn earlier(&self, at: Instant) -> Self {
+        let turned = per_second(self.rate.bits(), self.at.since(at));
+        Self {
+            at,
+            psi: self.psi.wrapping_sub(turned),
+            rate: self.rate,
+        }
+    }
+
     /// The heading at an instant not before this one.
     fn psi_at(&self, at: Instant) -> I8F24 {
         self.psi
@@ -81,14 +92,14 @@ impl MotionHistory {
         self.headings[self.newest % RING] = Heading { at: now, psi, rate };
     }
 
-    /// The heading known last before an instant, or the oldest.
+    /// The heading known last before an instant, or that of then if the vehicle turned as it did at the oldest.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn heading(&self, now: Instant, at: Instant) -> Heading {
         let age = now.since(at);
         let place = |back: usize| &self.headings[self.newest.wrapping_sub(back) % RING];
         let found = (0..RING).map(place).find(|heading| now.since(heading.at) >= age);
-        *found.unwrap_or_else(|| place(RING.wrapping_sub(1)))
+        found.map_or_else(|| place(RING.wrapping_sub(1)).earlier(at), |heading| *heading)
     }
 
     /// How far the vehicle turned from an instant until now, and the rate at which it turned before then: over 50 ms, the

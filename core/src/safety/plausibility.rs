@@ -586,6 +586,33 @@ mod tests {
         }
     }
 
+    /// A yaw rate of 0.02 rad/s more than the wheel's, as on a bank: learnt with a lag of 16 s.
+    #[test]
+    fn without_a_yaw_rate_the_wheel_turns_by_what_it_was_more() {
+        let wheel = 0.05 / (CURVATURE_GAIN_PER_M * 20.0) * (1.0 + STABILITY_FACTOR_S2_PER_M2 * 400.0);
+        for (sign, by_wheel) in [(1.0, 0.0), (-1.0, 0.0), (1.0, 0.05), (-1.0, 0.05)] {
+            let mut state = PlausibilityState::NEW;
+            let (speed, passed) = (Speed::from_m_per_s(20.0), Micros::from_ms(10));
+            CHECKS.motion(&mut state, speed, None);
+            state.set_wheel_angle(Radians::from_rad(wheel * by_wheel / 0.05));
+            let measured = TurningRate::from_rad_per_s(by_wheel + sign * 0.02);
+            for _ in 0..2000 {
+                let accepted = state.accepted_yaw_rate(measured, passed);
+                assert_eq!(accepted, Some(measured));
+                CHECKS.motion(&mut state, speed, accepted);
+                assert_eq!(state.turning(), measured);
+            }
+            let expected = by_wheel + sign * 0.02 * (1.0 - f64::exp(-20.0 / 16.0));
+            // In the step in which the lane denies it, and from the next message on.
+            state.distrust_yaw_rate();
+            for _ in 0..2 {
+                let turning = state.turning().rad_per_s();
+                assert!((turning - expected).abs() < 1e-3, "{turning}, not {expected}");
+                CHECKS.motion(&mut state, speed, None);
+            }
+        }
+    }
+
     #[test]
     fn a_sample_that_comes_twice_says_nothing_new() {
         let (mut state, mut motion_history) = (PlausibilityState::NEW, MotionHistory::new());
@@ -723,6 +750,9 @@ mod tests {
                     moved,
                     "{sum_rad}, {is_alive}"
                 );
+                // What a wrong yaw rate predicted is not held against the lane.
+                let used = Plausibility::used_margins(&state).0;
+                assert_eq!(used == Metres::ZERO, moved == LaneMotion::ContradictsYawRate);
             }
         }
     }
