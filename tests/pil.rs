@@ -157,8 +157,7 @@ fn run_cycles(
         guiding += u32::from(step.command.torque != Torque::ZERO);
         let background = ecu.background_step();
         if let Some(frame) = background {
-            let data = frame.data().try_into().unwrap();
-            let reading = Telemetry::unpack(u64::from_le_bytes(data)).unwrap().k_hg;
+            let reading = Telemetry::unpack(frame.data().try_into().unwrap()).unwrap().k_hg;
             // An LSB of the bus is 2^-10.
             let counts = |ratio: Ratio| (1024.0 * ratio.si()) as i32;
             readings.extend(reading.map(|r| [counts(r.k_hg), counts(r.deviation)]));

@@ -103,9 +103,7 @@ impl Model for Driver {
         let names = FIELDS.iter().map(|field| field.name);
         let (parameters, arm): (DriverParameters, ArmInFile) =
             from_numbers(names.zip(values[FIRST..].iter().copied()))?;
-        parameters
-            .check()
-            .and_then(|()| arm.check())?;
+        parameters.check().and_then(|()| arm.check())?;
         let (k_d, k_hg) = (values[K_D], values[K_HG]);
         self.vision = Vision::new(&parameters);
         self.arm = Some(Arm::new(&parameters, ArmGains { k_d, k_hg }));

@@ -586,7 +586,7 @@ impl<I: Injection> Step<'_, I> {
         if let (true, Some(column)) = (self.follows_activity(), self.inputs.column.value()) {
             let least = self.config.least_share;
             let share = self.activity.share(least, column.driver_torque, self.applied);
-            demanded = Torque::from_bits(share_of(share.bits(), demanded.bits()));
+            demanded = Torque::from_fixed(share_of(share.fixed(), demanded.fixed()));
         }
         let demanded = self.injection.law(demanded);
         // A share: more than all or less than nothing is a host's mistake.

@@ -44,7 +44,7 @@ impl Heading {
     /// The same at an instant before it, if it turned as fast before: for half a second at most.
     #[cold]
     fn earlier(&self, at: Instant) -> Self {
-        let turned = per_second(self.rate.bits(), self.at.since(at));
+        let turned = per_second(self.rate.fixed(), self.at.since(at));
         Self {
             at,
             psi: self.psi.wrapping_sub(turned),

@@ -171,7 +171,7 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
     }
     let law = base.guidance().controller.law;
     if law != 0.0 {
-        return Err(format!("guidance.law = {law}: a map is of the paper's law, 0"));
+        return Err(format!("guidance.law = {law}: a map is of the paper's law, 0").into());
     }
     let scenario = base
         .to_builder()

@@ -9,9 +9,9 @@
 use std::fmt;
 use std::marker::PhantomData;
 
-use serde::de::value::MapDeserializer;
 /// Why numbers by name are no table: a name that there is not, or one that lacks.
 pub use serde::de::value::Error as NotATable;
+use serde::de::value::MapDeserializer;
 use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, MapAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 

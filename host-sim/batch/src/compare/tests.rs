@@ -171,8 +171,7 @@ fn tuning_varies_what_a_file_leaves_open() {
 /// Two worlds, the second with another muscle: half of the drives are those of a file without worlds, the ratio is that of the sums.
 #[test]
 fn worlds_are_places_with_the_same_seeds_and_ratios_are_those_of_the_rows() {
-    let worlds =
-        "[[world]]\nname = 'as-it-is'\n[[world]]\nname = 'slow'\nscenario = { driver = { t_nms_s = 0.15 } }\n";
+    let worlds = "[[world]]\nname = 'as-it-is'\n[[world]]\nname = 'slow'\nscenario = { driver = { t_nms_s = 0.15 } }\n";
     let found = results(&FILE.replacen("[faults]", &format!("{worlds}[faults]"), 1));
     let plain = results(FILE);
     let of_world =
