@@ -328,34 +328,20 @@ struct Name<T>(&'static str, PhantomData<T>);
 
 impl<'de, T: Fields> Deserialize<'de> for Name<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Known<T>(PhantomData<T>);
-
-        impl<T: Fields> Visitor<'_> for Known<T> {
-            type Value = Name<T>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "a field of [{}]", T::TABLE)
-            }
-
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Name<T>, E> {
-                let fields = T::fields();
-                let known = fields.iter().find(|field| field.name == name);
-                known.map(|field| Name(field.name, PhantomData)).ok_or_else(|| {
-                    let names: Vec<_> = fields.iter().map(|field| format!("`{}`", field.name)).collect();
-                    E::custom(format!(
-                        "unknown field `{name}`, expected one of {}",
-                        names.join(", ")
-                    ))
-                })
-            }
-        }
-
-        deserializer.deserialize_identifier(Known(PhantomData))
+        let name = String::deserialize(deserializer)?;
+        let fields = T::fields();
+        let known = fields.iter().find(|field| field.name == name);
+        known.map(|field| Name(field.name, PhantomData)).ok_or_else(|| {
+            let names: Vec<_> = fields.iter().map(|field| format!("`{}`", field.name)).collect();
+            de::Error::custom(format!(
+                "unknown field `{name}`, expected one of {}",
+                names.join(", ")
+            ))
+        })
     }
 }
 
-/// Names of versions before units stood in them that are not the new name without its unit, or had another unit: table,
-/// old name, new name, old unit, and how much of the new unit that is.
+/// Names that older files have, where they are not the name without its unit or had another unit: table, old name, new name, old unit, and how much of the new unit that is.
 const OLD_NAMES: [(&str, &str, &str, &str, f64); 21] = [
     ("", "speed", "speed_m_per_s", "km/h", 1.0 / 3.6),
     ("", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),

@@ -19,8 +19,10 @@ fn by_time(points: &[(f64, f64)]) -> Speed {
 }
 
 fn by_place(points: &[(f64, f64)]) -> Speed {
-    let kmh: Vec<f64> = points.iter().map(|p| p.1).collect();
-    Speed::by_place_kmh(points.iter().map(|p| p.0).collect(), &kmh)
+    Speed::ByPlace {
+        place_m: points.iter().map(|p| p.0).collect(),
+        speed_m_per_s: points.iter().map(|p| p.1 / 3.6).collect(),
+    }
 }
 
 fn course(text: &str) -> Course {

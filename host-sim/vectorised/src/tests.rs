@@ -131,8 +131,12 @@ fn changing(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) 
         let time = vec![between(1.0, 5.0), between(12.0, 15.0), between(22.0, 26.0)];
         builder.speed(Speed::by_time_kmh(time, &kmh))
     } else {
-        let place = vec![between(10.0, 80.0), between(250.0, 300.0), between(480.0, 600.0)];
-        builder.speed(Speed::by_place_kmh(place, &kmh))
+        let place_m = vec![between(10.0, 80.0), between(250.0, 300.0), between(480.0, 600.0)];
+        let speed_m_per_s = kmh.iter().map(|kmh| kmh / 3.6).collect();
+        builder.speed(Speed::ByPlace {
+            place_m,
+            speed_m_per_s,
+        })
     }
 }
 

@@ -133,8 +133,11 @@ fn unless_default<T: Fields + PartialEq>(table: T) -> Option<InFile<T>> {
 /// The table `[driver]`.
 type DriverInFile = (DriverParameters, ArmInFile);
 
+/// How a list of fields is asked for.
+pub type FieldsOf = fn() -> Vec<&'static Field>;
+
 /// The lists of a scenario's tables, by the tables' names.
-pub const TABLES: [(&str, fn() -> Vec<&'static Field>); 8] = [
+pub const TABLES: [(&str, FieldsOf); 8] = [
     (DriverInFile::TABLE, DriverInFile::fields),
     (VehicleParameters::TABLE, VehicleParameters::fields),
     (GuidanceInFile::TABLE, GuidanceInFile::fields),

@@ -69,15 +69,6 @@ impl Speed {
         }
     }
 
-    /// Through speeds (km/h) by place (m).
-    pub fn by_place_kmh(place_m: Vec<f64>, kmh: &[f64]) -> Self {
-        let speed_m_per_s = kmh.iter().map(|kmh| kmh / 3.6).collect();
-        Self::ByPlace {
-            place_m,
-            speed_m_per_s,
-        }
-    }
-
     /// What it is at the start, km/h.
     pub fn start_kmh(&self) -> f64 {
         let points = match self {

@@ -10,7 +10,10 @@ fn by_time(time: &[f64], kmh: &[f64]) -> Speed {
 }
 
 fn by_place(place: &[f64], kmh: &[f64]) -> Speed {
-    Speed::by_place_kmh(place.to_vec(), kmh)
+    Speed::ByPlace {
+        place_m: place.to_vec(),
+        speed_m_per_s: kmh.iter().map(|kmh| kmh / 3.6).collect(),
+    }
 }
 
 fn close(found: f64, wanted: f64, within: f64) {
