@@ -19,6 +19,7 @@ use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
 use crate::safety::envelope::{EnvelopeState, LimitReason};
 use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::frozen_torque::FrozenTorqueState;
 use crate::safety::hands::HandsState;
 use crate::safety::modes::Mode;
 use crate::safety::motion_history::MotionHistory;
@@ -107,10 +108,12 @@ impl ChangedParts {
 
 /// The samples in use that have not gone through their checks. Not kept twice: a flip costs one check, whose sums the
 /// next one makes up for, or brings one more of the same sample, which changes nothing but how long it counts.
+/// Beside them what the column's check alone knows of the driver torque.
 #[derive(Debug, Clone, Copy, Default)]
 struct PendingChecks {
     lane: bool,
     column: bool,
+    frozen_torque: FrozenTorqueState,
 }
 
 /// What is small shares a word.

@@ -15,7 +15,6 @@ use crate::quantity::{
 use crate::safety::coast::{Coast, EXTRAPOLATION_PERIOD, PictureVerdict};
 use crate::safety::envelope::{EnvelopeState, LimitReason, Situation};
 use crate::safety::faults::{Fault, FaultSet};
-use crate::safety::frozen_torque::{MOST_TURN, MOST_TURN_WHEN_TESTED};
 use crate::safety::hands::{END, WARN};
 use crate::safety::modes::{Event, Events, Mode};
 use crate::safety::motion_history::MotionHistory;
@@ -279,9 +278,11 @@ impl<I: Injection> Step<'_, I> {
         let checks = &self.config.plausibility;
         if let Some(c) = to_check(&self.inputs.column, &mut pending.column) {
             changed.add(ChangedParts::COLUMN);
-            let most_turn = most_turn(v);
-            let (torque, wheel) = (c.driver_torque, c.wheel_angle);
-            let is_alive = v.plausibility.is_torque_alive(self.now, torque, wheel, most_turn);
+            let is_tested = v.fast.packed.mode == STANDBY || v.fast.probe != ProbeState::SILENT;
+            let passed = v.plausibility.since_column(self.now);
+            let is_alive = pending
+                .frozen_torque
+                .is_alive(c.driver_torque, c.wheel_angle, passed, is_tested);
             let plausible = checks.column(
                 &mut v.plausibility,
                 self.now,
@@ -507,7 +508,7 @@ impl<I: Injection> Step<'_, I> {
         };
         let (wanted, probe) = match mode {
             Mode::Active => {
-                let probe = self.probe(v, changed);
+                let probe = self.probe(v);
                 (add_probe(demanded, probe), probe)
             }
             // A driver who pushed the torque below its ramp does not get it back.
@@ -562,13 +563,9 @@ impl<I: Injection> Step<'_, I> {
     }
 
     /// The probe's torque, while it is wanted or on its way out.
-    fn probe(&self, v: &mut Memory, changed: &mut ChangedParts) -> Option<Torque> {
+    fn probe(&self, v: &mut Memory) -> Option<Torque> {
         // Without trust left there is no guidance to ride on.
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
-        if wanted && v.fast.probe == ProbeState::SILENT && self.config.probe.is_any() {
-            changed.add(ChangedParts::COLUMN);
-            v.plausibility.column.frozen_torque.restart();
-        }
         self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
@@ -604,15 +601,6 @@ impl<I: Injection> Step<'_, I> {
 fn to_check<T: Copy>(input: &Input<T>, is_pending: &mut bool) -> Option<T> {
     let was_pending = core::mem::replace(is_pending, matches!(input, Input::New(_)) && !*is_pending);
     input.value().filter(|_| was_pending)
-}
-
-/// How far the wheel may turn while the driver torque is the same to the bit.
-fn most_turn(v: &Memory) -> Radians {
-    if v.fast.packed.mode == STANDBY || v.fast.probe != ProbeState::SILENT {
-        MOST_TURN_WHEN_TESTED
-    } else {
-        MOST_TURN
-    }
 }
 
 fn add_probe(guidance: Torque, probe: Option<Torque>) -> Torque {

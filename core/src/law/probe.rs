@@ -57,11 +57,6 @@ pub const SIXTEENTH: u32 = 1 << 28;
 const MAX_ELAPSED_US: u32 = 2_000;
 
 impl Probe {
-    /// Whether there is one.
-    pub(crate) fn is_any(&self) -> bool {
-        self.amplitude != Torque::ZERO
-    }
-
     /// The torque to add now; `None` once it is silent.
     #[must_use]
     pub fn step(&self, state: &mut ProbeState, elapsed: Micros, wanted: bool) -> Option<Torque> {
@@ -71,7 +66,7 @@ impl Probe {
         } else {
             state.gain.saturating_sub(advance)
         };
-        if state.gain == 0 || !self.is_any() {
+        if state.gain == 0 || self.amplitude == Torque::ZERO {
             *state = ProbeState::SILENT;
             return None;
         }

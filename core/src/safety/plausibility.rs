@@ -37,7 +37,6 @@ use crate::quantity::{
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
     leak, per_second, product, product_below, product_of_three, product_within, saturate, signed_quotient,
 };
-use crate::safety::frozen_torque::FrozenTorqueState;
 use crate::safety::motion_history::MotionHistory;
 use crate::safety::redundant::words;
 use crate::safety::yaw::{BIAS_SHIFT, YawState};
@@ -110,7 +109,6 @@ words! {
         sum: AngularImpulse,
         /// The torque that the column lacks in the long run.
         bias: Torque,
-        pub(crate) frozen_torque: FrozenTorqueState,
     }
 }
 
@@ -144,7 +142,6 @@ impl PlausibilityState {
             checked: Radians::ZERO,
             sum: AngularImpulse::ZERO,
             bias: Torque::ZERO,
-            frozen_torque: FrozenTorqueState::NEW,
         },
     };
 
@@ -181,23 +178,13 @@ impl PlausibilityState {
         ))
     }
 
-    /// Takes a driver torque and a wheel angle, before [`Plausibility::column`] does. Whether the torque moves, if it has to
-    /// where the wheel turns by more than `most_turn`.
-    #[must_use]
-    pub(crate) fn is_torque_alive(
-        &mut self,
-        now: Instant,
-        driver: Torque,
-        wheel: Radians,
-        most_turn: Radians,
-    ) -> bool {
-        let column = &mut self.column;
-        let passed = if column.is_known != 0 {
-            now.since(column.at)
+    /// How long ago the column was checked last; no time if that is not known.
+    pub(crate) fn since_column(&self, now: Instant) -> Micros {
+        if self.column.is_known != 0 {
+            now.since(self.column.at)
         } else {
             Micros::from_us(0)
-        };
-        column.frozen_torque.is_alive(driver, wheel, passed, most_turn)
+        }
     }
 
     /// Takes a wheel angle that is not checked yet.
