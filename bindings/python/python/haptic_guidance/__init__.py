@@ -14,6 +14,7 @@ Examples
 from ._errors import InputError, RangeError, UnknownNameError
 from ._identify import Change, Fit, Parameter, Piece, identify
 from ._native import (
+    INPUT_IDS,
     Action,
     Bus,
     DriverView,
@@ -30,6 +31,7 @@ from ._results import Evaluation, Experiment, Run, evaluate, experiment, simulat
 from ._sweep import SweepResult, sweep
 
 __all__ = [
+    "INPUT_IDS",
     "Action",
     "Bus",
     "DriverView",
