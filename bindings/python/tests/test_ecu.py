@@ -32,6 +32,7 @@ def settled(engage_at_ms=600, duration_ms=900, **values):
 def test_the_frames_of_a_run_give_its_answers_bit_for_bit():
     run = hg.simulate(hg.Scenario(course=SHORT, condition="high", guidance={"probe": True}), bus=True)
     ecu, inputs = hg.Ecu(run.scenario, engaged=True), {0x100, 0x110, 0x120, 0x130}
+    assert inputs <= hg.INPUT_IDS
     sent = [(int(t), int(i), bytes(d)) for t, i, d in zip(run.bus["t_us"], run.bus["id"], run.bus["data"])]
     by_step = {}
     for t_us, id, data in sent:

@@ -41,7 +41,7 @@ words! {
         pub e_y: Metres,
         /// Yaw error e_theta' at the far point.
         pub e_theta: Radians,
-        /// When it was true.
+        /// The instant that it describes.
         pub at: Instant,
     }
 }
@@ -63,7 +63,7 @@ pub struct Law {
 }
 
 words! {
-    /// What the law remembers: the last sample and the filtered rates.
+    /// Memory of the law: the last sample and the filtered rates.
     pub struct LawState {
         /// 0 before the first sample.
         has_last: u32,
@@ -76,7 +76,7 @@ words! {
 }
 
 impl LawState {
-    /// No sample yet.
+    /// Before the first sample.
     pub const NEW: Self = Self {
         has_last: 0,
         last: LaneSample {
@@ -89,21 +89,22 @@ impl LawState {
     };
 }
 
-/// What the vehicle did since a sample that was old when it came: how its motion differs from going on as it did then.
+/// The vehicle's motion since a sample that was old when it arrived, as the difference from turning on at the rate that it had at
+/// the instant of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EgoMotion {
-    /// The heading that it turned beyond its rate of turn at the sample.
+    /// The angle turned beyond that.
     pub turned: Radians,
-    /// How much faster it turns now.
+    /// The present rate of turn less the one then.
     pub faster: TurningRate,
-    /// Its speed.
+    /// Speed.
     pub speed: Speed,
-    /// How far ahead the near point is.
+    /// Distance to the near point.
     pub near: Metres,
 }
 
 impl EgoMotion {
-    /// It went on as it did.
+    /// No difference.
     pub const STEADY: Self = Self {
         turned: Radians::ZERO,
         faster: TurningRate::ZERO,
@@ -111,7 +112,8 @@ impl EgoMotion {
         near: Metres::ZERO,
     };
 
-    /// Bounded to what a vehicle can turn in 200 ms beyond its rate: a flipped bit of the past must not ask for more.
+    /// Both are clamped to what a vehicle can turn in 200 ms beyond its rate: a flipped bit of the motion history, which is not kept
+    /// twice, must not move the torque further.
     #[must_use]
     pub fn new(turned: Radians, faster: TurningRate, speed: Speed, near: Metres) -> Self {
         let (most, fastest) = (Radians::from_rad(0.04), TurningRate::from_rad_per_s(0.3));
@@ -125,7 +127,7 @@ impl EgoMotion {
 }
 
 impl LawState {
-    /// The state from which [`Law::torque`], which lets the errors go on at their rates, finds the errors and rates of now.
+    /// The state from which [`Law::torque`], which continues the errors at their rates, computes the present errors and rates.
     /// Both errors turn with the vehicle; the near point moves aside by the way that it is ahead, and drifts at the speed
     /// times the heading, of which a third of the age counts where the heading grew with the square of the time.
     fn moved_with(&self, age: Micros, ego: &EgoMotion) -> Self {
@@ -133,7 +135,7 @@ impl LawState {
         let [speed, near] = [ego.speed.fixed(), ego.near.fixed()];
         let wide = |value: I8F24| I40F24::from(value);
         let aside = product(near, turned);
-        // What the yaw error's own rate makes of the lateral error's, and the heading beyond it.
+        // The lateral error drifts with the heading, of which the yaw error's own rate explains a part.
         let going = per_second_times(self.e_theta_rate.into(), age);
         let drift = product(speed, saturate(wide(turned).saturating_sub(going)));
         let drifted = per_second_times(product(speed, turned), age).wrapping_div_int(3);
@@ -141,7 +143,7 @@ impl LawState {
         let slower_y = drift.saturating_add(product(near, faster));
         let slower_theta = wide(faster);
         let error = |error: I8F24, away: I40F24, slower: I40F24| {
-            // The rates that are taken away below did not act all the time.
+            // `torque` continues the error at the lower rate for the whole age; this cancels it.
             let ahead = per_second_times(slower, age);
             wide(error).saturating_sub(away).saturating_add(ahead)
         };
@@ -165,7 +167,7 @@ impl LawState {
         (self.has_last != 0).then_some(self.last)
     }
 
-    /// The line is where this sample has it, and goes on at the rates that it had.
+    /// Takes the errors of a sample and keeps the rates.
     pub fn relocate(&mut self, sample: LaneSample) {
         self.last = sample;
     }
@@ -180,8 +182,7 @@ const GAP: Micros = Micros::from_ms(100);
 pub const MAX_RATE: u32 = 1000;
 
 impl Law {
-    /// The torque that the law asks for now, from the latest sample received; `since` is what the vehicle did since that
-    /// sample that its rates do not say.
+    /// The torque that the law demands now, from the latest sample received and the vehicle's motion since.
     #[must_use]
     pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, ego: &EgoMotion) -> Torque {
         if !state.is_latest(&sample) {
@@ -190,7 +191,7 @@ impl Law {
         self.demanded(state, now, Some(ego))
     }
 
-    /// Takes a sample: the rates of the errors.
+    /// Takes a sample: updates the filtered rates of the errors.
     pub(crate) fn update(&self, state: &mut LawState, sample: LaneSample) {
         let dt = sample.at.since(state.last.at);
         if state.has_last == 0 || dt > GAP {
@@ -214,7 +215,7 @@ impl Law {
         }
     }
 
-    /// The same from a sample that was old when it came. A function of its own, out of the way of the usual case.
+    /// The same from a sample that was old when it arrived. Not inlined, so that the usual case stays short.
     #[inline(never)]
     fn demanded_from_old_sample(&self, state: &LawState, age: Micros, ego: &EgoMotion) -> Torque {
         self.torque(&state.moved_with(age, ego), age)

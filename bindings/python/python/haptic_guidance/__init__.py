@@ -14,6 +14,7 @@ Examples
 from ._errors import InputError, RangeError, UnknownNameError
 from ._identify import Change, Fit, Parameter, Piece, identify
 from ._native import (
+    INPUT_IDS,
     Action,
     Bus,
     DriverView,
@@ -31,6 +32,7 @@ from ._results import Comparison, Evaluation, Experiment, Run, compare, evaluate
 from ._sweep import SweepResult, sweep
 
 __all__ = [
+    "INPUT_IDS",
     "Action",
     "Bus",
     "DriverView",

@@ -353,6 +353,9 @@ class Ecu:
     def clone(self) -> Ecu: ...
 
 @final
+INPUT_IDS: frozenset[int]
+"""Identifiers of what the ECU hears."""
+
 class Bus:
     def __init__(self) -> None: ...
     def lane_preview(

@@ -109,6 +109,15 @@ messages! {
     0x350 Identity, 0xDD, 2, Ecu, 1000.0;
 }
 
+/// Whether the ECU hears what comes under an identifier: a message of the list, of another sender.
+#[must_use]
+pub const fn is_input(id: u16) -> bool {
+    matches!(
+        sender_of(id),
+        Some(Sender::Camera | Sender::ColumnModule | Sender::Host)
+    )
+}
+
 /// A safety message of `N` bytes, eight on classic CAN: what the list says of it, and how its signals lie in the payload.
 pub trait Message<const N: usize = 8>: Copy {
     /// Its line of the list.
