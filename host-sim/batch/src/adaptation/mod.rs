@@ -252,20 +252,15 @@ impl<'k> Adaptation<'k> {
             })
             .collect();
         let loops: Vec<&[drive::Driven]> = self.pairs().map(|_| next()).collect();
-        let pairs = self.pairs().zip(law_maps).enumerate();
-        let pair =
-            |(number, ((law, driver), (map, ended))): (usize, ((usize, usize), (Vec<LawPoint>, u32)))| {
-                let own = loops[number];
-                let ended = ended + own.iter().filter(|drive| drive.ended).count() as u32;
-                let pair = self.pair(own, loops[driver], &maps[driver], map);
-                Pair {
-                    law,
-                    driver,
-                    ended,
-                    ..pair
-                }
-            };
-        let pairs = pairs.map(pair).collect();
+        let mut pairs = Vec::new();
+        for (((law, driver), (map, ended)), own) in self.pairs().zip(law_maps).zip(&loops) {
+            pairs.push(Pair {
+                law,
+                driver,
+                ended: ended + own.iter().filter(|drive| drive.ended).count() as u32,
+                ..self.pair(own, loops[driver], &maps[driver], map)
+            });
+        }
         Ok(self.results(maps, pairs))
     }
 
