@@ -184,7 +184,7 @@ fn a_lane_change_by_hand_is_no_fault() {
         rig.lane.e_theta = Radians::from_rad(-heading);
         rig.lane.e_y = Metres::from_m(e_y + line - 0.3 * SPEED * heading);
         // A sensor that is alive moves by its last bit.
-        rig.driver = Some(f64::from(ms / 500 % 2) / 4096.0);
+        rig.driver = Some(f64::from((ms / 500 + 1) % 2) / 4096.0);
         let step = rig.tick();
         assert_eq!(
             step.command.mode,
