@@ -183,8 +183,8 @@ fn a_lane_change_by_hand_is_no_fault() {
         let line = if e_y < -1.6 { 3.5 } else { 0.0 };
         rig.lane.e_theta = Radians::from_rad(-heading);
         rig.lane.e_y = Metres::from_m(e_y + line - 0.3 * SPEED * heading);
-        // A sensor that is alive moves by its last bit.
-        rig.driver = Some(f64::from((ms / 500 + 1) % 2) / 4096.0);
+        // A sensor that is alive moves.
+        rig.driver = (ms % 500 < 2).then_some(1.0 / 4096.0);
         let step = rig.tick();
         assert_eq!(
             step.command.mode,
