@@ -11,7 +11,7 @@
 //! Error: at most 1 % of the share from a float64 evaluation of the same samples (`core/tests/laws.rs` asserts it).
 
 use super::{GAP, Law, RATE_BITS};
-use crate::quantity::{FRAC_BITS, Micros, Radians, Ratio, Torque, product, quotient, saturate, share_of};
+use crate::quantity::{FRAC_BITS, Instant, Radians, Ratio, Torque, product, quotient, saturate, share_of};
 
 /// The square of a wheel's rate that counts: a hand turns no wheel faster than 8 rad/s.
 const MOST_SQUARE: i64 = (64 << FRAC_BITS) - 1;
@@ -19,6 +19,9 @@ const MOST_SQUARE: i64 = (64 << FRAC_BITS) - 1;
 /// What it remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Activity {
+    /// phi when it came last, and when that was.
+    wheel: Radians,
+    at: Instant,
     /// dphi/dt, filtered as the rates of the errors, in 2^-20 rad/s.
     rate: i32,
     /// L[P_d*P_h] and L[abs(P_d*P_h)].
@@ -29,23 +32,22 @@ pub struct Activity {
 impl Activity {
     /// Nothing felt yet.
     pub const NEW: Self = Self {
+        wheel: Radians::ZERO,
+        at: Instant::from_us(0),
         rate: 0,
         agreement: 0,
         size: 0,
     };
 
     /// The wheel turned; `law` has the filter.
-    pub fn turn(&mut self, law: &Law, from: Radians, to: Radians, passed: Micros) {
+    pub fn turn(&mut self, law: &Law, now: Instant, wheel: Radians) {
+        let passed = now.since(self.at);
         self.rate = if passed > GAP {
             0
         } else {
-            law.filter(self.rate, from.bits(), to.bits(), passed)
+            law.filter(self.rate, self.wheel.bits(), wheel.bits(), passed)
         };
-    }
-
-    /// What came before does not count.
-    pub fn forget(&mut self) {
-        (self.agreement, self.size) = (0, 0);
+        (self.wheel, self.at) = (wheel, now);
     }
 
     /// A step of 1 ms with these torques of driver and guidance: the share that is left.
