@@ -410,7 +410,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/sim/src/models/plant.rs", "one system of equations with its tests"),
     ("host-sim/sim/src/models/road/centreline.rs", "one geometry with its tests"),
     ("host-sim/sim/src/models/road/course.rs", "one document: the form of a course, with its tests"),
-    ("host-sim/sim/src/scenario/file.rs", "one document: the form of a scenario's file"),
 ];
 
 #[test]
