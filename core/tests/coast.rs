@@ -371,3 +371,28 @@ fn where_pictures_come_back_is_no_rate() {
         assert!((0.045..0.0505).contains(&most), "{most}");
     }
 }
+
+/// A bend of 2.5 m/s^2 that the vehicle follows, without a picture for almost a second: the near point has come to where the line
+/// was not seen. Of a line that went straight from there it would be 0.4 m aside.
+#[test]
+fn a_bend_goes_on_beyond_what_was_seen_of_it() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::paper();
+        let rate = 0.15 * sign;
+        rig.turn(rate);
+        rig.aligning = 0.987_4 * SPEED * rate;
+        rig.lane.e_theta = Radians::from_rad(0.7 * rate);
+        rig.run(600);
+        rig.engage = true;
+        rig.run(1500);
+        rig.silent[LANE] = true;
+        rig.run(970);
+        rig.silent[LANE] = false;
+        for _ in 0..100 {
+            let step = rig.tick();
+            assert_eq!(step.command.mode, Mode::Active);
+            assert!(!step.command.faults.contains(Fault::LaneStep));
+        }
+        assert_eq!(rig.tick().command.faults, FaultSet::NONE);
+    }
+}

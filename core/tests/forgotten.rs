@@ -420,3 +420,30 @@ fn a_motor_that_is_strong_again_is_no_weak_one() {
     rig.engage = true;
     assert_eq!(rig.run(50).command.mode, Mode::Active);
 }
+
+/// A new line is trusted from nothing on, by one a second: of K_1*a1' of 0.75 m three tenths after 0.3 s.
+#[test]
+fn a_new_line_is_trusted_from_nothing_on() {
+    for sign in [1.0, -1.0] {
+        let mut rig = taken(0.0, 0.75 * sign, 0.0);
+        rig.run(300);
+        let expected = 0.3 * 0.375 * sign;
+        assert!(
+            (rig.applied - expected).abs() < 0.01,
+            "{}, not {expected}",
+            rig.applied
+        );
+    }
+}
+
+/// Speeds that are refused for a step are lost; what comes after is a first one, and its silence no step.
+#[test]
+fn a_silence_after_a_step_is_a_silence() {
+    let mut rig = straight(0.0);
+    rig.speeds = [SPEED + 20.0; 2];
+    rig.run_until(500, |step| step.command.faults.contains(Fault::SpeedStep));
+    rig.run_until(100, |step| !step.command.faults.contains(Fault::SpeedStep));
+    rig.silent[VEHICLE] = true;
+    let faults = rig.run(90).command.faults;
+    assert!(faults.contains(Fault::SpeedTimeout) && !faults.contains(Fault::SpeedStep));
+}

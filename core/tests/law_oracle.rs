@@ -376,6 +376,11 @@ fn two_samples_share_a_rate_over_100_ms() {
     for (samples, expected) in [
         (&[(0, 0.0), (100_000, 0.5)][..], rated),
         (&[(0, 0.0), (100_001, 0.5)][..], position),
+        // What was a rate before a gap is none behind it.
+        (
+            &[(0, 0.0), (8000, 0.2), (16_000, 0.4), (116_001, 0.5)][..],
+            position,
+        ),
         // The clock starts from zero, and so does what there is of a last sample.
         (&[(50_000, 0.5)][..], position),
         // Two at one instant have no time for a rate between them.

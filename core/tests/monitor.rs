@@ -339,24 +339,25 @@ fn rates_are_forgotten_in_a_gap() {
 #[test]
 fn pictures_that_come_in_time_count_whatever_is_said_of_them() {
     let torque = counts(500).0;
-    let steps = |said: u64, gap_ms: u32| {
+    let steps = |said: u64, gap_ms: u32, age: u64| {
         let mut bench = Bench::at(5.0, torque);
-        assert!(bench.show(Some(lane(8192, 0, 0)), None, guidance(torque, FADE), 1000));
+        assert!(bench.show(Some(lane(8192, 0, age)), None, guidance(torque, FADE), 1000));
         (1..100)
             .take_while(|ms| {
                 let comes = *ms >= gap_ms && (ms - gap_ms).is_multiple_of(8);
                 let frame = u64::from_le_bytes(guidance(torque, ACTIVE)) | said;
-                bench.show(comes.then(|| lane(0, 0, 0)), None, frame.to_le_bytes(), 1000)
+                bench.show(comes.then(|| lane(0, 0, age)), None, frame.to_le_bytes(), 1000)
             })
             .count() as u32
     };
-    for said in [1 << 37, 1 << 52] {
-        assert_eq!(steps(said, 8), 7 + 20);
-        assert_eq!(steps(said, 25), 24 + 20);
-        assert_eq!(steps(said, 26), 99);
+    // However old they are: 40 ms.
+    for (said, age) in [(1 << 37, 0), (1 << 52, 0), (1 << 37, 400), (1 << 52, 400)] {
+        assert_eq!(steps(said, 8, age), 7 + 20);
+        assert_eq!(steps(said, 25, age), 24 + 20);
+        assert_eq!(steps(said, 26, age), 99);
     }
     // LaneInvalid says nothing of a picture that is used.
-    assert_eq!(steps(1 << 38, 26), 25 + 20);
+    assert_eq!(steps(1 << 38, 26, 0), 25 + 20);
 }
 
 /// Errors that passed zero at a constant rate with the last picture, and no picture since. From 40 ms of age on the

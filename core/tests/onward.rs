@@ -121,3 +121,18 @@ fn what_is_longer_ago_than_is_remembered_was_as_the_oldest_that_is() {
         }
     }
 }
+
+/// A straight line whose direction is read with 1 mrad of noise to either side: over the 0.3 s that its bend is taken over these
+/// are 2 mrad, and as much again in each further 0.3 s.
+#[test]
+fn noise_of_a_direction_is_no_bend() {
+    let mut motion = MotionHistory::new();
+    motion.record_turning_rate(after(0.0), TurningRate::ZERO);
+    for k in 0..60_u32 {
+        let t = f64::from(k) * 0.02;
+        let noise = if k.is_multiple_of(2) { 1e-3 } else { -1e-3 };
+        motion.record_line(after(t), after(t), Radians::from_rad(noise));
+        let change = motion.direction_change(after(t), after(t), after(t + 0.3));
+        assert!(k < 15 || change.rad().abs() < 2.1e-3, "{change:?}");
+    }
+}

@@ -670,6 +670,8 @@ mod tests {
             (state.column.is_known, state.column.at) = (1, Instant::from_us(0));
             state.column.sum = AngularImpulse::from_nm_s(sum_nm_s);
             let wheel = Radians::from_rad(2e-3 * rad_per_s);
+            // As soon as it comes, a step before its check.
+            state.set_wheel_angle(wheel);
             CHECKS.column(
                 &mut state,
                 Instant::from_us(2000),
