@@ -251,21 +251,22 @@ fn in_lock_step(board: Board, built: Built, scenario: &str, law: &str) -> Result
     let stack = number(&report["stack_bytes"], "stack")?;
     ensure!(stack <= STACK, "{stack} B of stack, of {STACK} B");
     let spent = &report["instructions"];
+    let named = |name: &str, unit, value, tolerance| figure(&format!("{name}{law}"), unit, value, tolerance);
     Ok(vec![
-        figure("stack used", "B", stack, 5),
-        figure(
+        named("stack used", "B", stack, 5),
+        named(
             "worst step",
             "instructions",
             number(&spent["worst"], "worst step")?,
             1,
         ),
-        figure(
+        named(
             "mean step",
             "instructions",
             number(&spent["mean"], "mean step")?,
             1,
         ),
-        figure(
+        named(
             "worst background step",
             "instructions",
             number(&spent["worst_background"], "background")?,
