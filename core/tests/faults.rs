@@ -2,9 +2,9 @@
 //! masks written here by hand.
 
 use haptic_core::bus::messages::{Guidance, Message, ResetCause};
-use haptic_core::quantity::Torque;
+use haptic_core::quantity::{Instant, Torque};
 use haptic_core::safety::envelope::LimitReason;
-use haptic_core::safety::faults::{Class, Fault, FaultSet};
+use haptic_core::safety::faults::{Class, Fault, FaultHistory, FaultSet};
 use haptic_core::safety::modes::Mode;
 
 /// Every row of the document's table: bit, name and class.
@@ -66,5 +66,19 @@ fn each_fault_has_its_bit_in_the_guidance_frame() {
         guidance.pack(&mut data);
         let faults = u64::from_le_bytes(data) >> 37 & 0x1F_FFFF;
         assert_eq!(faults, 1 << code, "{fault:?}");
+    }
+}
+
+#[test]
+fn the_history_counts_to_255_and_no_further() {
+    let (mut history, lane) = (
+        FaultHistory::new(Instant::from_us(0)),
+        FaultSet::NONE.with(Fault::LaneTimeout),
+    );
+    for k in 1..=300_u32 {
+        history.step(Instant::from_us(2000 * k), lane);
+        history.step(Instant::from_us(2000 * k + 1000), FaultSet::NONE);
+        let counts: Vec<u8> = history.records().map(|record| record.count).collect();
+        assert_eq!(counts, [k.min(255) as u8]);
     }
 }

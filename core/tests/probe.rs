@@ -8,7 +8,8 @@ use haptic_core::bus::Frame;
 use haptic_core::bus::messages::{Guidance, Message, Request, ResetCause, Telemetry};
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::Params;
-use haptic_core::quantity::{Ratio, Torque};
+use haptic_core::estimator::Sample;
+use haptic_core::quantity::{Radians, Ratio, Torque};
 use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::FaultSet;
 use haptic_core::safety::modes::Mode;
@@ -356,4 +357,39 @@ fn other_probes_are_read_as_well() {
             "{amplitude} N.m, {frequency} Hz: {estimate}"
         );
     }
+}
+
+/// What the ECU tells of K_hg is what the estimator makes of the torque that was applied until each sample of the column: one of
+/// a millisecond later is 0.016 rad of the probe's phase, 0.01 of K_hg.
+#[test]
+fn the_estimator_is_told_what_was_applied_until_the_sample() {
+    let mut rig = Rig::active_in_curve(0.4);
+    rig.probe = true;
+    let estimator = Setup::PAPER.estimator;
+    let mut state = estimator.start();
+    let (mut delayed, mut has_begun) = (0.0, false);
+    for _ in 0..12_000 {
+        let applied = rig.applied;
+        // A driver who yields, an arm behind the torque.
+        delayed += (applied - 0.4 - delayed) * 0.01;
+        let driver = -0.5 * delayed;
+        rig.driver = Some(driver);
+        let is_new = rig.ticks.is_multiple_of(2);
+        let step = rig.tick();
+        if step.command.probe.is_none() || !has_begun {
+            has_begun = step.command.probe.is_some();
+            continue;
+        }
+        let sample = Sample {
+            at: rig.now(),
+            applied: Torque::from_nm(applied),
+            driver_torque: Torque::from_nm((driver * 4096.0).round() / 4096.0),
+            wheel_angle: Radians::from_rad(rig.wheel),
+        };
+        estimator.step(&mut state, is_new.then_some(&sample));
+    }
+    let told = rig.telemetry.unwrap().k_hg.unwrap().k_hg.si();
+    let made = state.reading().unwrap().k_hg.si();
+    println!("{told} told, {made} made");
+    assert!((told - made).abs() < 0.003, "{told}, not {made}");
 }
