@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use super::file::Kind as AxisKind;
+use super::axis::Kind as AxisKind;
 use super::table::header;
 use super::{Driven, Point, Sweep, value};
 

@@ -1,7 +1,7 @@
 //! The unit of a varied field: what the reference's table of fields says, which a test holds against the code
 //! (`cargo test -p host-sim --test file_fields`).
 
-use super::file::Column;
+use super::axis::Column;
 
 const FIELDS: &str = include_str!("../../../../docs/files.md");
 

@@ -145,11 +145,6 @@ impl Validation {
     }
 }
 
-/// Place of a row in a figure of rows.
-pub(super) fn place(row: usize) -> f64 {
-    row as f64 + 1.0
-}
-
 /// So that dots of one row do not hide one another.
 const ASIDE: f64 = 0.2;
 
