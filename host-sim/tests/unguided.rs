@@ -2,7 +2,6 @@
 //! exit code. Held against the guidance frames of `bus.log`, decoded here as `core/haptic.dbc` has them.
 
 use std::fs;
-use std::path::Path;
 use std::process::Output;
 
 use serde_json::Value;

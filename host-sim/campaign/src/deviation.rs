@@ -2,6 +2,7 @@
 //! loses the torque in the step in which the ECU leaves. The *deviation* is the distance from the fault-free vehicle across
 //! its direction at the same instant.
 
+use haptic_sim::parts::DriverVehicle;
 use haptic_sim::{Action, Simulation};
 
 use super::drivers::{LANE_EDGE_M, OFF_ROAD_M};

@@ -36,7 +36,6 @@ use haptic_sim::models::real::WorldParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;
-use haptic_sim::parts::DriverVehicle;
 use haptic_sim::scenario::{Scenario, ScenarioBuilder, Speed};
 use haptic_sim::seeds::{Stream, named};
 use haptic_sim::stability::{Guided, growth_per_s};

@@ -2,6 +2,7 @@
 
 use haptic_log::trace::Sample;
 use haptic_sim::Action;
+use haptic_sim::parts::DriverVehicle;
 use haptic_sim::simulation::simulate;
 use haptic_sim::worlds::WORLDS;
 

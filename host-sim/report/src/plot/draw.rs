@@ -4,7 +4,6 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::figure::Figure as Grid;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
-use kuva::render::render::{Primitive, TextAnchor};
 
 use super::Figure;
 use super::frame::Frame;

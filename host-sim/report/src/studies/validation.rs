@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::changes;
+use super::{changes, place};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::experiment::{
