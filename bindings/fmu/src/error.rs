@@ -17,6 +17,9 @@ pub enum FmuError {
     /// Parameters of the controller that cannot be.
     #[error("{0}")]
     Setup(ParamError),
+    /// Numbers that are no table of a scenario.
+    #[error(transparent)]
+    Fields(#[from] haptic_sim::fields::NotATable),
     /// Parameters of the vehicle that cannot be.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),

@@ -1,5 +1,7 @@
 //! Variables of a model: the one list that both standards' descriptions and every access follow from.
 
+use haptic_sim::fields::Field;
+
 /// What a variable is to FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -112,4 +114,14 @@ pub const fn parameter(
         range: Some(range),
         ..variable(name, Kind::Real, Role::Parameter, unit, meaning)
     }
+}
+
+/// A field of a scenario as a parameter; its start is the field's default, or zero if that is none.
+#[must_use]
+pub const fn of_field(field: &Field) -> Variable {
+    let start = match field.default {
+        Some(start) => start,
+        None => 0.0,
+    };
+    parameter(field.name, field.unit, start, field.ends(), field.meaning)
 }

@@ -3,14 +3,12 @@
 use std::fmt::Write;
 
 use haptic_core::bus::Frame;
+use haptic_core::bus::messages::is_input;
 use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Ecu;
 use haptic_core::quantity::Instant;
 
 use crate::Answer;
-
-/// Identifiers of what the ECU hears.
-const INPUTS: [u16; 4] = [0x100, 0x110, 0x120, 0x130];
 
 /// Lines of `t_us id data` in order of time; what the ECU sends, in the same form, a step for each time.
 pub(crate) fn replay(bus: &str) -> Answer<String> {
@@ -22,7 +20,7 @@ pub(crate) fn replay(bus: &str) -> Answer<String> {
         let now = Instant::from_us(t_us as u32);
         while let Some(line) = lines.next_if(|line| time(line) == Some(t_us)) {
             let frame = frame(line)?;
-            if INPUTS.contains(&frame.id()) {
+            if is_input(frame.id()) {
                 ecu.receive(&frame, now)
                     .map_err(|why| format!("{line}: {why:?}"))?;
             }

@@ -204,6 +204,7 @@ fn law_at(place: usize, scenario: &Scenario) -> Answer<Box<dyn Law>> {
         None => return Ok(Box::new(PageLaw)),
         Some(kind) => match &kind.make {
             Make::Part(make) => make(scenario, &kind.defaults()),
+            Make::Given(make) => make(scenario, &kind.defaults()),
             // The only limit of the library is around its paper's law.
             Make::Around(make) => {
                 let paper = LAWS.iter().find(|kind| kind.name == "paper");

@@ -169,6 +169,10 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
             "speed: a map over speeds has one at each place, and none that changes; leave [speed] out".into(),
         );
     }
+    let law = base.guidance().controller.law;
+    if law != 0.0 {
+        return Err(format!("guidance.law = {law}: a map is of the paper's law, 0").into());
+    }
     let scenario = base
         .to_builder()
         .course(stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?)
@@ -268,10 +272,7 @@ mod tests {
 
     #[test]
     fn a_speed_that_changes_has_no_place_on_the_map() {
-        let speed = Speed::ByTime {
-            time: vec![0.0, 10.0],
-            kmh: vec![60.0, 50.0],
-        };
+        let speed = Speed::by_time_kmh(vec![0.0, 10.0], &[60.0, 50.0]);
         let scenario = Scenario::builder().speed(speed).build().unwrap();
         for error in
             [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()].map(|e| e.to_string())

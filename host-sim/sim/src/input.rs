@@ -5,6 +5,9 @@ use std::ops::RangeInclusive;
 
 use serde::de::DeserializeOwned;
 
+use crate::fields::old_name;
+use crate::scenario::fields_of;
+
 /// Bad input: which file or option, and what is wrong with it. Never a fault of the program.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {message}")]
@@ -27,7 +30,7 @@ impl InputError {
 ///
 /// # Errors
 /// Line, column and what is wrong there: syntax, an unknown field, a value of the wrong kind; that the file is one of another
-/// kind, where it is.
+/// kind, where it is; what a field of an old name is called.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         // The parser speaks of Rust's types; whoever wrote the file need not know them.
@@ -36,7 +39,7 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
             .replace("expected f64", "expected a number")
             .replace("expected u64", "expected a whole number, 0 or more")
             .replace("expected path string", "expected a string");
-        match other_kind::<T>(text) {
+        match other_kind::<T>(text).or_else(|| old_name(text, fields_of)) {
             Some(hint) => InputError::new(name, hint),
             None => InputError::new(name, message),
         }

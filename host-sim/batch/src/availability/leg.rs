@@ -132,7 +132,7 @@ impl LegNumber {
         let speed = if world.changes_speed() {
             falling_and_rising(speed_kmh, &mut rng)
         } else {
-            Speed::Constant(speed_kmh)
+            Speed::constant_kmh(speed_kmh)
         };
         let scenario = driver
             .drives(Scenario::builder().course(course).speed(speed), speed_kmh / 3.6)

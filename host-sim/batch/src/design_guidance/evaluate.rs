@@ -146,7 +146,7 @@ impl DesignGuidance {
 fn figures(scenario: &Scenario, run: &Run) -> Figures {
     let samples = &run.trace.samples;
     if scenario.failure().kind == FailureKind::None {
-        let [peak, .., effort, _, conflict, _, _, _] =
+        let [peak, _, _, _, effort, _, conflict, ..] =
             measured(scenario, &run.trace, run.diverged(), &[vec![], vec![]]);
         let [peak, effort, conflict] = [peak, effort, conflict].map(|value| value.unwrap_or(0.0));
         return [peak, effort, conflict, 0.0, noise_nm(run)];

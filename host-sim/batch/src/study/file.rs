@@ -214,13 +214,13 @@ fn of_published(number: u32, manual: bool) -> Result<Table, RangeError> {
     };
     let mut fields = Table::new();
     for (name, value) in [
-        ("a_1", Some(driver.a_1)),
-        ("a_2", Some(driver.a_2)),
+        ("a_1_rad_per_m", Some(driver.a_1)),
+        ("a_2_rad_per_m_s", Some(driver.a_2)),
         ("a_3", Some(driver.a_3)),
-        ("t_p", Some(driver.t_p)),
-        ("K_d", Some(driver.k_d)),
-        ("K_hg", driver.k_hg),
-        ("remnant_sd", Some(remnant_nm)),
+        ("t_p_s", Some(driver.t_p)),
+        ("k_d_nm_per_rad", Some(driver.k_d)),
+        ("k_hg", driver.k_hg),
+        ("remnant_sd_nm", Some(remnant_nm)),
     ] {
         if let Some(value) = value {
             fields.insert(name.into(), Value::Float(value));

@@ -9,7 +9,7 @@ const STUDY: &str = r#"
 name = "reliance"
 seed = 7
 [scenario]
-speed = 60
+speed_m_per_s = 16.666666666666668
 [scenario.course]
 name = "one curve"
 lane_width = 3.6
@@ -32,7 +32,7 @@ name = "P01"
 published = 3
 [[participant]]
 name = "P02"
-driver = { t_p = 0.3, remnant_sd = 0.05 }
+driver = { t_p_s = 0.3, remnant_sd_nm = 0.05 }
 [[participant]]
 name = "P03"
 person = true
@@ -115,7 +115,11 @@ fn a_study_goes_on_and_overwrites_nothing() {
     // Another seed, speed or name is another study.
     for (from, to, says) in [
         ("seed = 7", "seed = 8", "another scenario or seed"),
-        ("speed = 60", "speed = 61", "another scenario or seed"),
+        (
+            "speed_m_per_s = 16.666666666666668",
+            "speed_m_per_s = 17",
+            "another scenario or seed",
+        ),
         ("\"reliance\"", "\"trust\"", "in study reliance"),
     ] {
         let error = study(&STUDY.replace(from, to))
@@ -304,17 +308,21 @@ fn what_is_no_study_is_refused_by_name() {
             "participant P01, condition manual: published = 15 is outside 1 to 14",
         ),
         (
-            "t_p = 0.3",
-            "t_p = 3.0",
-            "participant P02, condition guided: driver.t_p = 3 s is outside 0.001 to 2 s",
+            "t_p_s = 0.3",
+            "t_p_s = 3.0",
+            "participant P02, condition guided: driver.t_p_s = 3 s is outside 0.001 to 2 s",
         ),
         (
             "seed = 7",
             "repetitions = 0",
             "repetitions = 0 is outside 1 to 100",
         ),
-        ("speed = 60", "sped = 60", "sped"),
-        ("speed = 60", "seed = 60", "seed: every session has its own"),
+        ("speed_m_per_s = 16.666666666666668", "sped = 16", "sped"),
+        (
+            "speed_m_per_s = 16.666666666666668",
+            "seed = 16",
+            "seed: every session has its own",
+        ),
         (
             "person = true",
             "person = false",
@@ -331,7 +339,7 @@ fn what_is_no_study_is_refused_by_name() {
         ("seed = 7", "sed = 7", "sed"),
         (
             "probe = true }",
-            "probe = true }, failure = { kind = \"torque\", time = 5 }",
+            "probe = true }, failure = { kind = \"torque\", time_s = 5 }",
             "P03, condition guided: failure: a person's",
         ),
     ] {

@@ -124,7 +124,7 @@ mod tests {
     use super::*;
 
     fn places(design: Design, samples: u64) -> Places {
-        let names = ["driver.t_p".to_string(), "speed".to_string()];
+        let names = ["driver.t_p_s".to_string(), "speed_m_per_s".to_string()];
         Places::new(design, samples, 1, &names).unwrap()
     }
 
@@ -171,7 +171,11 @@ mod tests {
         let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 40_000.0;
         assert!((mean - 0.5).abs() < 4.0 * 0.2887 / 200.0, "{mean}");
         assert!((variance - 1.0 / 12.0).abs() < 4.0 * 0.0745 / 200.0, "{variance}");
-        let more = ["a".to_string(), "driver.t_p".to_string(), "speed".to_string()];
+        let more = [
+            "a".to_string(),
+            "driver.t_p_s".to_string(),
+            "speed_m_per_s".to_string(),
+        ];
         let more = Places::new(Design::Random, 40_000, 1, &more).unwrap();
         assert_eq!(more.at(17, 0)[2], draws[17]);
     }

@@ -293,7 +293,7 @@ fn courses(name: &str, table: &Table) -> Result<BTreeMap<String, Course>, InputE
         let mut scenario = Table::new();
         scenario.insert("course".into(), value.clone());
         // Slow, so that the shortest course is long enough.
-        scenario.insert("speed".into(), Value::Integer(20));
+        scenario.insert("speed_m_per_s".into(), Value::Integer(6));
         let text = toml::to_string(&scenario).map_err(|e| InputError::new(name, e))?;
         let scenario: Scenario = Scenario::from_toml(name, &text, |other, _| {
             Err(InputError::new(

@@ -1,5 +1,6 @@
 //! What each study shows: a function of each module makes a report of its results, for a page and for a terminal.
 
+pub mod adaptation;
 pub mod availability;
 pub mod bus;
 mod changes;
