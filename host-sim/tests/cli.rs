@@ -7,14 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// Runs the program in a directory of its own.
-fn host_sim(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_host-sim"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .unwrap()
-}
+use crate::host_sim;
 
 fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).expect("stdout is one JSON value and nothing else")

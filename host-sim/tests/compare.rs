@@ -2,7 +2,9 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
+
+use crate::host_sim;
 
 const FILE: &str = "
 name = 'short'
@@ -25,9 +27,7 @@ kind = 'paper'
 ";
 
 fn compare(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    command.arg("compare").args(arguments).current_dir(folder);
-    command.output().unwrap()
+    host_sim(folder, &[&["compare"], arguments].concat())
 }
 
 #[test]

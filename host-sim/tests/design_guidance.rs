@@ -2,7 +2,9 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
+
+use crate::host_sim;
 
 const FILE: &str = "
 name = 'short'
@@ -26,11 +28,6 @@ roads = ['road.toml']
 speeds_m_per_s = [13.88888888888889]
 losses = 1
 ";
-
-fn host_sim(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    command.args(arguments).current_dir(folder).output().unwrap()
-}
 
 fn design(folder: &Path, arguments: &[&str]) -> Output {
     host_sim(folder, &[&["design-guidance", "design.toml"], arguments].concat())

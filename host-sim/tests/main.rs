@@ -10,3 +10,15 @@ mod recordings;
 mod study;
 mod sweep;
 mod unguided;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs the program in a directory.
+fn host_sim(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_host-sim"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .unwrap()
+}

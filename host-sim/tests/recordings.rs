@@ -2,22 +2,15 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use serde_json::Value;
+
+use crate::host_sim;
 
 const LOG: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../tests/data/driver-logs/guided-probe-clean.csv"
 );
-
-fn host_sim(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_host-sim"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .unwrap()
-}
 
 /// The rows of the log as numbers, without its heading.
 fn rows() -> Vec<Vec<f64>> {

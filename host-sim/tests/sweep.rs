@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
+use crate::host_sim;
+
 const SWEEP: &str = "
 samples = 200
 design = \"sobol\"
@@ -105,12 +107,7 @@ fn a_row_is_driven_again_by_one_command() {
         .split_once("host-sim sweep ")
         .expect("a line to drive a row again");
     let line: Vec<&str> = line.lines().next().unwrap().split_whitespace().collect();
-    let again = Command::new(env!("CARGO_BIN_EXE_host-sim"))
-        .arg("sweep")
-        .args(line)
-        .current_dir(at)
-        .output()
-        .unwrap();
+    let again = host_sim(at, &[&["sweep"], &line[..]].concat());
     assert_eq!(again.status.code(), Some(0));
     assert!(String::from_utf8_lossy(&again.stderr).contains("The same bits as in the table"));
 
@@ -126,11 +123,7 @@ fn a_row_is_driven_again_by_one_command() {
     assert!(text.contains(rows[18][peak]), "{text}");
     assert!(String::from_utf8_lossy(&output.stderr).contains("The same bits as in the table"));
     // The scenario that it wrote is one that `run` takes, and gives the same peak.
-    let run = Command::new(env!("CARGO_BIN_EXE_host-sim"))
-        .args(["run", "drive/scenario.toml", "--json"])
-        .current_dir(at)
-        .output()
-        .unwrap();
+    let run = host_sim(at, &["run", "drive/scenario.toml", "--json"]);
     let json: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     assert_eq!(
         json["peak_lateral_error_m"].as_f64().unwrap().to_string(),

@@ -2,10 +2,11 @@
 //! exit code. Held against the guidance frames of `bus.log`, decoded here as `core/haptic.dbc` has them.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
+
+use crate::host_sim;
 
 /// A left curve of a radius of 800 m, held for a minute at 60 km/h.
 const HELD: &str = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
@@ -27,11 +28,6 @@ fn folder() -> tempfile::TempDir {
         .unwrap();
     }
     folder
-}
-
-fn host_sim(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    command.args(arguments).current_dir(folder).output().unwrap()
 }
 
 fn said(output: &Output) -> String {

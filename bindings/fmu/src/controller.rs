@@ -11,7 +11,8 @@ use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::unguided::{Cause, Circumstances, Watch};
 
 use crate::error::FmuError;
-use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, variable};
+use crate::model::{About, Model, Texts};
+use crate::variable::{Kind, Role, Variable, input, limits, variable};
 
 /// The model.
 pub static ABOUT: About = About {

@@ -5,7 +5,8 @@ use haptic_sim::models::arm::Arm;
 use haptic_sim::models::driver::{ArmGains, ArmInFile, DriverParameters, Vision};
 
 use crate::error::FmuError;
-use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, of_field, variable};
+use crate::model::{About, Model, Texts};
+use crate::variable::{Kind, Role, Variable, input, limits, of_field, variable};
 use Kind::Real;
 use Role::Output;
 

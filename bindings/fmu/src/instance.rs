@@ -10,7 +10,8 @@ use haptic_sim::input::in_range;
 
 use crate::MODELS;
 use crate::history::{Group, History, MOST_STEPS as MOST_STEPS_OF_A_STATE, Reader};
-use crate::variable::{About, Kind, Model, Role, Texts};
+use crate::model::{About, Model, Texts};
+use crate::variable::{Kind, Role};
 
 /// Longest communication step, ms: an hour.
 const MOST_STEPS: f64 = 3_600_000.0;

@@ -12,11 +12,12 @@ pub mod fmi2;
 pub mod fmi3;
 mod history;
 mod instance;
+pub mod model;
 pub mod unit;
 pub mod variable;
 pub mod vehicle;
 
-use variable::About;
+use model::About;
 
 /// Every model of this binary.
 pub static MODELS: [&About; 3] = [&controller::ABOUT, &driver::ABOUT, &vehicle::ABOUT];

@@ -12,9 +12,8 @@ use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Scenario, Simulation};
 
 use crate::error::FmuError;
-use crate::variable::{
-    About, Kind, Model, Role, Texts, Variable, input, limits, of_field, parameter, variable,
-};
+use crate::model::{About, Model, Texts};
+use crate::variable::{Kind, Role, Variable, input, limits, of_field, parameter, variable};
 use Kind::{Real, Text};
 use Role::{Output, Parameter};
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use haptic_analysis::identify::{
     DriveLog, FixError, Layout, Mapping, Options, Recording, of_table, open_mapped,
 };
+use haptic_batch::StudyError;
 use haptic_batch::identify::{
     Method, identify as one, identify_pieces, identify_several as several, single_track,
 };
@@ -105,11 +106,9 @@ pub(crate) fn identify<'py>(
     };
     let in_pieces = how.pieces;
     let drive = interruptible(py, None, move |_| match logs.len() {
-        1 if in_pieces => {
-            identify_pieces("drive", &logs.remove(0), &options).map_err(|error| error.to_string())
-        }
-        1 => one("drive", &logs.remove(0), &options, method).map_err(|error| error.to_string()),
-        _ => several("drives", &logs, &options).map_err(|error| error.to_string()),
+        1 if in_pieces => identify_pieces("drive", &logs.remove(0), &options).map_err(StudyError::from),
+        1 => one("drive", &logs.remove(0), &options, method).map_err(StudyError::from),
+        _ => several("drives", &logs, &options),
     })?
     .map_err(|error| errors::input(py, error))?;
     let converted = notes.drain(..1).flatten();

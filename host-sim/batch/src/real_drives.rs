@@ -7,6 +7,7 @@
 mod fed;
 mod hands;
 mod linear;
+mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -22,9 +23,10 @@ use serde::Serialize;
 use crate::error::{StudyError, refuse};
 use fed::fed;
 pub use fed::{End, Ending, Fed, Feed};
+use hands::Felt;
 pub use hands::Hands;
-use hands::{Felt, Rows};
 use linear::linear;
+use rows::Rows;
 
 /// Circular shifts of the guidance torque that K_hg is held against.
 const SHIFTS: usize = 99;

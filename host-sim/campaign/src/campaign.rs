@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::deviation::{Deviation, MOST_EXCESS_M};
 use super::drivers::{Drivers, Limits};
 use super::table::{Class, FaultCase, Place};
-use super::trial::{Deviation, MOST_EXCESS_M, TrialOutcome, World};
+use super::trial::{TrialOutcome, World};
 use haptic_sim::share::wilson;
 
 /// What a campaign showed.

@@ -1,7 +1,6 @@
 //! Who drives in the campaign: the paper's drivers, those who keep the lane in a real car, or those of them who rely on the
 //! guidance. And how far a fault may move the vehicle of each.
 
-use super::trial::{LANE_EDGE_M, OFF_ROAD_M};
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::participants::participants;
 use haptic_sim::population::LaneKeeper;
@@ -10,6 +9,12 @@ use haptic_sim::seeds::{Stream, named};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 use serde::Serialize;
+
+/// Who goes further aside than a lane is wide without any torque is thrown off the road whatever the ECU does: metres
+/// beyond that say nothing of a handover, and are not judged.
+pub const OFF_ROAD_M: f64 = 3.6;
+/// From the middle of a lane of 3.6 m to where a vehicle of 1.7 m begins to leave it, m.
+pub(crate) const LANE_EDGE_M: f64 = 0.95;
 
 /// Remnant of those who keep the lane in a real car, N.m: that of `host-sim availability` on a motorway.
 const REMNANT_SD_NM: f64 = 0.4;

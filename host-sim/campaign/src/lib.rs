@@ -27,6 +27,7 @@
 
 mod bytes;
 pub mod campaign;
+mod deviation;
 pub mod document;
 pub mod drivers;
 mod ecu_harness;
@@ -44,7 +45,9 @@ mod trial_record;
 mod verdict;
 mod wire;
 
+pub use deviation::Deviation;
+pub use drivers::OFF_ROAD_M;
 pub use invariants::Violation;
 pub use residual::Seen;
 pub use speed_change::SpeedChange;
-pub use trial::{Deviation, OFF_ROAD_M, TrialOutcome, World};
+pub use trial::{TrialOutcome, World};

@@ -11,15 +11,14 @@
 //! where this vehicle is at the instants of a run at one speed; the arc has its 0.93 m/s2 where the vehicle is fastest, and less
 //! elsewhere. The driver keeps a lane at every speed in between.
 //!
-//! Where the vehicle goes is judged by forks of the same run: *fault-free* goes on without the fault from the onset, *dropped*
-//! loses the torque in the step in which the ECU leaves. The *deviation* is the distance from the fault-free vehicle across
-//! its direction at the same instant.
+//! Where the vehicle goes [`mod@super::deviation`] judges.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
+use super::deviation::{AFTER_MS, Deviation, drive};
 use super::drivers::{Driver, Drivers, everyone, lane_keeper, relying};
 use super::ecu_harness::EcuHarness;
 use super::injection::Start;
@@ -31,17 +30,16 @@ use super::trial_record::EcuTrace;
 use super::verdict::judge;
 use haptic_core::controller::params::Params;
 use haptic_log::Event;
+use haptic_sim::Simulation;
 use haptic_sim::models::driver::ArmGains;
 use haptic_sim::models::real::WorldParameters;
 use haptic_sim::models::road::Course;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::models::vehicle::VehicleParameters;
-use haptic_sim::parts::DriverVehicle;
 use haptic_sim::scenario::{Scenario, ScenarioBuilder, Speed};
 use haptic_sim::seeds::{Stream, named};
 use haptic_sim::stability::{Guided, growth_per_s};
 use haptic_sim::worlds::{Surface, WorldKind};
-use haptic_sim::{Action, Simulation};
 
 /// Speeds of the campaign, km/h.
 const SPEEDS_KMH: [f64; 7] = [40.0, 50.0, 60.0, 70.0, 80.0, 100.0, 130.0];
@@ -53,18 +51,8 @@ const SETTLES_PER_S: f64 = 0.05;
 const TURNING_KMH: [f64; 2] = [TURN_KMH, 50.0];
 const EARLIEST_ONSET_MS: u32 = 1500;
 const LATEST_ONSET_MS: u32 = 3000;
-const AFTER_MS: u32 = 5200;
 /// A curve to be left behind takes so much longer, ms.
 const BEHIND_MS: u32 = 2500;
-/// A driver who is warned drives as manually so much later, ms.
-const NOTICES_MS: u32 = 1000;
-/// Most that a handover may move the vehicle beyond what dropping the torque in the same step does, m.
-pub(crate) const MOST_EXCESS_M: f64 = 0.1;
-/// Who goes further aside than a lane is wide without any torque is thrown off the road whatever the ECU does: metres
-/// beyond that say nothing of a handover, and are not judged.
-pub const OFF_ROAD_M: f64 = 3.6;
-/// From the middle of a lane of 3.6 m to where a vehicle of 1.7 m begins to leave it, m.
-pub(crate) const LANE_EDGE_M: f64 = 0.95;
 
 const PLACES: [PlaceOnRoad; 3] = [PlaceOnRoad::In, PlaceOnRoad::Before, PlaceOnRoad::After];
 
@@ -122,31 +110,6 @@ pub struct TrialOutcome {
     pub seen: bool,
     /// What failed, and in which step.
     pub failure: Option<Violation>,
-}
-
-/// Where the vehicle of a run went.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Deviation {
-    /// Largest deviation, m.
-    pub faulted_m: f64,
-    /// The same had the torque been dropped in the step in which the ECU left; `None` if it stayed.
-    pub dropped_m: Option<f64>,
-    /// Whether the vehicle left its lane where the fault-free one did not.
-    pub leaves_lane: bool,
-    /// Whether the vehicle was off the road when the ECU left, and so was the fault-free one: its driver took it there.
-    pub driven_off: bool,
-}
-
-impl Deviation {
-    /// How much further the vehicle went than it would have if the torque had been dropped, m.
-    pub fn excess_m(&self) -> Option<f64> {
-        self.dropped_m.map(|dropped_m| self.faulted_m - dropped_m)
-    }
-
-    /// Whether the vehicle leaves the road with the torque dropped or without the fault as well: then no handover is judged.
-    pub fn is_off_road(&self) -> bool {
-        self.driven_off || self.dropped_m.is_some_and(|dropped_m| dropped_m > OFF_ROAD_M)
-    }
 }
 
 impl World {
@@ -433,81 +396,6 @@ fn able(drivers: &[Driver], kmh: f64) -> Vec<usize> {
         })
     };
     (0..drivers.len()).filter(|n| settles(&drivers[*n])).collect()
-}
-
-type Trial<'a> = Simulation<EcuHarness<'a>>;
-
-/// One step, with the hand on the wheel that the row has; whether there was one.
-fn step(simulation: &mut Trial<'_>, takes_over: bool) -> bool {
-    let (step, pair) = (simulation.steps(), simulation.driver_vehicle_mut());
-    pair.take_over(takes_over);
-    let arm_nm = pair.arm_torque_nm();
-    let action = Action {
-        hand_torque_nm: simulation.guidance().hand_torque_nm(step, arm_nm),
-        ..Action::default()
-    };
-    simulation.step(&action).is_some()
-}
-
-/// Distance from another vehicle, across its direction, m.
-fn apart_m(simulation: &Trial<'_>, from: &Trial<'_>) -> f64 {
-    let there = simulation.driver_vehicle().motion();
-    let here = from.driver_vehicle().motion();
-    let [x, y] = [0, 1].map(|axis| there.position_m[axis] - here.position_m[axis]);
-    (y * here.direction_rad.cos() - x * here.direction_rad.sin()).abs()
-}
-
-/// To the end, with the forks beside it if asked for.
-fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Deviation {
-    let mut seen = Deviation::default();
-    let mut healthy: Option<Trial<'_>> = None;
-    let mut dropped: Option<Trial<'_>> = None;
-    let mut edges = [false; 2];
-    loop {
-        if forks && simulation.steps() == onset {
-            healthy = Some(simulation.clone());
-            healthy
-                .as_mut()
-                .into_iter()
-                .for_each(|twin| twin.guidance_mut().heal());
-        }
-        let left_at = simulation.guidance().left_at();
-        let takes_over = left_at.is_some_and(|at| simulation.steps() >= at + NOTICES_MS);
-        let goes_on = simulation.steps() < onset + AFTER_MS && step(simulation, takes_over);
-        if !goes_on {
-            break;
-        }
-        let Some(twin) = &mut healthy else { continue };
-        if !step(twin, false) {
-            break;
-        }
-        seen.faulted_m = seen.faulted_m.max(apart_m(simulation, twin));
-        for (edge, one) in edges.iter_mut().zip([&*simulation, &*twin]) {
-            *edge |= one
-                .lateral_error_m()
-                .is_some_and(|error_m| error_m.abs() > LANE_EDGE_M);
-        }
-        match &mut dropped {
-            Some(without) => {
-                // Off the road it stays where it is.
-                step(without, takes_over);
-                let apart_m = apart_m(without, twin);
-                seen.dropped_m = seen.dropped_m.map(|most_m| most_m.max(apart_m));
-            }
-            None if left_at.is_none() && simulation.guidance().left_at().is_some() => {
-                let without = dropped.insert(simulation.clone());
-                without.guidance_mut().drop_torque();
-                seen.dropped_m = Some(seen.faulted_m);
-                seen.driven_off = [&*simulation, &*twin].iter().all(|one| {
-                    one.lateral_error_m()
-                        .is_some_and(|error_m| error_m.abs() > OFF_ROAD_M)
-                });
-            }
-            None => {}
-        }
-    }
-    seen.leaves_lane = edges[0] && !edges[1];
-    seen
 }
 
 impl Default for World {

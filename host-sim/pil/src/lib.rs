@@ -21,7 +21,7 @@
 //! // Over pipes thousands of ticks are under way at once; SLCAN is what an outside client speaks.
 //! assert_eq!("slcan".parse(), Ok(Channel::Slcan));
 //! let unknown: Result<Channel, _> = "usb".parse();
-//! assert_eq!(unknown.unwrap_err(), "channel 'usb' is neither fifo nor slcan");
+//! assert_eq!(unknown.unwrap_err().to_string(), "channel 'usb' is neither fifo nor slcan");
 //! // What is missing says what to install or to plug in.
 //! let missing = haptic_pil::parameters::Product::on("no-such-interface");
 //! assert!(matches!(missing, Err(PilError::Missing(_) | PilError::Failed(_))));

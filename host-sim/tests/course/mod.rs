@@ -15,8 +15,7 @@ fn root() -> PathBuf {
 }
 
 fn host_sim(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    command.args(arguments).current_dir(root()).output().unwrap()
+    crate::host_sim(&root(), arguments)
 }
 
 fn survey(arguments: &[&str]) -> Value {

@@ -4,8 +4,12 @@ use haptic_core::controller::config::LEAST_BAND_NM;
 use haptic_core::safety::monitor::{ASTRAY_MS, RATE_SPAN_US};
 
 use super::counts::{flag, whole};
-use super::ecu::GUIDED;
 use super::rejected::Reason;
+
+/// Who decides the torque.
+pub(super) const GUIDED: i32 = 0;
+pub(super) const HANDOVER: i32 = 1;
+pub(super) const OFF: i32 = 2;
 
 /// Half the band of the monitor at least, mN.m, and for how many steps a torque may be beyond it.
 const BAND_MNM: f64 = LEAST_BAND_NM * 1e3;

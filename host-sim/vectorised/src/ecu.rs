@@ -10,18 +10,13 @@ use haptic_core::controller::params::Params;
 use haptic_core::law::{self, schedule};
 use haptic_core::safety::{envelope, hands, plausibility, ramp};
 
-use super::band::Band;
+use super::band::{Band, GUIDED, HANDOVER, OFF};
 use super::coast::{Coast, GOES_ON_MS};
 use super::counts::{MS, ONE, bits, flag, ms, on_the_bus, per_second, small_bits, speed_heard, whole};
 use super::probe::Probes;
 use super::rejected::Reason;
 use haptic_sim::models::sensors::TORQUE_RESOLUTION_NM;
 use haptic_sim::scenario::{Condition, Scenario};
-
-/// Who decides the torque.
-pub(super) const GUIDED: i32 = 0;
-const HANDOVER: i32 = 1;
-const OFF: i32 = 2;
 
 /// An LSB of a torque on the bus.
 pub(super) const TORQUE_LSB: i32 = 1 << 12;

@@ -7,21 +7,13 @@ use super::divide::{SIX, TWENTY_FOUR};
 use super::points::Points;
 use super::real::{Acting, Reals};
 use super::tracked::{ALL, Tracked};
-use super::{ALIVE, Aligned};
+use super::{ALIVE, ARM, Aligned, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::delay_steps;
 use haptic_sim::models::plant::{COLUMNS, STATES, Transition};
 use haptic_sim::models::road::Centreline;
 use haptic_sim::scenario::Scenario;
 use haptic_sim::simulation::{DIVERGED_M, Plan};
-
-/// Places of the states, as the plant has them.
-pub(super) const BETA: usize = 0;
-pub(super) const YAW_RATE: usize = 1;
-pub(super) const WHEEL: usize = 2;
-pub(super) const WHEEL_RATE: usize = 3;
-pub(super) const ARM: usize = 4;
-pub(super) const YAW: usize = 5;
 
 /// The worlds.
 #[repr(C, align(64))]

@@ -2,7 +2,8 @@
 //! models' names.
 
 use haptic_fmu::MODELS;
-use haptic_fmu::variable::{About, Kind, Role, Variable};
+use haptic_fmu::model::About;
+use haptic_fmu::variable::{Kind, Role, Variable};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

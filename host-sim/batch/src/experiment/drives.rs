@@ -229,14 +229,7 @@ mod tests {
         let out = |scenario: &&Scenario| haptic_vectorised::unsupported_reason(scenario).is_some();
         assert_eq!(scenarios.iter().filter(out).count(), 1);
         let bits = |driven: &Driven| {
-            let log = &driven.log;
-            let columns = [
-                &log.e_y_m,
-                &log.e_theta_rad,
-                &log.wheel_angle_rad,
-                &log.guidance_torque_nm,
-                &log.driver_torque_nm,
-            ];
+            let columns = driven.log.signals();
             columns.map(|column| column.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
         };
         let clone = |scenario: &Scenario| Ok(scenario.clone());

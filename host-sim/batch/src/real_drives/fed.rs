@@ -17,7 +17,7 @@ use haptic_core::safety::modes::Mode;
 use haptic_sim::models::sensors;
 use serde::Serialize;
 
-use super::hands::Rows;
+use super::rows::Rows;
 use crate::availability::{Rate, UNNAMED, Watch};
 
 /// Rows further apart are a gap, in which nothing is sent, s.

@@ -3,7 +3,8 @@ use std::path::Path;
 use haptic_analysis::identify::Layout;
 
 use super::fed::{Feed, fed};
-use super::hands::{Felt, Hands, Rows, area, turned};
+use super::hands::{Felt, Hands, area};
+use super::rows::{Rows, turned};
 
 /// 100 s shared and 60 s by hand, of simulated drives with the paper's vehicle.
 fn recorded() -> Rows {

@@ -5,11 +5,16 @@
 //! interval, with the mean of its drives; where nothing is drawn, a repeat does. What a list compares meets the same samples,
 //! and its values are compared sample by sample.
 
+use haptic_analysis::metrics::Definition;
 use serde::Serialize;
 
 use super::groups::{CONFIDENCE, Drives, Group, Moments, share_between, student};
-use super::summary::small_is_bad;
 use super::{Driven, Point, SLICES, Sweep, units, value};
+
+/// Whether a small value of a metric is the bad one.
+pub(super) fn small_is_bad(metric: &Definition) -> bool {
+    metric.name.ends_with("time_to_lane_crossing_s")
+}
 
 /// A list with more rows is cut into slices.
 const MOST_LEVELS: usize = 64;
@@ -103,7 +108,7 @@ struct Sums {
 impl Effects {
     pub(super) fn new(sweep: &Sweep, judge: usize) -> Self {
         let mut column = 0;
-        let axis = |axis: &super::file::Axis| {
+        let axis = |axis: &super::axis::Axis| {
             let of_list = axis.rows();
             let rows = of_list.unwrap_or(SLICES as usize);
             let first = column;

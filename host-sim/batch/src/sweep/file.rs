@@ -5,12 +5,10 @@ use haptic_sim::input::{InputError, parse_toml};
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
+use super::axis::{Axis, Column, Kind};
 use super::value::Distribution;
 use super::vary::varied;
 use crate::error::{StudyError, refuse};
-
-/// Most values of one list or range: more belong into a distribution.
-pub(super) const MOST_VALUES: u32 = 100_000;
 
 /// How sampled fields are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -106,42 +104,6 @@ pub(super) struct TableFile {
     /// Whether a row is drawn for each sample; else each sample meets every row.
     #[serde(default)]
     pub choice: bool,
-}
-
-/// A column of the results, and the fields of the scenario that it sets.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Column {
-    pub name: String,
-    pub paths: Vec<String>,
-    /// What the fields get is the column's number times this,
-    pub times: f64,
-    /// over the number of that column.
-    pub over: Option<String>,
-}
-
-/// Columns that vary together.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axis {
-    pub columns: Vec<Column>,
-    pub kind: Kind,
-}
-
-impl Axis {
-    /// How many values a list or a choice has; none of a distribution.
-    pub(super) fn rows(&self) -> Option<usize> {
-        match &self.kind {
-            Kind::Grid(rows) => Some(rows.len()),
-            Kind::Sampled(distribution) => distribution.rows().map(<[_]>::len),
-        }
-    }
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Kind {
-    /// Every row with everything else.
-    Grid(Vec<Vec<Value>>),
-    /// A row a sample.
-    Sampled(Distribution),
 }
 
 impl SweepFile {

@@ -12,6 +12,7 @@
 //!
 //! Not here: the order of clusters and queues (whoever calls `run_chunk`), pictures.
 
+mod axis;
 mod chunk;
 mod design;
 mod drive;
@@ -55,8 +56,9 @@ use haptic_sim::scenario::Scenario;
 use toml::{Table, Value};
 
 use crate::error::{StudyError, refuse};
+use axis::{Axis, Kind};
 use design::Places;
-use file::{Axis, Kind, SweepFile, definition};
+use file::{SweepFile, definition};
 
 /// Most drives of a sweep.
 pub const MOST_DRIVES: u64 = 1_000_000_000;

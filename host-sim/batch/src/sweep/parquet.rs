@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io;
 
-use super::file::Kind as AxisKind;
+use super::axis::Kind as AxisKind;
 use super::table::header;
 use super::{Driven, Point, Sweep, value};
 use crate::parquet::{Cell, Column, Table};

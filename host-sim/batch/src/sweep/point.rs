@@ -5,7 +5,7 @@ use haptic_sim::scenario::Scenario;
 use haptic_sim::seeds::{self, Stream};
 use toml::Value;
 
-use super::file::Kind;
+use super::axis::Kind;
 use super::{Design, MOST_DRIVES, Point, SLICES, Sweep, value};
 use crate::error::StudyError;
 

@@ -8,7 +8,8 @@ use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::scenario::Scenario;
 use toml::{Table, Value};
 
-use super::file::{Kind, SweepFile};
+use super::axis::Kind;
+use super::file::SweepFile;
 use super::value;
 use crate::files::load_lane;
 

@@ -6,7 +6,7 @@ use haptic_analysis::metrics::Definition;
 use haptic_sim::unguided::Cause;
 use serde::Serialize;
 
-use super::effects::Effects;
+use super::effects::{Effects, small_is_bad};
 use super::saltelli::{Blocks, SobolIndex};
 use super::{Design, Driven, Effect, Point, Sweep, value};
 use crate::Away;
@@ -104,11 +104,6 @@ pub(super) struct Summarised<'a> {
     effects: Effects,
     blocks: Option<Blocks>,
     worst: Vec<Worst>,
-}
-
-/// Whether a small value of a metric is the bad one.
-pub(super) fn small_is_bad(metric: &Definition) -> bool {
-    metric.name.ends_with("time_to_lane_crossing_s")
 }
 
 impl<'a> Summarised<'a> {

@@ -2,7 +2,7 @@
 
 use haptic_sim::scenario::unit_of;
 
-use super::file::Column;
+use super::axis::Column;
 
 /// The unit of a column's values, `-` if that is 1; none if they are not its fields' values, or the fields have several.
 pub(super) fn of(column: &Column) -> Option<String> {

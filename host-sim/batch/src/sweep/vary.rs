@@ -4,7 +4,7 @@ use haptic_sim::input::InputError;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::file::{Axis, Column, Kind, MOST_VALUES};
+use super::axis::{Axis, Column, Kind, MOST_VALUES};
 use super::value::Distribution;
 use crate::error::{StudyError, refuse};
 

@@ -1,6 +1,8 @@
 //! A speed that changes around the onset, against the drive itself: what the vehicle does, what the bus carries. And who is judged.
 
 use haptic_log::trace::Sample;
+use haptic_sim::Action;
+use haptic_sim::parts::DriverVehicle;
 use haptic_sim::simulation::simulate;
 use haptic_sim::worlds::WORLDS;
 

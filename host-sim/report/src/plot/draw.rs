@@ -4,19 +4,12 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::figure::Figure as Grid;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
-use kuva::render::render::{Primitive, TextAnchor};
 
 use super::Figure;
 use super::frame::Frame;
 use super::legend::Legend;
+use super::page::{LEFT, PAGE_WIDTH, PANEL_HEIGHT, TEXT_SIZE, names_room};
 
-pub(super) const PAGE_WIDTH: f64 = 900.0;
-pub(super) const PANEL_HEIGHT: f64 = 190.0;
-pub(super) const LEFT: f64 = 76.0;
-pub(super) const RIGHT: f64 = 16.0;
-pub(super) const TEXT_SIZE: u32 = 14;
-/// About the width of a letter of that size.
-pub(super) const LETTER: f64 = 8.2;
 /// Around the page.
 const PADDING: f64 = 6.0;
 
@@ -82,21 +75,6 @@ pub(super) fn svg(figure: &Figure) -> String {
     tidy(&SvgBackend::new().render_scene(&scene), scene.width, scene.height)
 }
 
-/// Words whose middle has the height `y`.
-pub(super) fn text(x: f64, y: f64, words: &str, size: u32, anchor: TextAnchor, colour: &str) -> Primitive {
-    Primitive::Text {
-        x,
-        // Half the height of a digit.
-        y: y + 0.36 * f64::from(size),
-        content: words.into(),
-        size,
-        anchor,
-        rotate: None,
-        bold: false,
-        color: Some(colour.into()),
-    }
-}
-
 /// Round joins, because a mitred join of a zigzag reaches beyond the data. The names of clip paths, which the
 /// drawing library counts up for as long as the program runs, start from zero, so that equal figures are equal text. A view
 /// box, without which a narrow page or paper would cut the drawing.
@@ -144,15 +122,4 @@ impl Page {
         }
         grid
     }
-}
-
-/// Room for the names of the rows.
-pub(super) fn names_room(figure: &Figure) -> f64 {
-    let longest = figure
-        .rows
-        .iter()
-        .map(|name| name.chars().count())
-        .max()
-        .unwrap_or(0);
-    (0.82 * LETTER * longest as f64 + 16.0).max(LEFT)
 }

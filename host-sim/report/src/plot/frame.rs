@@ -7,7 +7,7 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, TextAnchor};
 
-use super::draw::{LEFT, LETTER, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, TEXT_SIZE, names_room, text};
+use super::page::{LEFT, LETTER, PAGE_WIDTH, PANEL_HEIGHT, RIGHT, TEXT_SIZE, names_room, text};
 use super::style::Style;
 use super::{Figure, Mark, Panel, Series, polyline, style};
 

@@ -5,8 +5,8 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::{Primitive, TextAnchor};
 
-use super::draw::{LEFT, LETTER, PAGE_WIDTH, RIGHT, TEXT_SIZE, text};
 use super::frame::{Frame, INTERVAL_OPACITY, bounds, dots, ends, line, marker, stems, whiskers};
+use super::page::{LEFT, LETTER, PAGE_WIDTH, RIGHT, TEXT_SIZE, text};
 use super::{Figure, Mark, Series, Shade, style};
 
 const LINE_HEIGHT: f64 = 22.0;

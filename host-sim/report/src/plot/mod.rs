@@ -17,6 +17,7 @@
 mod draw;
 mod frame;
 mod legend;
+mod page;
 mod pages;
 mod polyline;
 mod raster;

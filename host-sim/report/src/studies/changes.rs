@@ -2,7 +2,7 @@
 
 use haptic_batch::experiment::{Changes, ChangesLine};
 
-use super::validation::place;
+use super::place;
 use crate::document::{Cell, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 

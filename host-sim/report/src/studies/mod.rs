@@ -31,6 +31,11 @@ use crate::plot::{Mark, PlotError, Series};
 pub use crate::document::SeriesFormat;
 pub use files::write;
 
+/// Place of a row in a figure of rows.
+fn place(row: usize) -> f64 {
+    row as f64 + 1.0
+}
+
 /// Why a line ends when the vehicle did not stay on the road.
 const LEFT_THE_ROAD: &str = "ends: left the road";
 

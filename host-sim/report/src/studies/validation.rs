@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::changes;
+use super::{changes, place};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::experiment::{
@@ -143,11 +143,6 @@ impl Validation {
             Self::Methods(result) => methods_figure(&result.lines),
         }
     }
-}
-
-/// Place of a row in a figure of rows.
-pub(super) fn place(row: usize) -> f64 {
-    row as f64 + 1.0
 }
 
 /// So that dots of one row do not hide one another.

@@ -10,10 +10,9 @@ use std::sync::Arc;
 use haptic_core::quantity::Torque;
 use haptic_core::safety::actuator::{Actuator, Motor};
 
-use super::ALIVE;
 use super::counts::{ONE, bits, on_the_bus};
 use super::rejected::Reason;
-use super::world::{ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
+use super::{ALIVE, ARM, BETA, WHEEL, WHEEL_RATE, YAW, YAW_RATE};
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::ArmGains;
 use haptic_sim::models::plant;

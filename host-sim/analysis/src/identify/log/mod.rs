@@ -147,6 +147,15 @@ impl DriveLog {
 
     /// A log of signals that are on an even grid already: e_y, e_theta, wheel angle, T_h and T_d, of equal lengths.
     pub(crate) fn from_signals(start_s: f64, dt_s: f64, signals: [Vec<f64>; 5]) -> Result<Self, LogError> {
+        let span_s = dt_s * signals[4].len() as f64;
+        if span_s < SHORTEST_S {
+            return refuse(too_short(span_s));
+        }
+        Self::from_grid(start_s, dt_s, signals)
+    }
+
+    /// The same, of any length.
+    fn from_grid(start_s: f64, dt_s: f64, signals: [Vec<f64>; 5]) -> Result<Self, LogError> {
         let [
             e_y_m,
             e_theta_rad,
@@ -154,11 +163,6 @@ impl DriveLog {
             guidance_torque_nm,
             driver_torque_nm,
         ] = signals;
-        let findings = Vec::new();
-        let span_s = dt_s * driver_torque_nm.len() as f64;
-        if span_s < SHORTEST_S {
-            return refuse(too_short(span_s));
-        }
         check_sensor(&driver_torque_nm)?;
         Ok(Self {
             start_s,
@@ -171,8 +175,20 @@ impl DriveLog {
             approximate_points: false,
             resampling: Vec::new(),
             speeds_m_per_s: None,
-            findings,
+            findings: Vec::new(),
         })
+    }
+
+    /// The signals, in the order of [`COLUMNS`] behind the time.
+    #[must_use]
+    pub fn signals(&self) -> [&Vec<f64>; 5] {
+        [
+            &self.e_y_m,
+            &self.e_theta_rad,
+            &self.wheel_angle_rad,
+            &self.guidance_torque_nm,
+            &self.driver_torque_nm,
+        ]
     }
 
     /// Reads and checks the file at `path`. Lines that begin with `#` are skipped; upper and lower case are one in
@@ -327,27 +343,11 @@ impl DriveLog {
                 return refuse(format!("{name} holds no number"));
             }
         }
-        let [
-            e_y_m,
-            e_theta_rad,
-            wheel_angle_rad,
-            guidance_torque_nm,
-            driver_torque_nm,
-        ] = signals;
-        check_wheel_resolution(&wheel_angle_rad, lines)?;
-        check_sensor(&driver_torque_nm)?;
+        check_wheel_resolution(&signals[2], lines)?;
         Ok(Self {
-            start_s: grid.start_s,
-            dt_s: grid.dt_s,
-            e_y_m,
-            e_theta_rad,
-            wheel_angle_rad,
-            guidance_torque_nm,
-            driver_torque_nm,
-            approximate_points: false,
             resampling: grid.autocorrelation(&time),
-            speeds_m_per_s: None,
-            findings: grid.finding.into_iter().collect(),
+            findings: grid.finding.iter().cloned().collect(),
+            ..Self::from_grid(grid.start_s, grid.dt_s, signals)?
         })
     }
 }

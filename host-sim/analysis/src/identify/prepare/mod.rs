@@ -120,13 +120,7 @@ pub(crate) struct Prepared {
 /// Examines, repairs and cuts `log`.
 pub(crate) fn prepare(log: &DriveLog, options: &Options) -> Prepared {
     let dt = log.dt_s;
-    let columns = [
-        &log.e_y_m,
-        &log.e_theta_rad,
-        &log.wheel_angle_rad,
-        &log.guidance_torque_nm,
-        &log.driver_torque_nm,
-    ];
+    let columns = log.signals();
     let examined = [0, 1, 2, 3, 4].map(|c| faults::examine(columns[c], LEAST[c], c < 2));
     let lane = [0, 1].map(|c| {
         options

@@ -6,7 +6,7 @@
 use roxmltree::Node;
 
 use super::error::{RoadError, refuse};
-use super::polynomial::Polynomial;
+use super::polynomial::{Point, Polynomial};
 use super::xml::{cubic, number, text};
 use crate::models::road::centreline::quadrature;
 use crate::models::road::course::MAX_COURSE_M;
@@ -22,17 +22,6 @@ const GAP_ALONG_M: f64 = 0.01;
 const GAP_M: f64 = 0.1;
 /// Most that an element may turn, rad: a spiral of a hundred and sixty circles.
 const MOST_TURN_RAD: f64 = 1000.0;
-
-/// A point of the reference line.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Point {
-    pub(super) pose: Pose,
-    pub(super) curvature_1pm: f64,
-    /// Change of the curvature with arc length, 1/m^2.
-    pub(super) curvature_slope_1pm2: f64,
-    /// Arc length per s; 1 but for polynomials whose stated length is not theirs.
-    pub(super) stretch: f64,
-}
 
 /// An element of the plan view.
 #[derive(Debug, Clone)]

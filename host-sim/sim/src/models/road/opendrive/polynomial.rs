@@ -4,9 +4,19 @@
 //! states, arc length is stretched by the small rest, so that both ends are met.
 
 use super::error::{RoadError, refuse};
-use super::geometry::Point;
 use crate::models::road::centreline::quadrature;
 use crate::models::road::piece::Pose;
+
+/// A point of the reference line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    pub(super) pose: Pose,
+    pub(super) curvature_1pm: f64,
+    /// Change of the curvature with arc length, 1/m^2.
+    pub(super) curvature_slope_1pm2: f64,
+    /// Arc length per s; 1 but for polynomials whose stated length is not theirs.
+    pub(super) stretch: f64,
+}
 
 /// Distance between two entries of a table, m.
 const TABLE_STEP_M: f64 = 0.25;

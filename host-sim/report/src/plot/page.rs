@@ -1,0 +1,39 @@
+//! The page that a figure stands on: its measures, and words on it.
+
+use kuva::render::render::{Primitive, TextAnchor};
+
+use super::Figure;
+
+pub(super) const PAGE_WIDTH: f64 = 900.0;
+pub(super) const PANEL_HEIGHT: f64 = 190.0;
+pub(super) const LEFT: f64 = 76.0;
+pub(super) const RIGHT: f64 = 16.0;
+pub(super) const TEXT_SIZE: u32 = 14;
+/// About the width of a letter of that size.
+pub(super) const LETTER: f64 = 8.2;
+
+/// Words whose middle has the height `y`.
+pub(super) fn text(x: f64, y: f64, words: &str, size: u32, anchor: TextAnchor, colour: &str) -> Primitive {
+    Primitive::Text {
+        x,
+        // Half the height of a digit.
+        y: y + 0.36 * f64::from(size),
+        content: words.into(),
+        size,
+        anchor,
+        rotate: None,
+        bold: false,
+        color: Some(colour.into()),
+    }
+}
+
+/// Room for the names of the rows.
+pub(super) fn names_room(figure: &Figure) -> f64 {
+    let longest = figure
+        .rows
+        .iter()
+        .map(|name| name.chars().count())
+        .max()
+        .unwrap_or(0);
+    (0.82 * LETTER * longest as f64 + 16.0).max(LEFT)
+}
