@@ -113,6 +113,8 @@ fn where_the_vehicle_went_meanwhile_is_known() {
         rig.silent[LANE] = true;
         rig.run(20);
         rig.turn(-0.1);
+        // A sensor that is alive moves by its last bit.
+        rig.driver = Some(1.0 / 4096.0);
         rig.run(500);
         rig.turn(0.0);
         rig.silent[LANE] = false;
@@ -181,6 +183,8 @@ fn a_lane_change_by_hand_is_no_fault() {
         let line = if e_y < -1.6 { 3.5 } else { 0.0 };
         rig.lane.e_theta = Radians::from_rad(-heading);
         rig.lane.e_y = Metres::from_m(e_y + line - 0.3 * SPEED * heading);
+        // A sensor that is alive moves.
+        rig.driver = (ms % 500 < 2).then_some(1.0 / 4096.0);
         let step = rig.tick();
         assert_eq!(
             step.command.mode,

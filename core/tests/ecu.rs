@@ -25,9 +25,9 @@ const BUS_LSB: f64 = 1.0 / 4096.0;
 /// The signals of a frame, read without a receiver's history.
 fn read<M: Message>(frame: &Frame) -> Option<M> {
     (frame.id() == M::ID).then(|| {
-        let bytes = frame.data().try_into().unwrap();
-        assert!(M::PROTECTION.is_intact(&bytes));
-        M::unpack(u64::from_le_bytes(bytes)).unwrap()
+        let bytes = frame.payload().unwrap();
+        assert!(M::PROTECTION.is_intact(bytes));
+        M::unpack(bytes).unwrap()
     })
 }
 

@@ -225,7 +225,7 @@ fn a_veto_hides_no_other_fault() {
     let step = rig.tick();
     assert!(!step.permitted);
     let bytes: [u8; 8] = step.guidance.data().try_into().unwrap();
-    let told = Guidance::unpack(u64::from_le_bytes(bytes)).unwrap().faults;
+    let told = Guidance::unpack(&bytes).unwrap().faults;
     for fault in [Fault::LaneTimeout, Fault::Monitor, Fault::Memory] {
         assert!(
             step.command.faults.contains(fault) && told.contains(fault),
@@ -345,8 +345,7 @@ fn telemetry_beyond_its_fields_stays_at_their_ends() {
         }),
     };
     let frame = beyond.encode(0);
-    let word = u64::from_le_bytes(frame.data().try_into().unwrap());
-    let read = Telemetry::unpack(word).unwrap();
+    let read = Telemetry::unpack(frame.payload().unwrap()).unwrap();
     // Of the fields of core/haptic.dbc: 2047 counts of 2^-12 N.m, 4, 2047 counts of 2^-10.
     assert_eq!(read.probe.unwrap().nm(), 2047.0 / 4096.0);
     let reading = read.k_hg.unwrap();
@@ -364,8 +363,7 @@ fn the_largest_number_of_a_vehicle_arrives_whole() {
         hardware: u32::MAX,
     };
     let frame = sent.encode(0);
-    let word = u64::from_le_bytes(frame.data().try_into().unwrap());
-    assert_eq!(Identity::unpack(word), Some(sent));
+    assert_eq!(Identity::unpack(frame.payload().unwrap()), Some(sent));
     assert_eq!(sent.vehicle, 0xF_FFFF);
 }
 

@@ -62,7 +62,10 @@ fn each_fault_has_its_bit_in_the_guidance_frame() {
             faults: FaultSet::NONE.with(fault),
             reset: ResetCause::PowerOn,
         };
-        assert_eq!(guidance.pack() >> 37 & 0x1F_FFFF, 1 << code, "{fault:?}");
+        let mut data = [0; 8];
+        guidance.pack(&mut data);
+        let faults = u64::from_le_bytes(data) >> 37 & 0x1F_FFFF;
+        assert_eq!(faults, 1 << code, "{fault:?}");
     }
 }
 

@@ -176,6 +176,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
             let evidence = Evidence {
                 lane: Some(&lane),
                 column: None,
+                vehicle: None,
                 request: ms.is_multiple_of(10).then_some(&request),
                 guidance: &guidance,
                 elapsed_us,
@@ -218,6 +219,7 @@ fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> Monit
         let evidence = Evidence {
             lane: Some(&lane),
             column: None,
+            vehicle: None,
             request: Some(request),
             guidance: &guidance,
             elapsed_us: 1_000,
@@ -365,12 +367,11 @@ fn the_estimator_is_told_what_was_applied_until_the_sample() {
     rig.probe = true;
     let estimator = Setup::PAPER.estimator;
     let mut state = estimator.start();
-    let (mut delayed, mut has_begun) = (0.0, false);
+    let mut has_begun = false;
     for _ in 0..12_000 {
         let applied = rig.applied;
-        // A driver who yields, an arm behind the torque.
-        delayed += (applied - 0.4 - delayed) * 0.01;
-        let driver = -0.5 * delayed;
+        // A driver who yields at once, whom the arm's lag that is assumed puts 1.57 rad apart.
+        let driver = -0.5 * (applied - 0.4);
         rig.driver = Some(driver);
         let is_new = rig.ticks.is_multiple_of(2);
         let step = rig.tick();

@@ -260,6 +260,8 @@ fn what_a_late_camera_did_not_see_yet_is_made_up_for() {
         }
         assert_eq!((mode(&rig), rig.applied), (Mode::Active, 0.0));
         rig.turn(0.1);
+        // A sensor that is alive moves by its last bit.
+        rig.driver = Some(1.0 / 4096.0);
         rig.run(100);
         assert_eq!(mode(&rig), Mode::Active);
         // Half of a period of the vehicle's message, 5 ms, is 2.5 % of it.

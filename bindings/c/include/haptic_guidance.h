@@ -21,7 +21,7 @@ extern "C" {
 #define HG_ECU_ALIGN 8
 
 /* Number of parameters; hg_parameter numbers them. */
-#define HG_PARAMETERS 22
+#define HG_PARAMETERS 29
 
 /* Torque of one count of hg_step.torque_raw: 2^-12 N.m, as on the bus. */
 #define HG_TORQUE_LSB_NM (1.0 / 4096.0)
@@ -38,7 +38,7 @@ typedef enum hg_status {
     HG_ERROR_NOT_MADE = 3,  /* hg_ecu_init did not make this ECU */
     HG_ERROR_RANGE = 4,     /* a value is outside its range or no number */
     /* Why a frame is not used; the last good one stays in use until it is stale. */
-    HG_REJECT_LENGTH = 16,      /* not eight bytes */
+    HG_REJECT_LENGTH = 16,      /* not as long as its message is */
     HG_REJECT_CRC = 17,         /* flipped bits, or another message's data ID */
     HG_REJECT_REPEATED = 18,    /* the counter repeats the last one */
     HG_REJECT_JUMP = 19,        /* the counter went back or too far ahead */
@@ -83,7 +83,14 @@ typedef enum hg_parameter {
     HG_VEHICLE_ALIGNING_GAIN_NM_S2_PER_M = 18,
     HG_VEHICLE_COLUMN_DAMPING_NM_S = 19,
     HG_VEHICLE_FAR_TIME_S = 20,
-    HG_VEHICLE_NEAR_TIME_S = 21
+    HG_VEHICLE_NEAR_TIME_S = 21,
+    HG_LAW = 22,
+    HG_FDCA_K_Y_RAD_PER_M = 23,
+    HG_FDCA_K_PSI = 24,
+    HG_FDCA_LOHS = 25,
+    HG_FDCA_SOHF = 26,
+    HG_FDCA_LOHA_NM_PER_RAD = 27,
+    HG_ACTIVITY_LAMBDA_MIN = 28
 } hg_parameter;
 
 /* A classic CAN data frame. */
@@ -121,6 +128,9 @@ int32_t hg_parameters_default(double *values);
  * studies. wrong: null, or where HG_ERROR_RANGE leaves the number of the parameter out of range, HG_PARAMETERS for a
  * product of several. */
 int32_t hg_ecu_init(hg_ecu *ecu, const double *values, uint8_t engaged, uint32_t now_us, uint32_t *wrong);
+
+/* 1 for an identifier under which the ECU hears something, else 0. */
+uint8_t hg_is_input(uint16_t id);
 
 /* Takes a frame that arrived at now_us. Frames of no interest are HG_OK. */
 int32_t hg_ecu_receive(hg_ecu *ecu, const hg_frame *frame, uint32_t now_us);

@@ -7,7 +7,7 @@
 
 use core::mem::{align_of, size_of};
 
-use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle, is_input};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::{PARAMETERS, Params};
@@ -18,7 +18,7 @@ use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torq
 const ECU_SIZE: usize = 4096;
 const ECU_ALIGN: usize = 8;
 /// `HG_PARAMETERS` of the header.
-const PARAMETER_COUNT: usize = 22;
+const PARAMETER_COUNT: usize = 29;
 /// In front of an ECU that was made by [`hg_ecu_init`].
 const MADE: u32 = 0x4847_4543;
 
@@ -258,6 +258,12 @@ pub unsafe extern "C" fn hg_ecu_init(
         Ok(())
     };
     code(make())
+}
+
+/// Whether the ECU hears something under an identifier.
+#[unsafe(no_mangle)]
+pub extern "C" fn hg_is_input(id: u16) -> u8 {
+    u8::from(is_input(id))
 }
 
 /// Takes a frame.

@@ -20,6 +20,8 @@ use super::counts::{ONE, speed_heard};
 pub enum Reason {
     /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
     Camera,
+    /// Another law than the paper's.
+    AnotherLaw,
     /// Exact sensors, past the bus.
     ExactSensors,
     /// Slower than the controller guides.
@@ -64,12 +66,13 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 21] = [
+    pub const ALL: [(Self, &str); 22] = [
         (
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
         ),
-        (Self::ExactSensors, "exact sensors, motion_history the bus"),
+        (Self::AnotherLaw, "another law than the paper's"),
+        (Self::ExactSensors, "exact sensors, past the bus"),
         (Self::TooSlow, "slower than is guided"),
         (
             Self::EarlyFailure,
@@ -155,6 +158,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
     let heard_m_per_s = f64::from(speed_heard(scenario)) * (1.0 / ONE);
     let reasons = [
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
+        (guided && params.law != 0.0, Reason::AnotherLaw),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (
             guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
@@ -197,41 +201,46 @@ fn camera_errors(car: &Car) -> [f64; 4] {
                 tyres: _,
                 mu: _,
                 castor_share: _,
-                bank: _,
-                friction: _,
-                friction_give: _,
-                assist: _,
-                assist_speed: _,
-                motor_lag: _,
+                bank_rad: _,
+                friction_nm: _,
+                friction_give_rad: _,
+                assist_nm: _,
+                assist_speed_m_per_s: _,
+                motor_lag_s: _,
                 motor_error: _,
-                motor_ripple: _,
-                wind: _,
-                gust_sd: _,
-                gust_corner: _,
-                wind_lever: _,
+                motor_ripple_nm: _,
+                wind_n: _,
+                gust_sd_n: _,
+                gust_corner_hz: _,
+                wind_lever_m: _,
             },
         sensor_errors:
             SensorErrors {
-                torque_bias: _,
+                torque_bias_nm: _,
                 torque_gain: _,
-                angle_bias: _,
+                angle_bias_rad: _,
                 speed_gain: _,
-                yaw_rate_bias: _,
+                yaw_rate_bias_rad_per_s: _,
                 yaw_rate_gain: _,
-                yaw_rate_noise: _,
-                lane_noise: _,
-                heading_noise: _,
-                camera_yaw: _,
-                camera_latency,
-                camera_jitter,
-                dropouts,
+                yaw_rate_noise_rad_per_s: _,
+                lane_noise_m: _,
+                heading_noise_rad: _,
+                camera_yaw_rad: _,
+                camera_latency_s,
+                camera_jitter_s,
+                dropout_rate_per_s,
                 // Without its rate a dropout or a jump never comes.
-                dropout: _,
-                line_jumps,
-                line_jump: _,
+                dropout_duration_s: _,
+                line_jump_rate_per_s,
+                line_jump_m: _,
             },
     } = *car;
-    [camera_latency, camera_jitter, dropouts, line_jumps]
+    [
+        camera_latency_s,
+        camera_jitter_s,
+        dropout_rate_per_s,
+        line_jump_rate_per_s,
+    ]
 }
 
 /// All of a controller's parameters are vectorised, but for what its estimator alone knows of the driver's arm.
@@ -268,6 +277,14 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
                 far_time_s: _,
                 near_time_s: _,
             },
+        law: _,
+        // Without its law none of these acts.
+        fdca_k_y_rad_per_m: _,
+        fdca_k_psi: _,
+        fdca_lohs: _,
+        fdca_sohf: _,
+        fdca_loha_nm_per_rad: _,
+        activity_lambda_min: _,
     } = controller;
     controller
 }
