@@ -446,3 +446,13 @@ fn an_unlock_is_for_one_attempt() {
         assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
     }
 }
+
+/// An unlock for another set takes the permission to write this one. It lasts for two seconds.
+#[test]
+fn a_wrong_unlock_locks() {
+    assert_eq!(UNLOCK_MS, 2000);
+    let mut download = unlocked();
+    assert_eq!(download.receive(&unlock(8, VEHICLE), &READY), None);
+    assert_eq!(download.receive(&frames(&SET)[0], &READY), None);
+    assert_eq!(download.status(None, false).outcome, WriteOutcome::NotUnlocked);
+}

@@ -328,6 +328,10 @@ fn a_refused_speed_is_no_standstill() {
     assert!(!rig.ecu.stands());
     rig.run(200);
     assert!(rig.ecu.stands());
+    // Nobody says so any more.
+    rig.silent[VEHICLE] = true;
+    rig.run(100);
+    assert!(!rig.ecu.stands());
 }
 
 /// One wheel locks while the vehicle brakes with 12 m/s^2, the other one tells how much slower it becomes; when the wheel

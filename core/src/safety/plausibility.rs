@@ -583,6 +583,9 @@ mod tests {
             CHECKS.motion(&mut state, speed, None);
             state.set_wheel_angle(Radians::from_rad(wheel * by_wheel / 0.05));
             let measured = TurningRate::from_rad_per_s(by_wheel + sign * 0.02);
+            // The first may be any: nothing came before that it could have stepped from.
+            let swerve = TurningRate::from_rad_per_s(sign * 0.4);
+            assert_eq!({ state }.accepted_yaw_rate(swerve, passed), Some(swerve));
             for _ in 0..2000 {
                 let accepted = state.accepted_yaw_rate(measured, passed);
                 assert_eq!(accepted, Some(measured));
