@@ -60,9 +60,9 @@ pub fn number_of(words: &[u32]) -> u32 {
     digest.finalize()
 }
 
-/// Looks at the image that runs.
+/// Checks the image that runs against its seal.
 #[cfg(target_os = "none")]
-pub fn look() -> State {
+pub fn check() -> State {
     use core::slice::from_raw_parts;
 
     /// Written by `cargo xtask seal`.

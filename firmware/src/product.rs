@@ -50,7 +50,7 @@ pub fn run(ecu: &'static mut Option<Ecu>, mut disturb: impl FnMut(&mut Ecu, Boot
     stack::paint();
     let mut board = ThisBoard::start();
     let mut boot = reset::boot(board.reset_source());
-    let image = image::look();
+    let image = image::check();
     boot.latched.insert_if(!image.is_good(), Fault::Memory);
     let is_sound = image.is_good() && board.has_expected_options();
     let found = if is_sound {

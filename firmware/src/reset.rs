@@ -95,7 +95,7 @@ impl Record {
     }
 
     /// The record of a copy, if it is whole.
-    fn of([a, b, announced, recent, total, latched, crc]: [u32; COPY]) -> Option<Self> {
+    fn from_words([a, b, announced, recent, total, latched, crc]: [u32; COPY]) -> Option<Self> {
         let body = [a, b, announced, recent, total, latched];
         ([a, b] == MAGIC && crc == checksum(body)).then_some(Self {
             announced,
@@ -164,7 +164,7 @@ fn checksum(body: [u32; COPY - 1]) -> u32 {
 }
 
 impl Found {
-    fn of(words: &Words) -> Self {
+    fn from_words(words: &Words) -> Self {
         let mut plain = [0; COPY];
         let mut inverted = [0; COPY];
         for i in 0..COPY {
@@ -174,7 +174,7 @@ impl Found {
             let wrong = (copy[0] ^ MAGIC[0]).count_ones() + (copy[1] ^ MAGIC[1]).count_ones();
             wrong <= NEAR_BITS
         };
-        match (Record::of(plain), Record::of(inverted)) {
+        match (Record::from_words(plain), Record::from_words(inverted)) {
             (Some(a), Some(b)) => Self::Whole(a.with(b)),
             (Some(one), None) | (None, Some(one)) => Self::Whole(one),
             (None, None) if is_near(plain) || is_near(inverted) => Self::Damaged,
@@ -264,18 +264,18 @@ mod on_target {
     #[unsafe(link_section = ".uninit.parameters")]
     static mut PARAMETERS: MaybeUninit<[u8; BYTES]> = MaybeUninit::uninit();
 
-    /// Whatever lies there.
-    fn look() -> Found {
+    /// What lies in the record's memory.
+    fn read_record() -> Found {
         // SAFETY: one core, interrupts masked: only a handler that never returns comes between; every pattern of bits
         // is a value, and the compiler does not see which.
-        Found::of(&unsafe { (&raw const RECORD).cast::<Words>().read_volatile() })
+        Found::from_words(&unsafe { (&raw const RECORD).cast::<Words>().read_volatile() })
     }
 
     fn read() -> Record {
         if WRITTEN.load(Ordering::Relaxed) {
-            look().written()
+            read_record().written()
         } else {
-            look().early()
+            read_record().early()
         }
     }
 
@@ -293,7 +293,7 @@ mod on_target {
 
     /// How the controller comes up. To be called once.
     pub fn boot(hardware: Hardware) -> Boot {
-        let (boot, record) = look().boot(hardware);
+        let (boot, record) = read_record().boot(hardware);
         write(record);
         boot
     }
@@ -360,7 +360,7 @@ mod tests {
 
     /// How the next start comes up when this record lies in memory.
     fn start(record: Record, hardware: Hardware) -> Boot {
-        Found::of(&record.words()).boot(hardware).0
+        Found::from_words(&record.words()).boot(hardware).0
     }
 
     fn boot(record: Record, hardware: Hardware) -> (ResetCause, u8) {
@@ -394,10 +394,10 @@ mod tests {
     fn noise_is_a_power_up() {
         for words in noise() {
             for hardware in [Hardware::Supply, Hardware::Operator, Hardware::Unknown] {
-                let (boot, record) = Found::of(&words).boot(hardware);
+                let (boot, record) = Found::from_words(&words).boot(hardware);
                 assert_eq!((boot, record), (Boot::default(), Record::default()), "{words:x?}");
             }
-            assert_eq!(Found::of(&words).early(), Record::default());
+            assert_eq!(Found::from_words(&words).early(), Record::default());
         }
     }
 
@@ -406,8 +406,11 @@ mod tests {
     fn a_record_that_is_gone_is_a_fault_where_it_must_be_there() {
         let memory = latched(Fault::Memory);
         for words in noise().take(100) {
-            assert_eq!(Found::of(&words).boot(Hardware::Watchdog).0.latched, memory);
-            assert_eq!(Found::of(&words).written(), Record::damaged());
+            assert_eq!(
+                Found::from_words(&words).boot(Hardware::Watchdog).0.latched,
+                memory
+            );
+            assert_eq!(Found::from_words(&words).written(), Record::damaged());
         }
     }
 
@@ -422,7 +425,7 @@ mod tests {
             let mut flipped = words;
             flip(&mut flipped, bit);
             for hardware in RESETTERS {
-                let boot = Found::of(&flipped).boot(hardware).0;
+                let boot = Found::from_words(&flipped).boot(hardware).0;
                 assert_eq!(
                     (boot.latched, boot.recent_resets),
                     (latched(Fault::Monitor), 3),
@@ -439,14 +442,18 @@ mod tests {
                     Hardware::Unknown,
                     Hardware::Operator,
                 ] {
-                    let (boot, record) = Found::of(&both).boot(hardware);
+                    let (boot, record) = Found::from_words(&both).boot(hardware);
                     let is_kept = boot.latched == latched(Fault::Monitor);
                     let is_faulty = boot.latched == latched(Fault::Memory);
-                    let by_hand = hardware == Hardware::Operator && Found::of(&both) != Found::Damaged;
+                    let by_hand =
+                        hardware == Hardware::Operator && Found::from_words(&both) != Found::Damaged;
                     assert!(is_kept || is_faulty || by_hand, "bits {bit}, {other}: {boot:?}");
                     // And the start after that one knows it too.
                     assert_eq!(
-                        Found::of(&record.words()).boot(Hardware::Watchdog).0.latched,
+                        Found::from_words(&record.words())
+                            .boot(Hardware::Watchdog)
+                            .0
+                            .latched,
                         boot.latched
                     );
                 }
@@ -463,7 +470,7 @@ mod tests {
         for written in 0..=2 * COPY {
             let mut words = old;
             words[..written].copy_from_slice(&new[..written]);
-            let boot = Found::of(&words).boot(Hardware::Watchdog).0;
+            let boot = Found::from_words(&words).boot(Hardware::Watchdog).0;
             let faults = boot.latched;
             let both = latched(Fault::Monitor).union(latched(Fault::Actuator));
             let expected = match written {
@@ -520,7 +527,7 @@ mod tests {
         for cause in [0, ResetCause::NewParameters as u32, ResetCause::Panic as u32] {
             let mut now = Record::default();
             for reset in 1..=12 {
-                let found = Found::of(
+                let found = Found::from_words(
                     &Record {
                         announced: cause,
                         ..now
@@ -541,7 +548,7 @@ mod tests {
     #[test]
     fn noise_does_not_become_a_record() {
         for words in noise().take(100) {
-            let after = Found::of(&words).early().announcing(ResetCause::Panic);
+            let after = Found::from_words(&words).early().announcing(ResetCause::Panic);
             assert_eq!(boot(after, Hardware::Operator), (ResetCause::Panic, 1));
             assert_eq!(start(after, Hardware::Operator).latched, FaultSet::NONE);
         }

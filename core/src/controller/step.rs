@@ -4,7 +4,7 @@
 use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
-use crate::controller::inputs::{Input, Inputs, Request};
+use crate::controller::inputs::{Input, Inputs, Motion, Request};
 use crate::law::fdca::Car;
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
@@ -194,28 +194,10 @@ impl<I: Injection> Step<'_, I> {
             request,
             ..
         } = self.inputs;
-        let checks = &self.config.plausibility;
         let mut kept = v.faults();
 
         if let Input::New(motion) = motion {
-            let passed = self.now.since(v.input_times.motion);
-            v.input_times.motion = self.now;
-            changed.add(ChangedParts::INPUT_TIMES);
-            changed.add(ChangedParts::MOTION);
-            let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds, passed);
-            kept.set(!plausible, Fault::SpeedImplausible);
-            let speed = if agree {
-                motion.speeds[0]
-            } else {
-                v.plausibility.speed()
-            };
-            let measured = motion.yaw_rate();
-            let yaw_rate = measured.and_then(|rate| v.plausibility.accepted_yaw_rate(rate, passed));
-            let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
-            kept.set(is_distrusted, Fault::YawRate);
-            checks.motion(&mut v.plausibility, speed, yaw_rate);
-            v.share = self.config.schedule.share(v.plausibility.speed());
-            motion_history.record_turning_rate(self.now, v.plausibility.turning());
+            self.update_motion(v, changed, motion, motion_history, &mut kept);
         }
         if fast_enough != Some(true) {
             changed.add(ChangedParts::LANE);
@@ -264,6 +246,37 @@ impl<I: Injection> Step<'_, I> {
 
         v.fast.kept = kept.bits();
         self.lost_inputs()
+    }
+
+    /// Takes speeds and yaw rate that came since the last step: judges them, and what follows from the speed.
+    #[inline(always)]
+    fn update_motion(
+        &self,
+        v: &mut Memory,
+        changed: &mut ChangedParts,
+        motion: &Motion,
+        motion_history: &mut MotionHistory,
+        kept: &mut FaultSet,
+    ) {
+        let checks = &self.config.plausibility;
+        let passed = self.now.since(v.input_times.motion);
+        v.input_times.motion = self.now;
+        changed.add(ChangedParts::INPUT_TIMES);
+        changed.add(ChangedParts::MOTION);
+        let (agree, plausible) = v.plausibility.speeds_agree(motion.speeds, passed);
+        kept.set(!plausible, Fault::SpeedImplausible);
+        let speed = if agree {
+            motion.speeds[0]
+        } else {
+            v.plausibility.speed()
+        };
+        let measured = motion.yaw_rate();
+        let yaw_rate = measured.and_then(|rate| v.plausibility.accepted_yaw_rate(rate, passed));
+        let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
+        kept.set(is_distrusted, Fault::YawRate);
+        checks.motion(&mut v.plausibility, speed, yaw_rate);
+        v.share = self.config.schedule.share(v.plausibility.speed());
+        motion_history.record_turning_rate(self.now, v.plausibility.turning());
     }
 
     /// Runs the plausibility checks that are pending.

@@ -74,7 +74,7 @@ pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Devi
             healthy
                 .as_mut()
                 .into_iter()
-                .for_each(|twin| twin.guidance_mut().heal());
+                .for_each(|twin| twin.guidance_mut().end_faults());
         }
         let left_at = simulation.guidance().left_at();
         let takes_over = left_at.is_some_and(|at| simulation.steps() >= at + NOTICES_MS);

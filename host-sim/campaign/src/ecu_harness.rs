@@ -129,8 +129,8 @@ impl<'a> EcuHarness<'a> {
         self.trace.take()
     }
 
-    /// From here on nothing of the row goes wrong.
-    pub(super) fn heal(&mut self) {
+    /// Ends every fault of the case.
+    pub(super) fn end_faults(&mut self) {
         self.healthy = true;
         self.trace = None;
     }

@@ -84,7 +84,7 @@ impl Product {
         loop {
             attempts += 1;
             self.send_set(&unlock(before.sequence, vehicle), &frames)?;
-            match self.fate(&before)? {
+            match self.outcome(&before)? {
                 Ok(now) => return Ok(now),
                 // Our own speeds were too old when the set came: this computer was busy with something else.
                 Err((now, _))
@@ -118,7 +118,7 @@ impl Product {
     }
 
     /// What became of a set: the status that has it in use, or the last one and why not.
-    fn fate(
+    fn outcome(
         &mut self,
         before: &ParameterStatus,
     ) -> Result<Result<ParameterStatus, (ParameterStatus, String)>, PilError> {
