@@ -130,18 +130,18 @@ impl Beside {
             Self::Nothing => builder,
             Self::Probe => builder.probe(true),
             Self::Sensors => builder.seed(number).sensor_errors(SensorErrors {
-                torque_bias: 0.05,
-                angle_bias: 1.0,
+                torque_bias_nm: 0.05,
+                angle_bias_rad: 1.0_f64.to_radians(),
                 speed_gain: 1.01,
-                yaw_rate_noise: 2.0,
-                lane_noise: 0.01,
-                heading_noise: 0.5,
+                yaw_rate_noise_rad_per_s: 0.002,
+                lane_noise_m: 0.01,
+                heading_noise_rad: 0.0005,
                 ..SensorErrors::default()
             }),
             Self::Wind => builder.seed(number).world(WorldParameters {
-                gust_sd: 100.0,
-                friction: 0.2,
-                motor_lag: 0.005,
+                gust_sd_n: 100.0,
+                friction_nm: 0.2,
+                motor_lag_s: 0.005,
                 ..WorldParameters::default()
             }),
             Self::Everything => {

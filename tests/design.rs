@@ -52,8 +52,8 @@ fn what_cannot_be_asked_is_named() {
     let of = |edit: fn(&mut Question)| {
         let mut question = question();
         edit(&mut question);
-        design(&question, || {}).unwrap_err()
+        design(&question, || {}).unwrap_err().to_string()
     };
     assert!(of(|q| q.parameter = "k_d".to_owned()).contains("\"k_d\" is unknown"));
-    assert!(of(|q| q.participants = vec![15]).contains("participant 15 is outside 1 to 14"));
+    assert!(of(|q| q.participants = vec![15]).contains("participant = 15 is outside 1 to 14"));
 }

@@ -173,7 +173,7 @@ fn a_speed_that_changes_hides_no_driver() {
         time.extend([at, at + 4.0, at + 11.0, at + 14.8, at + 22.0, at + 26.0]);
         kmh.extend([60.0, 85.0, 85.0, 45.0, 45.0, 60.0]);
     }
-    let scenario = scenario().to_builder().speed(Speed::ByTime { time, kmh });
+    let scenario = scenario().to_builder().speed(Speed::by_time_kmh(time, &kmh));
     let scenario = scenario.build().unwrap();
     let (text, seen) = record(&scenario);
     let (log, _) = open(&text, None).unwrap();

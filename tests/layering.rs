@@ -16,7 +16,7 @@ type Arrows = &'static [(&'static str, &'static [&'static str])];
 const CORE: Arrows = &[
     // The request that it carries, the codes of limits, modes and faults, the estimator's reading, and the parameters' names.
     ("bus", &["controller::inputs", "controller::params", "estimator", "quantity", "safety::envelope", "safety::faults", "safety::modes"]),
-    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
+    ("controller", &["controller::config", "controller::injection", "controller::inputs", "law", "law::activity", "law::probe", "quantity", "safety::coast", "safety::envelope", "safety::faults", "safety::frozen_torque", "safety::hands", "safety::modes", "safety::motion_history", "safety::plausibility", "safety::ramp", "safety::redundant"]),
     ("controller::config", &["controller::params", "estimator", "law", "law::fdca", "law::probe", "law::schedule", "quantity", "safety::envelope", "safety::monitor", "safety::plausibility", "safety::redundant"]),
     ("controller::injection", &["quantity"]),
     ("controller::inputs", &["law", "quantity", "safety::faults", "safety::redundant"]),
@@ -33,6 +33,7 @@ const CORE: Arrows = &[
     ("safety::coast", &["law", "quantity", "safety::redundant"]),
     ("safety::envelope", &["quantity", "safety::redundant"]),
     ("safety::faults", &["quantity"]),
+    ("safety::frozen_torque", &["quantity"]),
     ("safety::hands", &["quantity", "safety::redundant"]),
     // Nothing of the rest but how its memory is kept.
     ("safety::monitor", &["safety::redundant"]),

@@ -4,11 +4,12 @@
 //! These runs feed frames that the closed loop of the paper's studies never makes: damaged, missing, asking for
 //! guidance again and again. QEMU must be there; without it they fail.
 
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use haptic_core::bus::Frame;
-use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Telemetry, Vehicle};
 use haptic_core::controller::params::{DRIVER_ACTIVITY, FDCA, Params};
 use haptic_core::ecu::Boot;
 use haptic_core::quantity::{Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
@@ -30,10 +31,11 @@ impl Random {
 /// A car on a straight road, its steering wheel turned by driver and guidance against a spring of 5.18 N.m/rad
 /// (the steady state at 20 m/s that the plausibility checks assume), as frames.
 ///
-/// The driver keeps the road but weaves, strongly enough to override now and then. Every 8 s the bus is silent for 100 ms; the
-/// guidance hands over and is asked for anew. One frame in two hundred has a bit flipped.
+/// The driver keeps the road but weaves, strongly enough to override now and then. At the end of every cycle the bus is silent
+/// for 100 ms; the guidance hands over and is asked for anew. One frame in two hundred has a bit flipped.
 struct World {
     random: Random,
+    cycle_ms: u32,
     offset_m: f64,
     heading_rad: f64,
     /// What the motor delivers: the ECU's last torque.
@@ -56,8 +58,8 @@ impl World {
         self.offset_m += 1e-3 * Self::SPEED_M_PER_S * self.heading_rad;
 
         let mut frames = Vec::new();
-        let in_cycle = k % 8000;
-        if in_cycle >= 7900 {
+        let in_cycle = k % self.cycle_ms;
+        if in_cycle >= self.cycle_ms - 100 {
             return frames;
         }
         if k.is_multiple_of(8) {
@@ -113,9 +115,21 @@ const fn qemu(channel: Channel) -> Target {
     }
 }
 
-/// Runs `steps` ticks; the host's controller has `host`'s parameters, the target's has `other`'s. Returns the
+/// Runs `steps` ticks in cycles of 8 s; the host's controller has `host`'s parameters, the target's has `other`'s. Returns the
 /// report and how many of the host's torques were not zero.
 fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u32) {
+    let (report, guiding, _) = run_cycles(target, steps, 8_000, host, other);
+    (report, guiding)
+}
+
+/// The same in cycles of another length, and the values of K_hg and its deviation that the host's telemetry carried.
+fn run_cycles(
+    target: &Target,
+    steps: u32,
+    cycle_ms: u32,
+    host: &Params,
+    other: &Params,
+) -> (Report, u32, BTreeSet<[i32; 2]>) {
     // Starts 2 s before the clock's wrap.
     let clock = |k: u32| Instant::from_us((u32::MAX - 2_000_000).wrapping_add(k * 1000));
     let start = Start {
@@ -126,11 +140,12 @@ fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u
     let mut pil = Pil::on(target, other, start).unwrap();
     let mut world = World {
         random: Random(0x9E37_79B9_7F4A_7C15),
+        cycle_ms,
         offset_m: 0.0,
         heading_rad: 0.0,
         motor: Torque::ZERO,
     };
-    let mut guiding = 0;
+    let (mut guiding, mut readings) = (0, BTreeSet::new());
     for k in 0..steps {
         let now = clock(k);
         let frames = world.frames(k);
@@ -141,6 +156,12 @@ fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u
         world.motor = step.command.torque;
         guiding += u32::from(step.command.torque != Torque::ZERO);
         let background = ecu.background_step();
+        if let Some(frame) = background {
+            let reading = Telemetry::unpack(frame.data().try_into().unwrap()).unwrap().k_hg;
+            // An LSB of the bus is 2^-10.
+            let counts = |ratio: Ratio| (1024.0 * ratio.si()) as i32;
+            readings.extend(reading.map(|r| [counts(r.k_hg), counts(r.deviation)]));
+        }
         let answer: Vec<Frame> = [step.guidance]
             .into_iter()
             .chain(step.others)
@@ -148,7 +169,7 @@ fn run(target: &Target, steps: u32, host: &Params, other: &Params) -> (Report, u
             .collect();
         pil.tick(now, &frames, &answer).unwrap();
     }
-    (pil.finish().unwrap(), guiding)
+    (pil.finish().unwrap(), guiding, readings)
 }
 
 #[test]
@@ -159,6 +180,15 @@ fn twenty_seconds_over_the_fifo_are_identical() {
     // A torque frame each step, and warnings and fault records beside them.
     assert!(report.frames_compared > 20_000);
     assert!(guiding > 10_000, "only {guiding} steps of the run guide at all");
+}
+
+/// The estimate of K_hg is in f32, with a root of micromath: every telemetry frame that carries one is among those compared.
+#[test]
+fn a_live_estimate_has_the_same_bits() {
+    let target = qemu(Channel::Fifo);
+    let (report, _, readings) = run_cycles(&target, 40_000, 40_000, &Params::PAPER, &Params::PAPER);
+    assert_eq!(report.mismatches, 0, "{}", report.first_mismatch.unwrap());
+    assert!(readings.len() > 20, "{readings:?}");
 }
 
 /// The laws that ship beside the paper's, one with a division that most steps of it do without.

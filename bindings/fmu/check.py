@@ -320,7 +320,7 @@ def roads(directory, ending):
     for place in (dict(course=str(hill)), dict(course=hill.name, resource=hill)):
         errors.append(coupled(directory, ending, 60.0, **place))
     assert np.array_equal(*errors)
-    run = hg.simulate(hg.Scenario(course=hill, driver={"t_p": 0.3}))
+    run = hg.simulate(hg.Scenario(course=hill, driver={"t_p_s": 0.3}))
     rows = len(errors[0])
     apart = np.abs(errors[0] - run["lateral_error_m"][:rows]).max()
     assert apart < WITHIN_M < 0.1 * np.abs(run["lateral_error_m"][:rows]).max(), apart

@@ -10,7 +10,7 @@ ecu = hg.Ecu(engaged=True)
 lines = (line.split() for line in sys.stdin)
 for t_us, frames in itertools.groupby(lines, key=lambda line: int(line[0])):
     for _, id, data in frames:
-        if int(id, 16) in (0x100, 0x110, 0x120, 0x130):
+        if int(id, 16) in hg.INPUT_IDS:
             refused = ecu.receive(int(id, 16), bytes.fromhex(data), t_us)
             if refused is not None:
                 sys.exit(f"{t_us} us: {id} {data}: {refused}")

@@ -7,5 +7,5 @@ import haptic_guidance as hg
 
 bus = hg.simulate(hg.Scenario.load(sys.argv[1]), bus=True).bus
 for t_us, id, data in zip(bus["t_us"].tolist(), bus["id"].tolist(), bus["data"]):
-    if id not in (0x100, 0x110, 0x120, 0x130):
+    if id not in hg.INPUT_IDS:
         print(t_us, f"{id:03X}", data.tobytes().hex().upper())

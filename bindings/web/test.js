@@ -233,8 +233,8 @@ async function files() {
   await pause(200);
   check("a road of one's own", page.state().course === "mine.toml" && page.live.road[4 * 100 + 3] === 0.003 && $("told").textContent.includes("0.7 km"), $("told").textContent);
   let fault = "";
-  try { page.lab.begin("speed = 900"); } catch (error) { fault = error.message; }
-  check("bad input", fault.includes("speed") && fault.includes("250"), fault);
+  try { page.lab.begin("speed_m_per_s = 900"); } catch (error) { fault = error.message; }
+  check("bad input", fault.includes("speed") && fault.includes("70 m/s"), fault);
 }
 
 return (async () => {

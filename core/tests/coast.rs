@@ -113,6 +113,8 @@ fn where_the_vehicle_went_meanwhile_is_known() {
         rig.silent[LANE] = true;
         rig.run(20);
         rig.turn(-0.1);
+        // A sensor that is alive moves by its last bit.
+        rig.driver = Some(1.0 / 4096.0);
         rig.run(500);
         rig.turn(0.0);
         rig.silent[LANE] = false;
@@ -181,6 +183,8 @@ fn a_lane_change_by_hand_is_no_fault() {
         let line = if e_y < -1.6 { 3.5 } else { 0.0 };
         rig.lane.e_theta = Radians::from_rad(-heading);
         rig.lane.e_y = Metres::from_m(e_y + line - 0.3 * SPEED * heading);
+        // A sensor that is alive moves.
+        rig.driver = (ms % 500 < 2).then_some(1.0 / 4096.0);
         let step = rig.tick();
         assert_eq!(
             step.command.mode,
@@ -346,5 +350,24 @@ fn a_probe_ends_where_trust_does() {
         let step = rig.tick();
         assert!(step.permitted && step.command.mode == Mode::Active);
         assert_eq!(rig.applied, 0.0);
+    }
+}
+
+/// Pictures that come back with the line 0.1 m beside where it went on to: K_1*a1' of it, as if it had always been there. As a
+/// rate within one picture it would ask for as much again.
+#[test]
+fn where_pictures_come_back_is_no_rate() {
+    for sign in [1.0, -1.0] {
+        let mut rig = beside(0.0);
+        rig.silent[LANE] = true;
+        rig.run(100);
+        rig.silent[LANE] = false;
+        rig.lane.e_y = Metres::from_m(0.1 * sign);
+        let most = (0..100).map(|_| {
+            rig.tick();
+            rig.applied * sign
+        });
+        let most = most.fold(0.0, f64::max);
+        assert!((0.045..0.0505).contains(&most), "{most}");
     }
 }

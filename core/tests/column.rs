@@ -138,3 +138,31 @@ fn friction_explains_a_push_that_is_over_and_no_more() {
         assert_eq!(left(422, 3000, 0.0), 0.0);
     }
 }
+
+/// At 20 m/s and 0.25 rad/s the tyres give 0.9874*5 = 4.94 N.m, right by 30 %. Of 0.4 N.m the assist makes 2 at most: what lacks is
+/// 0.96 beyond that and friction, 0.6 N.m.s after ln(0.96/0.36) = 1 s and what is learnt until then. Of 0.7 it makes 3.5.
+#[test]
+fn the_assist_makes_five_times_of_a_driver_torque_at_most() {
+    for side in [1.0, -1.0] {
+        // 0.25 rad/s at 20*0.022324/(1 + 0.001753*400) = 0.2624 of the wheel's angle.
+        let holds = |driver: f64| {
+            declared(20.0, 20.0, side * 0.25, 0.0, |_| {
+                (side * driver, side * 0.25 / 0.2624)
+            })
+        };
+        let declared = holds(0.4).unwrap();
+        assert!((0.95..1.4).contains(&declared), "{declared} s");
+        assert_eq!(holds(0.7), None);
+    }
+}
+
+/// Of 1 N.m that lacks for 100 s half is learnt, and friction has the rest. Turned round, 1.5 N.m lack: 1 beyond friction, 0.6
+/// N.m.s after ln(1/0.4) = 0.92 s, less what is learnt anew.
+#[test]
+fn no_more_than_half_a_newton_metre_is_learnt() {
+    for side in [1.0, -1.0] {
+        let turns_round = |t: f64| (if t < 100.0 { side } else { -side }, 0.0);
+        let declared = declared(102.0, 20.0, 0.0, 0.0, turns_round).unwrap();
+        assert!((100.9..101.05).contains(&declared), "{declared} s");
+    }
+}

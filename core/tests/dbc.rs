@@ -295,7 +295,9 @@ fn parameters() {
         index: 29,
         value: 1.0,
     };
-    assert_eq!(ParameterWrite::unpack(beyond.pack()), None);
+    let mut data = [0; 8];
+    beyond.pack(&mut data);
+    assert_eq!(ParameterWrite::unpack(&data), None);
     for code in 0..9 {
         let sent = ParameterStatus {
             stored: code % 2 == 0,
@@ -444,7 +446,7 @@ fn one_lsb_beyond_the_range_is_rejected_when_received() {
 #[test]
 fn a_yaw_rate_counts_only_where_it_is_valid() {
     let unpack = |raw: i64, valid: u64| {
-        Vehicle::unpack(((raw as u64) & 0x3FFF) << 44 | valid << 58)
+        Vehicle::unpack(&(((raw as u64) & 0x3FFF) << 44 | valid << 58).to_le_bytes())
             .map(|v| v.yaw_rate.map(|r| r.rad_per_s()))
     };
     assert_eq!(unpack(-8191, 1), Some(Some(-8191.0 / 4096.0)));

@@ -364,21 +364,20 @@ fn a_set_is_refused_in_traffic_too_soon_and_without_an_unlock() {
             }
         }
     }
-    // At its very end the unlock still holds, across a wrap of the clock too.
+    // At its very end the unlock still holds, and not a millisecond longer, across a wrap of the clock too.
     let mut download = Download::NEW;
     let begin = Conditions {
         now_ms: u32::MAX - 5,
         ..READY
     };
     download.receive(&unlock(7, VEHICLE), &begin);
-    let end = Conditions {
-        now_ms: UNLOCK_MS - 6,
-        ..READY
+    let taken_at = |now_ms: u32| {
+        let (mut download, end) = (download.clone(), Conditions { now_ms, ..READY });
+        frames(&SET)
+            .iter()
+            .any(|frame| download.receive(frame, &end).is_some())
     };
-    let taken = frames(&SET)
-        .iter()
-        .any(|frame| download.receive(frame, &end).is_some());
-    assert!(taken);
+    assert!(taken_at(UNLOCK_MS - 6) && !taken_at(UNLOCK_MS - 5));
 }
 
 /// A download that was recorded unlocks with the number of a set that is no longer in use.

@@ -225,7 +225,7 @@ fn a_veto_hides_no_other_fault() {
     let step = rig.tick();
     assert!(!step.permitted);
     let bytes: [u8; 8] = step.guidance.data().try_into().unwrap();
-    let told = Guidance::unpack(u64::from_le_bytes(bytes)).unwrap().faults;
+    let told = Guidance::unpack(&bytes).unwrap().faults;
     for fault in [Fault::LaneTimeout, Fault::Monitor, Fault::Memory] {
         assert!(
             step.command.faults.contains(fault) && told.contains(fault),
@@ -345,8 +345,7 @@ fn telemetry_beyond_its_fields_stays_at_their_ends() {
         }),
     };
     let frame = beyond.encode(0);
-    let word = u64::from_le_bytes(frame.data().try_into().unwrap());
-    let read = Telemetry::unpack(word).unwrap();
+    let read = Telemetry::unpack(frame.payload().unwrap()).unwrap();
     // Of the fields of core/haptic.dbc: 2047 counts of 2^-12 N.m, 4, 2047 counts of 2^-10.
     assert_eq!(read.probe.unwrap().nm(), 2047.0 / 4096.0);
     let reading = read.k_hg.unwrap();
@@ -364,8 +363,7 @@ fn the_largest_number_of_a_vehicle_arrives_whole() {
         hardware: u32::MAX,
     };
     let frame = sent.encode(0);
-    let word = u64::from_le_bytes(frame.data().try_into().unwrap());
-    assert_eq!(Identity::unpack(word), Some(sent));
+    assert_eq!(Identity::unpack(frame.payload().unwrap()), Some(sent));
     assert_eq!(sent.vehicle, 0xF_FFFF);
 }
 
@@ -455,4 +453,25 @@ fn a_yaw_rate_is_there_if_it_was_measured() {
     let speeds = [Speed::from_m_per_s(20.0); 2];
     assert_eq!(Motion::new(speeds, Some(rate)).yaw_rate(), Some(rate));
     assert_eq!(Motion::new(speeds, None).yaw_rate(), None);
+}
+
+/// Steps that nobody asked for, and late ones, are a fault in a row only.
+#[test]
+fn steps_out_of_time_are_counted_in_a_row() {
+    for (tolerated, us) in [(3, 400), (1, 2600)] {
+        let mut rig = Rig::active_in_curve(0.4);
+        for _ in 0..20 {
+            for _ in 0..tolerated {
+                let step = rig.tick_after(us);
+                assert_eq!(step.command.mode, Mode::Active, "{us} us");
+            }
+            let step = rig.run(20);
+            assert_eq!(step.command.mode, Mode::Active, "{us} us");
+        }
+        for _ in 0..tolerated {
+            rig.tick_after(us);
+        }
+        let step = rig.tick_after(us);
+        assert!(step.command.faults.contains(Fault::Deadline), "{us} us");
+    }
 }

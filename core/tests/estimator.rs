@@ -59,12 +59,13 @@ impl Drive<'_> {
     }
 }
 
-/// In f32 a mean is good to 2e-5; both shares of the deviation are cut to 2^-14.
+/// In f32 a mean is good to 2e-5. The root in the deviation is at most 0.18 % too large, never too small; its other share is
+/// good to as much as the mean.
 fn agrees(told: Estimate, expected: Estimate) -> bool {
     match (told, expected) {
         (Some(told), Some(expected)) => {
-            let cut = expected[1] - told[1];
-            (told[0] - expected[0]).abs() < 5e-5 && (-2e-5..1.5e-4).contains(&cut)
+            let more = told[1] - expected[1];
+            (told[0] - expected[0]).abs() < 5e-5 && (-2e-5..0.0018 * expected[1] + 2e-5).contains(&more)
         }
         (told, expected) => told == expected,
     }

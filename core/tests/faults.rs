@@ -1,7 +1,11 @@
 //! The list of faults against the table in docs/reference/bus.md, and the sets that follow from their classes against
 //! masks written here by hand.
 
+use haptic_core::bus::messages::{Guidance, Message, ResetCause};
+use haptic_core::quantity::Torque;
+use haptic_core::safety::envelope::LimitReason;
 use haptic_core::safety::faults::{Class, Fault, FaultSet};
+use haptic_core::safety::modes::Mode;
 
 /// Every row of the document's table: bit, name and class.
 fn documented() -> Vec<String> {
@@ -44,4 +48,23 @@ fn bits_without_a_fault_are_dropped() {
     assert_eq!(Fault::from_code(19), Some(Fault::HandsOff));
     assert_eq!(Fault::from_code(20), Some(Fault::YawRate));
     assert_eq!(Fault::from_code(21), None);
+}
+
+/// Bit 37 of the guidance frame and the 20 behind it.
+#[test]
+fn each_fault_has_its_bit_in_the_guidance_frame() {
+    for (code, fault) in Fault::ALL.into_iter().enumerate() {
+        let guidance = Guidance {
+            torque: Torque::ZERO,
+            limit: LimitReason::None,
+            mode: Mode::Boot,
+            warning: false,
+            faults: FaultSet::NONE.with(fault),
+            reset: ResetCause::PowerOn,
+        };
+        let mut data = [0; 8];
+        guidance.pack(&mut data);
+        let faults = u64::from_le_bytes(data) >> 37 & 0x1F_FFFF;
+        assert_eq!(faults, 1 << code, "{fault:?}");
+    }
 }

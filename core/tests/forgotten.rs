@@ -11,6 +11,7 @@ use haptic_core::safety::modes::Mode;
 const LANE: usize = 0;
 const COLUMN: usize = 1;
 const VEHICLE: usize = 2;
+const REQUEST: usize = 3;
 
 /// On a straight in Standby, with the yaw rate measured.
 fn straight(e_y_m: f64) -> Rig {
@@ -280,6 +281,8 @@ fn a_wheel_angle_hides_no_driver_torque() {
         turned.curve(3.0 * sign);
         for ms in 0..1000 {
             rig.wheel = turned.wheel * f64::from(ms) * 1e-3;
+            // A sensor that is alive moves by its last bit.
+            rig.driver = Some(f64::from(ms / 100 % 2) / 4096.0);
             let faults = rig.tick().command.faults;
             assert!(!faults.contains(Fault::ColumnImplausible), "{ms} ms");
         }
@@ -325,4 +328,95 @@ fn a_refused_speed_is_no_standstill() {
     assert!(!rig.ecu.stands());
     rig.run(200);
     assert!(rig.ecu.stands());
+}
+
+/// One wheel locks while the vehicle brakes with 12 m/s^2, the other one tells how much slower it becomes; when the wheel
+/// turns again, it is where the other one is.
+#[test]
+fn a_speed_that_steps_goes_with_the_other() {
+    for (locked, by_message) in [(0, -0.12), (1, -0.12), (0, 0.12), (1, 0.12)] {
+        let mut rig = straight(0.2);
+        rig.engage = true;
+        rig.run(1500);
+        for _ in 0..25 {
+            let speed = rig.speeds[1 - locked] + by_message;
+            rig.speeds[1 - locked] = speed;
+            rig.speeds[locked] = speed - 8.0;
+            let step = rig.run(10);
+            assert_eq!(
+                (step.command.mode, step.command.faults),
+                (Mode::Active, FaultSet::NONE)
+            );
+        }
+        rig.speeds[locked] = rig.speeds[1 - locked];
+        for ms in 0..600 {
+            let step = rig.tick();
+            assert_eq!(
+                (step.command.mode, step.command.faults),
+                (Mode::Active, FaultSet::NONE),
+                "{locked}, {ms} ms"
+            );
+        }
+    }
+}
+
+/// Pictures that the camera does not vouch for show the line 3 m to the other side. Nobody goes by them, the monitor neither:
+/// guidance goes on for its second, with half of its trust less.
+#[test]
+fn nobody_goes_by_a_picture_that_its_sender_does_not_vouch_for() {
+    for sign in [1.0, -1.0] {
+        let mut rig = straight(sign);
+        rig.engage = true;
+        rig.run(1500);
+        (rig.lane.valid, rig.lane.e_y) = (false, Metres::from_m(-3.0 * sign));
+        for ms in 0..1000 {
+            let step = rig.tick();
+            assert!(step.permitted, "{ms} ms");
+            assert_eq!(step.command.mode, Mode::Active, "{ms} ms");
+            assert!(rig.applied * sign > 0.24, "{ms} ms: {}", rig.applied);
+        }
+    }
+}
+
+/// Guidance begins where a request rises that was heard to be low. One that was high before its silence, in Standby or in a
+/// handover, is not.
+#[test]
+fn a_request_that_comes_back_is_no_new_one() {
+    for engaged in [false, true] {
+        let mut rig = straight(0.2);
+        rig.silent[REQUEST] = !engaged;
+        rig.run(100);
+        (rig.silent[REQUEST], rig.engage) = (false, true);
+        assert_eq!(rig.run(1000).command.mode == Mode::Active, engaged);
+        rig.silent[REQUEST] = true;
+        rig.run(2500);
+        rig.silent[REQUEST] = false;
+        for _ in 0..2000 {
+            assert_eq!(rig.tick().command.mode, Mode::Standby, "{engaged}");
+        }
+        rig.engage = false;
+        rig.run(50);
+        rig.engage = true;
+        assert_eq!(rig.run(50).command.mode, Mode::Active);
+    }
+}
+
+/// A motor that delivers half of what it is told, and all of it again.
+#[test]
+fn a_motor_that_is_strong_again_is_no_weak_one() {
+    let mut rig = straight(1.0);
+    rig.engage = true;
+    rig.run(1500);
+    rig.motor = |torque| 0.5 * torque;
+    let (_, step) = rig.run_until(100, |step| step.command.mode == Mode::Handover);
+    assert!(step.command.faults.contains(Fault::MotorWeak));
+    rig.motor = |torque| torque;
+    rig.engage = false;
+    let step = rig.run(3000);
+    assert_eq!(
+        (step.command.mode, step.command.faults),
+        (Mode::Standby, FaultSet::NONE)
+    );
+    rig.engage = true;
+    assert_eq!(rig.run(50).command.mode, Mode::Active);
 }

@@ -1,7 +1,7 @@
 //! A frame and what `embedded-can` sees of it.
 
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
-use haptic_core::bus::Frame;
+use haptic_core::bus::{CanFrame, FdFrame, Frame};
 
 #[test]
 fn identifiers_and_lengths_at_their_edges() {
@@ -12,6 +12,28 @@ fn identifiers_and_lengths_at_their_edges() {
     }
     assert_eq!(Frame::new(0x800, &[]), None);
     assert_eq!(Frame::new(0, &[0; 9]), None);
+}
+
+/// The lengths of CAN FD and their codes, ISO 11898-1; a frame of up to 32 bytes has room for some.
+#[test]
+fn a_frame_of_can_fd_has_sixteen_lengths() {
+    const BYTES: [u8; 65] = [0xA5; 65];
+    let lengths = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
+    for length in 0..=65 {
+        let frame = FdFrame::new(0x7FF, &BYTES[..length]);
+        let code = lengths.iter().position(|one| *one == length);
+        assert_eq!(frame.map(|frame| frame.dlc()), code, "{length}");
+        if let Some(frame) = frame {
+            assert_eq!((frame.id(), frame.data()), (0x7FF, &BYTES[..length]));
+            assert_eq!(frame.payload::<12>().is_some(), length == 12);
+            assert_eq!(frame.payload::<48>().is_some(), length == 48);
+            assert_eq!(frame.full_data().is_some(), length == 64);
+        }
+        let shorter = CanFrame::<32>::new(0x7FF, &BYTES[..length]);
+        assert_eq!(shorter.is_some(), code.is_some() && length <= 32, "{length}");
+    }
+    assert_eq!(FdFrame::new(0x800, &[]), None);
+    assert_eq!(FdFrame::full(0x123, [7; 64]).data(), [7; 64]);
 }
 
 #[test]

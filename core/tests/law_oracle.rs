@@ -188,25 +188,33 @@ fn held_errors_have_no_rate() {
     }
 }
 
-/// From 1.75 m on one side to as much on the other: k_1 * a_1 of it, as if the line had always been there.
+/// From 1.75 m on one side to as much on the other, at an angle and not: equation (9) as if the line had always been there. After
+/// 0.8 s the filter of the rates has settled.
 #[test]
 fn a_line_chosen_anew_goes_on_at_the_rates_of_the_old_one() {
     let law = Config::PAPER.law;
-    let mut state = LawState::NEW;
-    let at = |ms: u32, e_y: f64| LaneSample {
-        e_y: Metres::from_m(e_y),
-        e_theta: Radians::ZERO,
-        at: Instant::from_us(1000 * ms),
-    };
-    for ms in [0, 8] {
-        let sample = at(ms, 1.75);
-        let torque = law.step(&mut state, sample.at, sample, &EgoMotion::STEADY).nm();
-        assert!((torque - 0.25 * 2.0 * 1.75).abs() < 1e-4, "{torque}");
+    for (y_rate, theta_rate) in [(0.0, 0.0), (0.5, 0.02), (-0.5, -0.02), (0.5, -0.02)] {
+        let mut state = LawState::NEW;
+        let at = |ms: u32, e_y: f64| {
+            let t = f64::from(ms) * 1e-3 - 0.8;
+            LaneSample {
+                e_y: Metres::from_m(e_y + y_rate * t),
+                e_theta: Radians::from_rad(theta_rate * t),
+                at: Instant::from_us(1000 * ms),
+            }
+        };
+        let expected = |e_y: f64| 0.25 * (2.0 * e_y + 0.05 * y_rate + theta_rate);
+        let mut torque = f64::NAN;
+        for ms in (0..=800).step_by(8) {
+            let sample = at(ms, 1.75);
+            torque = law.step(&mut state, sample.at, sample, &EgoMotion::STEADY).nm();
+        }
+        assert!((torque - expected(1.75)).abs() < 1e-4, "{torque}");
+        let anew = at(800, -1.75);
+        state.relocate(anew);
+        let torque = law.step(&mut state, anew.at, anew, &EgoMotion::STEADY).nm();
+        assert!((torque - expected(-1.75)).abs() < 1e-4, "{torque}");
     }
-    let anew = at(16, -1.75);
-    state.relocate(anew);
-    let torque = law.step(&mut state, anew.at, anew, &EgoMotion::STEADY).nm();
-    assert!((torque + 0.25 * 2.0 * 1.75).abs() < 1e-4, "{torque}");
 }
 
 #[test]
@@ -378,5 +386,23 @@ fn two_samples_share_a_rate_over_100_ms() {
             (torque - expected).abs() < BOUND_NM,
             "{samples:?}: {torque} {expected}"
         );
+    }
+}
+
+/// What a flipped bit of the past may ask for: 0.04 rad and 0.3 rad/s, to either side.
+#[test]
+fn what_the_vehicle_did_is_bounded_on_both_sides() {
+    for sign in [1.0, -1.0] {
+        for (turned, faster) in [(0.03, 0.2), (0.04, 0.3), (0.05, 0.4), (100.0, 100.0)] {
+            let since = EgoMotion::new(
+                Radians::from_rad(sign * turned),
+                TurningRate::from_rad_per_s(sign * faster),
+                Speed::from_m_per_s(20.0),
+                Metres::from_m(6.0),
+            );
+            let bounded = (turned.min(0.04) * sign, faster.min(0.3) * sign);
+            assert_eq!(since.turned, Radians::from_rad(bounded.0));
+            assert_eq!(since.faster, TurningRate::from_rad_per_s(bounded.1));
+        }
     }
 }

@@ -14,9 +14,14 @@ fn guidance(torque: i64, mode: u64) -> [u8; 8] {
     (((torque as u64) & 0xFFFF) << 12 | mode << 32).to_le_bytes()
 }
 
-/// e_y in 2^-13 m from bit 12, e_theta in 2^-16 rad from bit 29, age in 0.1 ms from bit 46, valid bit 55.
+/// e_y in 2^-13 m from bit 12, e_theta in 2^-16 rad from bit 29, age in 0.1 ms from bit 46, valid bit 55, and how often 512 come to
+/// the age from bit 56.
 fn lane(e_y: i64, e_theta: i64, age: u64) -> [u8; 8] {
-    let word = ((e_y as u64) & 0x1_FFFF) << 12 | ((e_theta as u64) & 0x1_FFFF) << 29 | age << 46 | 1 << 55;
+    let word = ((e_y as u64) & 0x1_FFFF) << 12
+        | ((e_theta as u64) & 0x1_FFFF) << 29
+        | (age & 0x1FF) << 46
+        | 1 << 55
+        | (age >> 9) << 56;
     word.to_le_bytes()
 }
 
@@ -204,7 +209,14 @@ fn against_the_driver() {
 #[test]
 fn old_lane_data_in_active() {
     // 360 ms, and 1.4 s in which the lane goes on.
-    for (age, last_good_ms) in [(0, 1760), (100, 1750), (400, 1720)] {
+    for (age, last_good_ms) in [
+        (0, 1760),
+        (100, 1750),
+        (400, 1720),
+        (512, 1708),
+        (1500, 1610),
+        (2047, 1555),
+    ] {
         let mut bench = Bench::at(5.0, 40);
         assert!(bench.show(Some(lane(0, 0, age)), None, guidance(40, ACTIVE), 1000));
         for _ in 0..last_good_ms {
@@ -398,6 +410,43 @@ fn a_torque_on_its_way_back_is_not_astray() {
     // One step inside begins the count anew.
     for mnm in (1..=25).map(|k| 500 - 8 * k) {
         assert!(back.show(Some(lane(0, 0, 0)), None, guidance(counts(mnm).0, ACTIVE), 1000));
+    }
+}
+
+/// However often, 20 steps outside are allowed again after one inside.
+#[test]
+fn steps_outside_are_counted_since_the_last_inside() {
+    for sign in [1, -1] {
+        let (outside, inside) = (sign * counts(301).0, sign * counts(299).0);
+        let mut bench = Bench::at(5.0, inside);
+        for _ in 0..5 {
+            for torque in [inside].into_iter().chain([outside; 20]) {
+                assert!(bench.show(Some(lane(0, 0, 0)), None, guidance(torque, ACTIVE), 1000));
+            }
+        }
+        assert!(!bench.show(Some(lane(0, 0, 0)), None, guidance(outside, ACTIVE), 1000));
+    }
+}
+
+/// 8 m/s towards the line of 0.54 s ago. For 0.32 s beyond 40 ms the position goes on: 2.56 m are 1280 mN.m, with 100 for the
+/// rate and a band of 300 and of 500 for the time.
+#[test]
+fn a_sample_is_carried_for_320_ms_at_most() {
+    for sign in [1, -1] {
+        let permitted = |mnm: i64| {
+            let torque = sign * counts(mnm).0;
+            let mut bench = Bench::at(5.0, torque);
+            for k in -30..=0 {
+                let sample = lane(sign * k * 524, 0, 0);
+                assert!(bench.show(Some(sample), None, guidance(torque, FADE), 8000));
+            }
+            for _ in 0..540 {
+                assert!(bench.torque(torque, FADE));
+            }
+            (0..60).take_while(|_| bench.torque(torque, ACTIVE)).count()
+        };
+        assert_eq!(permitted(2180 - 10), 60);
+        assert_eq!(permitted(2180 + 30), 20);
     }
 }
 

@@ -92,3 +92,57 @@ fn what_is_missing_is_weak_and_what_is_too_much_astray() {
     // 8 ms of dead time, 10 ms of patience; the band has 12.5 % of 2 N.m and 0.1 N.m, so its lag of 21 ms adds 4 ms.
     assert!(first.is_some_and(|ms| (518..=526).contains(&ms)), "{first:?}");
 }
+
+/// Of 1 N.m an honest motor delivers 0.775 to 1.225. Ten steps of too much are tolerated, again and again where something is
+/// missing between, or nothing wrong; and fifty of what is missing likewise.
+#[test]
+fn too_much_and_too_little_are_counted_in_a_row() {
+    for sign in [1.0, -1.0] {
+        for (most, long, short) in [
+            (10, 1.24, 0.76),
+            (50, 0.76, 1.24),
+            (10, 1.24, 1.0),
+            (50, 0.76, 1.0),
+        ] {
+            let mut actuator = Actuator::default();
+            let mut judge = |delivered: f64| {
+                actuator.deliver(Torque::from_nm(sign * delivered));
+                actuator.judge(Torque::from_nm(sign))
+            };
+            for _ in 0..500 {
+                let _ = judge(1.0);
+            }
+            for _ in 0..8 {
+                for delivered in [long].repeat(most).into_iter().chain([short]) {
+                    assert_eq!(judge(delivered), Motor::Obeys);
+                }
+            }
+            assert!(
+                [long]
+                    .repeat(most)
+                    .into_iter()
+                    .all(|nm| judge(nm) == Motor::Obeys)
+            );
+            assert_ne!(judge(long), Motor::Obeys);
+        }
+    }
+}
+
+/// A motor that stays at 2 N.m when the command ends at once. For 8 ms it may, then the band goes back by 3/64 a step: it is too
+/// much where 2*(61/64)^n and an eighth of it and 0.1 N.m are less, after 4 steps more; ten of those are tolerated.
+#[test]
+fn a_motor_that_stays_is_astray_after_dead_time_lag_and_patience() {
+    for sign in [1.0, -1.0] {
+        let mut actuator = Actuator::default();
+        let mut judge = |commanded: f64| {
+            actuator.deliver(Torque::from_nm(sign * 2.0));
+            actuator.judge(Torque::from_nm(sign * commanded))
+        };
+        for _ in 0..500 {
+            let _ = judge(2.0);
+        }
+        let steps = (1..).find(|n| 2.0 * f64::powi(61.0 / 64.0, *n) * 1.125 + 0.1 < 2.0);
+        let first = (1..100).find(|_| judge(0.0) != Motor::Obeys);
+        assert_eq!(first, steps.map(|steps| 8 + steps + 10));
+    }
+}

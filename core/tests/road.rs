@@ -244,16 +244,42 @@ fn a_late_sample_is_made_up_for() {
 /// By K_1 times a1' to a4': -0.029 N.m, -0.008 N.m (0.67 m/s), -0.1 N.m and -0.025 N.m.
 #[test]
 fn what_a_late_camera_did_not_see_yet_is_made_up_for() {
-    let mut rig = Rig::paper();
-    rig.lane.age = Micros::from_ms(100);
-    rig.yaw_rate = Some(0.0);
+    for do_speeds_differ in [false, true] {
+        let mut rig = Rig::paper();
+        rig.lane.age = Micros::from_ms(100);
+        rig.yaw_rate = Some(0.0);
+        rig.run(600);
+        rig.engage = true;
+        rig.run(1000);
+        if do_speeds_differ {
+            // By 2.7 m/s: the last on which they agreed is gone on with, for 0.3 s.
+            for _ in 0..3 {
+                rig.speeds[1] += 0.9;
+                rig.run(10);
+            }
+        }
+        assert_eq!((mode(&rig), rig.applied), (Mode::Active, 0.0));
+        rig.turn(0.1);
+        // A sensor that is alive moves by its last bit.
+        rig.driver = Some(1.0 / 4096.0);
+        rig.run(100);
+        assert_eq!(mode(&rig), Mode::Active);
+        // Half of a period of the vehicle's message, 5 ms, is 2.5 % of it.
+        assert!((rig.applied + 0.162).abs() < 0.005, "{} N.m", rig.applied);
+    }
+}
+
+/// Whoever asks for guidance is there: 15 s without a hand are counted from then.
+#[test]
+fn hands_begin_anew_with_guidance() {
+    let mut rig = Rig::active_in_curve(0.5);
+    rig.driver = Some(0.3);
+    rig.run(20);
+    assert!(!rig.run(14_000).command.warning);
+    rig.engage = false;
+    rig.run_until(500, |step| step.command.mode == Mode::Standby);
     rig.run(600);
     rig.engage = true;
-    rig.run(1000);
-    assert_eq!((mode(&rig), rig.applied), (Mode::Active, 0.0));
-    rig.turn(0.1);
-    rig.run(100);
-    assert_eq!(mode(&rig), Mode::Active);
-    // Half of a period of the vehicle's message, 5 ms, is 2.5 % of it.
-    assert!((rig.applied + 0.162).abs() < 0.005, "{} N.m", rig.applied);
+    let (ms, _) = rig.run_until(16_000, |step| step.command.warning);
+    assert!((14_900..=15_100).contains(&ms), "{ms}");
 }

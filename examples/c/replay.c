@@ -45,7 +45,7 @@ int main(void) {
             (void)sscanf(text + 2 * byte, "%2x", &value);
             frame.data[byte] = (uint8_t)value;
         }
-        if (id == 0x100 || id == 0x110 || id == 0x120 || id == 0x130) {
+        if (hg_is_input(frame.id)) {
             if (hg_ecu_receive(&ecu, &frame, (uint32_t)now_us) != HG_OK) {
                 return 1;
             }

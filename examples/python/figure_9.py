@@ -7,7 +7,7 @@ import haptic_guidance as hg
 figure, panels = plt.subplots(3, sharex=True, sharey=True, layout="constrained")
 for panel, t_p in zip(panels, (0.1, 0.3, 0.5)):
     for condition in ("high", "mid", "low"):
-        run = hg.simulate(hg.Scenario(condition=condition, driver={"t_p": t_p}, failure={"kind": "torque"}))
+        run = hg.simulate(hg.Scenario(condition=condition, driver={"t_p_s": t_p}, failure={"kind": "torque"}))
         panel.plot(run["time_s"], run["lateral_error_m"], label=f"{condition} reliance")
     panel.set(title=f"t_p = {t_p} s", ylabel="lateral error (m)", xlim=(60, 110))
 panels[0].legend()

@@ -26,7 +26,7 @@ class Intermittent:
 
 def drive() -> list[float]:
     """The lateral errors of a drive, 200 a second."""
-    scenario = hg.Scenario(driver={"t_n": 0.8, "t_f": 1.0})
+    scenario = hg.Scenario(driver={"t_n_s": 0.8, "t_f_s": 1.0})
     simulation = hg.Simulation(scenario, own_driver=True)
     driver, errors_m = Intermittent(), []
     while (view := simulation.view()) is not None:

@@ -185,7 +185,7 @@ fn a_diverged_evaluation_is_flagged_and_has_no_nan() {
 #[test]
 fn a_run_prints_its_record_and_writes_files_when_asked() {
     let directory = tempfile::tempdir().unwrap();
-    let scenario = "condition = 'high'\n[driver]\nt_p = 0.5\n[failure]\nkind = 'torque'\n";
+    let scenario = "condition = 'high'\n[driver]\nt_p_s = 0.5\n[failure]\nkind = 'torque'\n";
     std::fs::write(directory.path().join("s.toml"), scenario).unwrap();
     let output = host_sim(directory.path(), &["run", "s.toml", "--json", "--out", "here"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -223,8 +223,8 @@ fn a_result_is_repeated_from_itself() {
     );
     write(
         "s.toml",
-        "course = 'c.toml'\nspeed = 53.7\nseed = 42\n[driver]\nt_p = 0.25\nremnant_sd = 0.1\nK_d = 3.3\n\
-         [failure]\nkind = 'input'\ntime = 9.5\n[guidance]\nprobe = true\n",
+        "course = 'c.toml'\nspeed_m_per_s = 14.9\nseed = 42\n[driver]\nt_p_s = 0.25\nremnant_sd_nm = 0.1\nk_d_nm_per_rad = 3.3\n\
+         [failure]\nkind = 'input'\ntime_s = 9.5\n[guidance]\nprobe = true\n",
     );
     let first = host_sim(directory.path(), &["run", "s.toml", "--json", "--out", "here"]);
     assert_eq!(first.status.code(), Some(0), "{}", stderr(&first));
@@ -375,7 +375,7 @@ fn a_run_records_its_bus_when_asked() {
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
     write("c.toml", "[[segment]]\nlength = 100\n");
-    write("s.toml", "course = 'c.toml'\nspeed = 72\n");
+    write("s.toml", "course = 'c.toml'\nspeed_m_per_s = 20\n");
     let output = host_sim(directory.path(), &["run", "s.toml", "--out", "here", "--bus-log"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let log = std::fs::read_to_string(directory.path().join("here/bus.log")).unwrap();
@@ -413,7 +413,7 @@ fn live_says_of_a_recorded_bus_what_changed_and_when() {
     write("c.toml", "[[segment]]\nlength = 200\n");
     write(
         "s.toml",
-        "course = 'c.toml'\nspeed = 72\n[failure]\nkind = 'input'\ntime = 3\n",
+        "course = 'c.toml'\nspeed_m_per_s = 20\n[failure]\nkind = 'input'\ntime_s = 3\n",
     );
     let driven = host_sim(directory.path(), &["run", "s.toml", "--out", "here", "--bus-log"]);
     assert_eq!(driven.status.code(), Some(0), "{}", stderr(&driven));

@@ -8,14 +8,14 @@ const FILE: &str = "
 name = 'short'
 seeds = 2
 roads = ['road.toml']
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 [faults]
 sudden_loss = 1
 [tuning]
 budget = 2
 seeds = 1
 roads = ['road.toml']
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 [[law]]
 kind = 'none'
 [[law]]
@@ -58,7 +58,12 @@ fn a_comparison_leaves_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file
             own.trim_end()
         );
     }
-    for file in ["drives.csv", "report.html", "matrix-worst_peak_after_loss_m.svg"] {
+    for file in [
+        "drives.csv",
+        "drives.parquet",
+        "report.html",
+        "matrix-worst_peak_after_loss_m.svg",
+    ] {
         let [one, three] = ["1", "3"].map(|threads| fs::read(folder.join(threads).join(file)).unwrap());
         assert_eq!(one, three, "{file}");
     }

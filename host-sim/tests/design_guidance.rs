@@ -18,12 +18,12 @@ scales = [[0.5, 9], [0.5, 2], [0.5, 2], [0.5, 2]]
 [training]
 seeds = 1
 roads = ['road.toml']
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 losses = 1
 [held_out]
 seeds = 1
 roads = ['road.toml']
-speeds_kmh = [50]
+speeds_m_per_s = [13.88888888888889]
 losses = 1
 ";
 

@@ -1,12 +1,16 @@
 //! The tables of docs/files.md against the code: every field is there, its default is the code's, and a value
 //! just outside its range is refused with the table's unit and range.
+//!
+//! What is made of the lists of fields is compared with them, and written anew by `FIELDS=write cargo test -p host-sim
+//! file_fields::`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use haptic_sim::fields::{Field, Range};
 use haptic_sim::input::InputError;
 use haptic_sim::models::road::Course;
-use haptic_sim::scenario::Scenario;
+use haptic_sim::scenario::{Scenario, TABLES};
 
 /// A row of a table.
 #[derive(Debug, Clone)]
@@ -50,8 +54,10 @@ fn rows(heading: &str) -> Vec<DocumentedField> {
     let bare = |cell: &str| cell.trim().trim_matches('`').to_owned();
     let row = |line: &str| {
         let cells: Vec<&str> = line.trim_matches('|').split('|').collect();
-        let [name, unit, range, default, meaning] = cells[..] else {
-            panic!("not five cells: {line}");
+        let (name, [unit, range, default, meaning]) = match cells[..] {
+            [name, unit, range, default, meaning] => (name, [unit, range, default, meaning]),
+            [name, _symbol, unit, range, default, meaning] => (name, [unit, range, default, meaning]),
+            _ => panic!("not five or six cells: {line}"),
         };
         assert!(!meaning.trim().is_empty(), "{line}");
         let name = bare(name);
@@ -77,11 +83,11 @@ fn scenario_text(row: &DocumentedField, value: &str) -> String {
     match row.table.as_str() {
         "" => set(&row.field),
         "speed" => match row.field.as_str() {
-            "kmh" => format!("[speed]\ntime = [0, 1000]\nkmh = [60, {value}]\n"),
-            axis => format!("[speed]\n{axis} = [0, {value}]\nkmh = [60, 60]\n"),
+            "speed_m_per_s" => format!("[speed]\ntime_s = [0, 1000]\nspeed_m_per_s = [16, {value}]\n"),
+            axis => format!("[speed]\n{axis} = [0, {value}]\nspeed_m_per_s = [16, 16]\n"),
         },
         "driver_change" => {
-            let others = [("time", "1"), ("K_d", "2"), ("K_hg", "0.25")];
+            let others = [("time_s", "1"), ("k_d_nm_per_rad", "2"), ("k_hg", "0.25")];
             let line = |(field, other): (&str, &str)| {
                 if field == row.field {
                     set(field)
@@ -103,77 +109,162 @@ fn scenario(text: &str) -> Result<Scenario, String> {
         .map_err(|e| e.to_string())
 }
 
-/// The fields that the code knows of a table, as its refusal of an unknown one lists them. Spellings with and
-/// without capitals and underscores are one field.
+/// The fields that the code knows of a table, as its refusal of an unknown one lists them.
 fn known(refusal: &str) -> BTreeSet<String> {
     let list = refusal.split_once(", expected ").expect(refusal).1;
-    list.split('`').skip(1).step_by(2).map(spelling).collect()
+    list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
-fn spelling(field: &str) -> String {
-    field.to_lowercase().replace('_', "")
+/// The default of a field as a file has it; none where a file has to give every field of the table. The first word is the default where there are words.
+fn default_of(table: &str, field: &Field) -> Option<String> {
+    match (field.range, field.default) {
+        _ if table == "driver_change" => None,
+        (_, Some(number)) => Some(number.to_string()),
+        (Range::OneOf(words), _) => Some(format!("{:?}", words[0])),
+        (Range::Flag, _) => Some("false".into()),
+        _ => None,
+    }
+}
+
+/// The rows of a table in the document.
+fn documented(table: &str, field: &Field) -> String {
+    let quoted = |words: &[&str]| {
+        words
+            .iter()
+            .map(|word| format!("`{word:?}`"))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let range = match field.range {
+        Range::Between(from, to) => format!("{from} to {to}"),
+        Range::OneOf(words) => quoted(words),
+        Range::Whole => "whole numbers from 0".into(),
+        Range::Flag => "`true`, `false`".into(),
+    };
+    let default = default_of(table, field).map_or("none".into(), |default| format!("`{default}`"));
+    let spaced = |cell: &str| {
+        if cell.is_empty() {
+            " ".into()
+        } else {
+            format!(" {cell} ")
+        }
+    };
+    let (symbol, unit) = (spaced(field.symbol), spaced(field.unit));
+    format!(
+        "| `{table}.{}` |{symbol}|{unit}| {range} | {default} | {} |\n",
+        field.name,
+        field.meaning.trim()
+    )
+}
+
+/// A field in the example that has every field; what has no default is a comment.
+fn exemplified(table: &str, field: &Field) -> String {
+    match default_of(table, field) {
+        Some(default) => format!("{} = {default}\n", field.name),
+        None => format!("# {} = ...\n", field.name),
+    }
+}
+
+/// A field in the stub for Python.
+fn typed(_table: &str, field: &Field) -> String {
+    let kind = match field.range {
+        Range::Between(..) => "float".into(),
+        Range::OneOf(words) => format!(
+            "Literal[{}]",
+            words
+                .iter()
+                .map(|w| format!("{w:?}"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+        Range::Whole => "int".into(),
+        Range::Flag => "bool".into(),
+    };
+    format!("    {}: {kind}\n", field.name)
+}
+
+/// A file whose lines behind `start(table)` are one for each field of the table.
+fn made_of_the_lists(file: &str, start: impl Fn(&str) -> String, line: impl Fn(&str, &Field) -> String) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut made = text.clone();
+    for (table, fields) in TABLES {
+        let start = start(table);
+        let at = made
+            .find(&start)
+            .unwrap_or_else(|| panic!("{file}: no {start:?}"))
+            + start.len();
+        let rest = &made[at..];
+        let is_field = |line: &&str| !line.trim().is_empty() && !line.starts_with("# [");
+        let old: usize = rest
+            .split_inclusive('\n')
+            .take_while(is_field)
+            .map(str::len)
+            .sum();
+        let lines: String = fields().iter().map(|field| line(table, field)).collect();
+        made.replace_range(at..at + old, &lines);
+    }
+    if std::env::var("FIELDS").is_ok_and(|what| what == "write") {
+        std::fs::write(&path, made).unwrap();
+    } else {
+        assert!(
+            text == made,
+            "{file} is not what the lists of fields make: FIELDS=write cargo test -p host-sim file_fields::"
+        );
+    }
 }
 
 #[test]
-fn every_field_of_a_scenario_is_in_the_table_with_its_default() {
-    let rows = rows("Scenario");
-    for table in [
-        "",
-        "driver",
-        "vehicle",
-        "guidance",
-        "failure",
-        "driver_change",
-        "world",
-        "sensor_errors",
-        "tolerances",
-    ] {
-        let probe = match table {
-            "" => "no_such_field = 1".to_owned(),
-            table => format!("[{table}]\nno_such_field = 1"),
+fn documents_and_stubs_are_made_of_the_lists() {
+    let heading = |table: &str| {
+        format!(
+            "\n`[{table}]`:\n\n| field | symbol | unit | range | default | meaning |\n|---|---|---|---|---|---|\n"
+        )
+    };
+    made_of_the_lists("docs/files.md", heading, documented);
+    let section = |table: &str| match table {
+        "driver_change" => "\n# [driver_change]\n".into(),
+        table => format!("\n[{table}]\n"),
+    };
+    made_of_the_lists("examples/every-field.toml", section, exemplified);
+    let class = |table: &str| {
+        let words = table.split('_').map(|word| word[..1].to_uppercase() + &word[1..]);
+        let total = if table == "driver_change" {
+            ""
+        } else {
+            ", total=False"
         };
-        let mut code = known(&scenario(&probe).unwrap_err());
-        if table.is_empty() {
-            for sub in [
-                "driver",
-                "vehicle",
-                "guidance",
-                "failure",
-                "driver_change",
-                "world",
-                "sensor_errors",
-                "tolerances",
-            ] {
-                assert!(code.remove(&spelling(sub)), "{sub}");
-            }
+        format!("\nclass {}Table(TypedDict{total}):\n", words.collect::<String>())
+    };
+    made_of_the_lists("bindings/python/python/haptic_guidance/_native.pyi", class, typed);
+}
+
+#[test]
+fn every_default_of_a_scenario_is_the_codes() {
+    for row in &rows("Scenario") {
+        if let Some(default) = &row.default {
+            let text = scenario_text(row, default);
+            assert_eq!(scenario(&text).as_ref(), Ok(&Scenario::default()), "{text}");
         }
-        let document = rows
-            .iter()
-            .filter(|row| row.table == table)
-            .map(|row| spelling(&row.field));
-        assert_eq!(document.collect::<BTreeSet<_>>(), code, "table {table:?}");
     }
-    // A number or a table: the refusal names the fields in words.
+}
+
+/// What is no list: the fields beside the tables, and the points of a speed.
+#[test]
+fn the_other_fields_of_a_scenario_are_in_the_table() {
+    let documented = |table: &str| {
+        let rows = rows("Scenario").into_iter().filter(|row| row.table == table);
+        rows.map(|row| row.field).collect::<BTreeSet<_>>()
+    };
+    let mut top = known(&scenario("no_such_field = 1").unwrap_err());
+    for table in TABLES.map(|(table, _)| table).iter().chain(&["speed"]) {
+        assert!(top.remove(*table), "{table}");
+    }
+    assert_eq!(documented(""), top);
+    // The refusal names the fields in words.
     let refusal = scenario("[speed]\nno_such_field = 1").unwrap_err();
-    let code: BTreeSet<_> = refusal.split('`').skip(1).step_by(2).map(spelling).collect();
-    let document = rows.iter().filter(|row| row.table == "speed");
-    assert_eq!(
-        document.map(|row| spelling(&row.field)).collect::<BTreeSet<_>>(),
-        code
-    );
-    for row in &rows {
-        match &row.default {
-            Some(default) => {
-                let text = scenario_text(row, default);
-                assert_eq!(scenario(&text).as_ref(), Ok(&Scenario::default()), "{text}");
-            }
-            None => assert!(
-                ["driver_change", "failure", "speed", "tolerances"].contains(&row.table.as_str())
-                    || ["an id", "a list of ids"].contains(&row.range.as_str()),
-                "{row:?}"
-            ),
-        }
-    }
+    let speed = refusal.split('`').skip(1).step_by(2).map(str::to_owned);
+    assert_eq!(documented("speed"), speed.collect());
 }
 
 #[test]
@@ -222,23 +313,12 @@ fn every_range_of_a_scenario_is_the_codes() {
     assert_eq!(numbers, 94, "fields with a range of numbers");
 }
 
+/// Read with its comments it is a scenario of defaults too.
 #[test]
-fn the_example_with_every_field_has_every_field() {
+fn the_example_with_every_field_is_a_scenario_of_defaults() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/every-field.toml");
     let text = std::fs::read_to_string(path).unwrap();
-    let mut table = String::new();
-    let mut found = BTreeSet::new();
-    for line in text.lines() {
-        // A field that another one decides is there as a comment.
-        let line = line.trim_start_matches("# ");
-        if let Some(name) = line.strip_prefix('[').and_then(|rest| rest.split(']').next()) {
-            table = format!("{name}.");
-        } else if let Some((field, _)) = line.split_once(" = ") {
-            found.insert(format!("{table}{field}"));
-        }
-    }
-    let document: BTreeSet<_> = rows("Scenario").iter().map(DocumentedField::name).collect();
-    assert_eq!(found, document);
+    assert_eq!(scenario(&text).as_ref(), Ok(&Scenario::default()));
 }
 
 #[test]
@@ -247,7 +327,7 @@ fn the_table_of_a_course_is_the_codes() {
     let rows = rows("Course");
     let fields = |table: &str| {
         let rows = rows.iter().filter(|row| row.table == table);
-        rows.map(|row| spelling(&row.field)).collect::<BTreeSet<_>>()
+        rows.map(|row| row.field.clone()).collect::<BTreeSet<_>>()
     };
     let mut top = known(
         &course("no_such_field = 1")

@@ -21,7 +21,7 @@ name = \"P01\"
 published = 2
 [[participant]]
 name = \"P02\"
-driver = { t_p = 0.2, remnant_sd = 0.05 }
+driver = { t_p_s = 0.2, remnant_sd_nm = 0.05 }
 [[participant]]
 name = \"anna\"
 person = true
@@ -29,7 +29,7 @@ person = true
 const COURSE: &str =
     "lane_width = 3.6\n[[segment]]\nlength = 150\n[[segment]]\nlength = 300\ncurvature = 0.002\n";
 /// What a person might leave: the lab writes the same columns.
-const PERSON: &str = "course = \"course.toml\"\nseed = 9\n[driver]\nt_p = 0.25\nremnant_sd = 0.1\n";
+const PERSON: &str = "course = \"course.toml\"\nseed = 9\n[driver]\nt_p_s = 0.25\nremnant_sd_nm = 0.1\n";
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
@@ -181,7 +181,11 @@ fn a_persons_drive_comes_in_once() {
         ]
     );
     // Another study in the same place is refused, and nothing is driven.
-    fs::write(at.join("other.toml"), STUDY.replace("t_p = 0.2,", "t_p = 0.3,")).unwrap();
+    fs::write(
+        at.join("other.toml"),
+        STUDY.replace("t_p_s = 0.2,", "t_p_s = 0.3,"),
+    )
+    .unwrap();
     refused(
         at,
         &["study", "other.toml", "--out", "out"],

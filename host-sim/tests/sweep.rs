@@ -26,10 +26,10 @@ curvature_start = 0.003
 curvature_end = 0.003
 
 [vary]
-\"driver.t_p\" = { uniform = [0.1, 0.5] }
-\"driver.remnant_sd\" = { uniform = [0.0, 0.1] }
-place = { uniform = [50, 120], fields = [\"failure.time\"], times = 3.6, over = \"speed\" }
-speed = { uniform = [40, 80] }
+\"driver.t_p_s\" = { uniform = [0.1, 0.5] }
+\"driver.remnant_sd_nm\" = { uniform = [0.0, 0.1] }
+place = { uniform = [50, 120], fields = [\"failure.time_s\"], over = \"speed_m_per_s\" }
+speed_m_per_s = { uniform = [11, 22] }
 ";
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {

@@ -11,7 +11,7 @@ use serde_json::Value;
 const HELD: &str = "[[segment]]\nlength = 200\n[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = 0.00125\n\
                     [[segment]]\nlength = 1000\ncurvature = 0.00125\n";
 /// A camera that is blind for 1.5 s every few seconds: the ECU hands over after a second of that.
-const BLIND: &str = "[sensor_errors]\ndropouts = 720\ndropout = 1.5\n";
+const BLIND: &str = "[sensor_errors]\ndropout_rate_per_s = 0.2\ndropout_duration_s = 1.5\n";
 const RELIANCES: [&str; 3] = ["high", "mid", "low"];
 
 fn folder() -> tempfile::TempDir {
@@ -146,6 +146,8 @@ fn an_evaluation_that_rests_on_unguided_runs_fails() {
         let report = fs::read_to_string(here.join("out/report.html")).unwrap();
         let on_the_road = runs.iter().filter(|run| run["diverged"] == false);
         let (count, of) = (on_the_road.clone().filter(left).count(), on_the_road.count());
+        // Who relies on the guidance in a long bend and holds still is asked for a hand, and answers.
+        assert!(course != "held.toml" || count == 0, "{text}");
         if count == 0 {
             assert_eq!(output.status.code(), Some(0), "{course}");
             assert_eq!(results["claims"], serde_json::json!([]));
@@ -173,8 +175,8 @@ fn a_sweep_has_columns_for_it_and_counts() {
     let folder = folder();
     let here = folder.path();
     let sweep = "metrics = [\"peak_lateral_error_m\"]\n[scenario]\ncourse = \"held.toml\"\n\
-                 [scenario.sensor_errors]\ndropout = 1.5\n[vary]\ncondition = [\"manual\", \"high\", \"mid\", \"low\"]\n\
-                 \"sensor_errors.dropouts\" = [0, 720]\n";
+                 [scenario.sensor_errors]\ndropout_duration_s = 1.5\n[vary]\ncondition = [\"manual\", \"high\", \"mid\", \"low\"]\n\
+                 \"sensor_errors.dropout_rate_per_s\" = [0, 0.2]\n";
     fs::write(here.join("sweep.toml"), sweep).unwrap();
     let output = host_sim(here, &["sweep", "sweep.toml", "--out", "s"]);
     assert_eq!(
@@ -198,9 +200,9 @@ fn a_sweep_has_columns_for_it_and_counts() {
         ];
         let away = names.map(field);
         let drive = field("drive");
-        match (field("condition"), field("sensor_errors.dropouts")) {
+        match (field("condition"), field("sensor_errors.dropout_rate_per_s")) {
             ("manual", _) => assert_eq!(away, [""; 4]),
-            (_, "720") => assert_eq!((away[1], away[2]), ("LaneTimeout", "")),
+            (_, "0.2") => assert_eq!((away[1], away[2]), ("LaneTimeout", "")),
             _ => assert!(["", "HandsOff"].contains(&away[1]), "{row:?}"),
         }
         let left_by_itself = !away[1].is_empty();
@@ -241,7 +243,7 @@ fn the_means_of_a_study_say_which_sessions_were_not_guided_throughout() {
     let here = folder.path();
     let study = "name = \"blind\"\n[scenario]\ncourse = \"held.toml\"\n[[condition]]\nname = \"manual\"\n\
                  scenario = { condition = \"manual\" }\n[[condition]]\nname = \"guided\"\n\
-                 scenario = { sensor_errors = { dropouts = 720.0, dropout = 1.5 } }\n\
+                 scenario = { sensor_errors = { dropout_rate_per_s = 0.2, dropout_duration_s = 1.5 } }\n\
                  [[participant]]\nname = \"P01\"\npublished = 2\n[[participant]]\nname = \"P02\"\npublished = 3\n";
     fs::write(here.join("study.toml"), study).unwrap();
     let output = host_sim(here, &["study", "study.toml", "--out", "s"]);

@@ -20,9 +20,9 @@ fn a_road_is_nested() {
 
 #[test]
 fn a_scenario_is_nested() {
-    let text = format!("speed = {}60{}", "[".repeat(DEEP), "]".repeat(DEEP));
+    let text = format!("speed_m_per_s = {}16{}", "[".repeat(DEEP), "]".repeat(DEEP));
     assert!(Course::from_toml("nested", &text).is_err());
-    let text = format!("{}speed = 1", "a.".repeat(DEEP));
+    let text = format!("{}speed_m_per_s = 1", "a.".repeat(DEEP));
     assert!(Course::from_toml("nested", &text).is_err());
 }
 

@@ -259,11 +259,11 @@ pub(crate) fn dbc() -> Vec<Vec<u8>> {
 }
 
 pub(crate) fn toml() -> Vec<Vec<u8>> {
-    let inline = "speed = 50\n[course]\nname = \"mine\"\nlane_width = 3\n[[course.segment]]\nlength = 300\n\
+    let inline = "speed_m_per_s = 14\n[course]\nname = \"mine\"\nlane_width = 3\n[[course.segment]]\nlength = 300\n\
                   curvature_start = 0\ncurvature_end = 0.01\n";
-    let speed = "[speed]\ntime = [0, 10]\nkmh = [50, 90]\n[failure]\ntime = 20\n";
+    let speed = "[speed]\ntime_s = [0, 10]\nspeed_m_per_s = [14, 25]\n[failure]\ntime_s = 20\n";
     let sweep = "samples = 4\ndesign = \"latin-hypercube\"\n[vary]\nspeed = [40, 50]\n\
-                 \"driver.t_p\" = { uniform = [0.1, 0.3] }\nseed = { from = 1, to = 5, count = 3 }\n";
+                 \"driver.t_p_s\" = { uniform = [0.1, 0.3] }\nseed = { from = 1, to = 5, count = 3 }\n";
     let mut seeds: Vec<Vec<u8>> = [inline, speed, sweep]
         .map(|text| text.as_bytes().to_vec())
         .to_vec();

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.io
 
 OUT = Path(__file__).parents[1] / "data/layouts"
-DRIVER = "[driver]\nt_p = 0.2\nremnant_sd = 0.1\n"
+DRIVER = "[driver]\nt_p_s = 0.2\nremnant_sd_nm = 0.1\n"
 PROBE = "[guidance]\nprobe = true\nprobe_amplitude_nm = 0.3\nprobe_frequency_hz = 1\n"
 
 

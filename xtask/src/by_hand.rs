@@ -1,89 +1,81 @@
 //! Defects made by hand (`core/tests/mutants.toml`): each is put into a copy of the sources, and the test that is there
 //! for it has to fail. A tool that mutates single expressions comes upon few of them.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
 
 use crate::tool;
 
 const LIST: &str = "core/tests/mutants.toml";
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct List {
-    mutant: Vec<Mutant>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Mutant {
-    name: String,
-    file: PathBuf,
-    find: String,
-    replace: String,
-    test: String,
-}
+/// By the file that a defect is put into, and its name: what stands there once, what takes its place, and the test that has to
+/// fail.
+type List = BTreeMap<PathBuf, BTreeMap<String, [String; 3]>>;
 
 /// Applies each; an error names those that no test noticed.
 pub(crate) fn run() -> Result<()> {
     let text = fs::read_to_string(tool::root().join(LIST)).context(LIST)?;
     let list: List = toml::from_str(&text).context(LIST)?;
-    ensure!(!list.mutant.is_empty(), "{LIST} has no mutant");
+    ensure!(!list.is_empty(), "{LIST} has no defect");
     let copy = tool::root().join("target/by-hand");
     copy_sources(&copy)?;
     // First of all the copy as it is: what fails there anyway would notice everything.
-    for mutant in &list.mutant {
-        let (said, name) = test(&copy, mutant)?;
+    let said = test(&copy, &["--lib", "--test", "all"])?;
+    for [.., name] in list.values().flat_map(BTreeMap::values) {
         ensure!(
             said.contains(&format!("test {name} ... ok")),
             "without a defect {name} does not pass:\n{said}"
         );
     }
-    let mut survivors = Vec::new();
-    for mutant in &list.mutant {
-        let path = copy.join(&mutant.file);
-        let source = fs::read_to_string(&path).with_context(|| mutant.file.display().to_string())?;
-        let found = source.matches(&mutant.find).count();
-        ensure!(
-            found == 1,
-            "{LIST}: {:?} stands {found} times in {}, not once",
-            mutant.find,
-            mutant.file.display()
-        );
-        fs::write(&path, source.replacen(&mutant.find, &mutant.replace, 1))?;
-        let (said, name) = test(&copy, mutant)?;
-        fs::write(&path, &source)?;
-        let failed = format!("test {name} ... FAILED");
-        if said.contains(&failed) {
-            println!("killed    {} ({})", mutant.name, mutant.test);
-        } else if said.contains("error: could not compile") {
-            bail!("{}: the defect does not compile:\n{said}", mutant.name);
-        } else {
-            println!("SURVIVED  {} ({})", mutant.name, mutant.test);
-            survivors.push(mutant.name.as_str());
+    let (mut count, mut survivors) = (0, Vec::new());
+    for (file, defects) in &list {
+        for (defect, [find, replace, name]) in defects {
+            count += 1;
+            let path = copy.join(file);
+            let source = fs::read_to_string(&path).with_context(|| file.display().to_string())?;
+            let found = source.matches(find).count();
+            ensure!(
+                found == 1,
+                "{LIST}, {defect:?}: {find:?} stands {found} times in {}, not once",
+                file.display()
+            );
+            fs::write(&path, source.replacen(find, replace, 1))?;
+            let program: &[&str] = if name.contains("::tests::") {
+                &["--lib"]
+            } else {
+                &["--test", "all"]
+            };
+            let said = test(&copy, &[program, &["--", "--exact", name]].concat())?;
+            fs::write(&path, &source)?;
+            if said.contains(&format!("test {name} ... FAILED")) {
+                println!("killed    {defect} ({name})");
+            } else if said.contains("error: could not compile") {
+                bail!("{defect}: the defect does not compile:\n{said}");
+            } else {
+                println!("SURVIVED  {defect} ({name})");
+                survivors.push(defect.as_str());
+            }
         }
     }
     ensure!(survivors.is_empty(), "not noticed: {}", survivors.join("; "));
-    println!("all {} defects made by hand are noticed", list.mutant.len());
+    println!("all {count} defects made by hand are noticed");
     Ok(())
 }
 
-/// What the test of a mutant, `file::function`, prints, and the function.
-fn test<'a>(copy: &Path, mutant: &'a Mutant) -> Result<(String, &'a str)> {
-    let name = mutant.test.as_str();
-    ensure!(name.contains("::"), "{LIST}: {name} is not FILE::TEST");
+/// What the tests print.
+fn test(copy: &Path, which: &[&str]) -> Result<String> {
     let output = tool::cargo()
         .current_dir(copy)
-        .args(["test", "-p", "haptic-core", "--all-features", "--test", "all"])
-        .args(["--", "--exact", name])
+        .args(["test", "-p", "haptic-core", "--all-features"])
+        .args(which)
         .env("CARGO_TARGET_DIR", tool::root().join("target/by-hand-build"))
         .output()
         .context("cargo does not start")?;
     let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    Ok((out + &err, name))
+    Ok(out + &err)
 }
 
 /// Core with what its tests read, as a workspace of its own.

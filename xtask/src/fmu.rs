@@ -8,7 +8,7 @@ use crate::python;
 use crate::tool::{Built, cargo, command, exists, output, root, run};
 
 /// A relying driver on the paper's course, as bindings/fmu/check.py couples it.
-const SCENARIO: &str = "speed = 60\ncondition = \"mid\"\n[driver]\nt_p = 0.3\n";
+const SCENARIO: &str = "speed_m_per_s = 16.666666666666668\ncondition = \"mid\"\n[driver]\nt_p_s = 0.3\n";
 const WINDOWS: &str = "x86_64-pc-windows-gnu";
 const LINKER: &str = "x86_64-w64-mingw32-gcc";
 

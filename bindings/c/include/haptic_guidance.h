@@ -38,7 +38,7 @@ typedef enum hg_status {
     HG_ERROR_NOT_MADE = 3,  /* hg_ecu_init did not make this ECU */
     HG_ERROR_RANGE = 4,     /* a value is outside its range or no number */
     /* Why a frame is not used; the last good one stays in use until it is stale. */
-    HG_REJECT_LENGTH = 16,      /* not eight bytes */
+    HG_REJECT_LENGTH = 16,      /* not as long as its message is */
     HG_REJECT_CRC = 17,         /* flipped bits, or another message's data ID */
     HG_REJECT_REPEATED = 18,    /* the counter repeats the last one */
     HG_REJECT_JUMP = 19,        /* the counter went back or too far ahead */
@@ -128,6 +128,9 @@ int32_t hg_parameters_default(double *values);
  * studies. wrong: null, or where HG_ERROR_RANGE leaves the number of the parameter out of range, HG_PARAMETERS for a
  * product of several. */
 int32_t hg_ecu_init(hg_ecu *ecu, const double *values, uint8_t engaged, uint32_t now_us, uint32_t *wrong);
+
+/* 1 for an identifier under which the ECU hears something, else 0. */
+uint8_t hg_is_input(uint16_t id);
 
 /* Takes a frame that arrived at now_us. Frames of no interest are HG_OK. */
 int32_t hg_ecu_receive(hg_ecu *ecu, const hg_frame *frame, uint32_t now_us);

@@ -7,7 +7,7 @@
 
 use core::mem::{align_of, size_of};
 
-use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle, is_input};
 use haptic_core::bus::{Frame, Reject};
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::{PARAMETERS, Params};
@@ -258,6 +258,12 @@ pub unsafe extern "C" fn hg_ecu_init(
         Ok(())
     };
     code(make())
+}
+
+/// Whether the ECU hears something under an identifier.
+#[unsafe(no_mangle)]
+pub extern "C" fn hg_is_input(id: u16) -> u8 {
+    u8::from(is_input(id))
 }
 
 /// Takes a frame.

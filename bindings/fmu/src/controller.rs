@@ -10,6 +10,7 @@ use haptic_sim::guidance::Status;
 use haptic_sim::models::sensors::camera_looks;
 use haptic_sim::unguided::{Cause, Circumstances, Watch};
 
+use crate::error::FmuError;
 use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, variable};
 
 /// The model.
@@ -186,13 +187,13 @@ impl Default for Controller {
 }
 
 /// The parameters among the values, checked alone and together.
-fn setup_of(values: &[f64]) -> Result<Setup, String> {
+fn setup_of(values: &[f64]) -> Result<Setup, FmuError> {
     let parameters = std::array::from_fn(|i| values[OWN + i]);
-    Setup::new(&Params::from_values(&parameters)).map_err(|e| e.to_string())
+    Setup::new(&Params::from_values(&parameters)).map_err(FmuError::Setup)
 }
 
 impl Model for Controller {
-    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), String> {
+    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), FmuError> {
         let setup = setup_of(values)?;
         let start = Instant::from_us(0);
         self.ecu = if values[ENGAGED] != 0.0 {
@@ -211,13 +212,10 @@ impl Model for Controller {
     }
 
     /// As on a vehicle: while nobody is guided, the ECU starts again with the new set.
-    fn tune(&mut self, values: &[f64]) -> Result<(), String> {
+    fn tune(&mut self, values: &[f64]) -> Result<(), FmuError> {
         let setup = setup_of(values)?;
         if !matches!(self.mode, Mode::Boot | Mode::Standby) {
-            return Err(format!(
-                "the ECU takes parameters in Boot and in Standby, and is in {:?}",
-                self.mode
-            ));
+            return Err(FmuError::Mode(self.mode));
         }
         let now = Instant::from_us(self.steps.wrapping_mul(1000) as u32);
         self.ecu = Ecu::new(Some(&setup), Boot::default(), now);
@@ -226,7 +224,7 @@ impl Model for Controller {
     }
 
     /// The sensors send what is due, the ECU decides.
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let [
             e_y,
             e_theta,
@@ -242,7 +240,7 @@ impl Model for Controller {
             ..,
         ] = *values
         else {
-            return Err("variables are missing".into());
+            return Err(FmuError::Other("variables are missing"));
         };
         let step = self.steps;
         // The ECU's clock wraps.

@@ -1,9 +1,11 @@
 //! `HapticDriver`: equations (7) and (8), the delay exact.
 
+use haptic_sim::fields::{Field, Fields, from_numbers};
 use haptic_sim::models::arm::Arm;
-use haptic_sim::models::driver::{ArmGains, DriverParameters, Vision};
+use haptic_sim::models::driver::{ArmGains, ArmInFile, DriverParameters, Vision};
 
-use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, parameter, variable};
+use crate::error::FmuError;
+use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, of_field, variable};
 use Kind::Real;
 use Role::Output;
 
@@ -23,9 +25,40 @@ pub static ABOUT: About = About {
 
 const TORQUE: usize = 4;
 const FIRST: usize = 5;
+/// The fields of a scenario's driver that act here: whoever couples the unit looks at the road, and adds a remnant.
+const FIELDS: [&Field; 9] = [
+    Field::named(DriverParameters::FIELDS, "a_1_rad_per_m"),
+    Field::named(DriverParameters::FIELDS, "a_2_rad_per_m_s"),
+    Field::named(DriverParameters::FIELDS, "a_3"),
+    Field::named(DriverParameters::FIELDS, "t_p_s"),
+    Field::named(DriverParameters::FIELDS, "t_nms_s"),
+    Field::named(DriverParameters::FIELDS, "k_nms_nm_per_rad"),
+    Field::named(DriverParameters::FIELDS, "line_m"),
+    Field::named(ArmInFile::FIELDS, "k_d_nm_per_rad"),
+    Field::named(ArmInFile::FIELDS, "k_hg"),
+];
+/// Places of the arm's gains.
+const K_D: usize = FIRST + 7;
+const K_HG: usize = K_D + 1;
 
 /// The driver of a scenario that says nothing.
-static VARIABLES: [Variable; 13] = [
+static VARIABLES: [Variable; FIRST + FIELDS.len()] = {
+    let mut all = [OWN[0]; FIRST + FIELDS.len()];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = if i < FIRST {
+            OWN[i]
+        } else {
+            of_field(FIELDS[i - FIRST])
+        };
+        i += 1;
+    }
+    // Without them a scenario takes those of its condition.
+    (all[K_D].start, all[K_HG].start) = (3.0, 0.5);
+    all
+};
+
+const OWN: [Variable; FIRST] = [
     input(
         "e_y_m",
         "m",
@@ -57,32 +90,6 @@ static VARIABLES: [Variable; 13] = [
         "N.m",
         "Torque of the driver on the column",
     ),
-    parameter("a_1", "rad/m", 0.1, [0.0, 10.0], "Target angle per lateral error"),
-    parameter(
-        "a_2",
-        "rad/(m.s)",
-        0.05,
-        [0.0, 10.0],
-        "Target angle per integral of the lateral error",
-    ),
-    parameter("a_3", "", 3.7, [0.0, 100.0], "Target angle per yaw error"),
-    parameter("t_p_s", "s", 0.1, [0.001, 2.0], "Delay from seeing to acting"),
-    parameter("t_nms_s", "s", 0.1, [0.01, 2.0], "Time constant of the arm"),
-    parameter("k_nms_nm_per_rad", "N.m/rad", 1.0, [0.0, 100.0], "Reflex gain"),
-    parameter(
-        "k_d_nm_per_rad",
-        "N.m/rad",
-        3.0,
-        [0.0, 50.0],
-        "Torque per target angle",
-    ),
-    parameter(
-        "k_hg",
-        "",
-        0.5,
-        [0.0, 10.0],
-        "Share of the guidance torque that the arm works against",
-    ),
 ];
 
 #[derive(Clone)]
@@ -92,27 +99,19 @@ struct Driver {
 }
 
 impl Model for Driver {
-    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), String> {
-        let [a_1, a_2, a_3, t_p, t_nms, k_nms, k_d, k_hg, ..] = values[FIRST..] else {
-            return Err("variables are missing".into());
-        };
-        let parameters = DriverParameters {
-            a_1,
-            a_2,
-            a_3,
-            t_p,
-            t_nms,
-            k_nms,
-            ..DriverParameters::default()
-        };
-        parameters.check().map_err(|e| e.to_string())?;
+    fn begin(&mut self, values: &mut [f64], _texts: &Texts) -> Result<(), FmuError> {
+        let names = FIELDS.iter().map(|field| field.name);
+        let (parameters, arm): (DriverParameters, ArmInFile) =
+            from_numbers(names.zip(values[FIRST..].iter().copied()))?;
+        parameters.check().and_then(|()| arm.check())?;
+        let (k_d, k_hg) = (values[K_D], values[K_HG]);
         self.vision = Vision::new(&parameters);
         self.arm = Some(Arm::new(&parameters, ArmGains { k_d, k_hg }));
         values[TORQUE] = 0.0;
         Ok(())
     }
 
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let target_rad = self.vision.step(values[0], values[1]);
         if let Some(arm) = &mut self.arm {
             values[TORQUE] = arm.step(target_rad, values[2], values[3]);

@@ -5,6 +5,9 @@
 
 use std::path::PathBuf;
 
+use crate::error::FmuError;
+use haptic_sim::input::in_range;
+
 use crate::MODELS;
 use crate::history::{Group, History, MOST_STEPS as MOST_STEPS_OF_A_STATE, Reader};
 use crate::variable::{About, Kind, Model, Role, Texts};
@@ -62,7 +65,7 @@ impl State {
     }
 
     /// The parameters take hold.
-    fn begin(&mut self) -> Result<(), String> {
+    fn begin(&mut self) -> Result<(), FmuError> {
         let begun = self.values.clone();
         self.model.begin(&mut self.values, &self.texts)?;
         self.held.clone_from(&begun);
@@ -71,7 +74,7 @@ impl State {
     }
 
     /// One step, or none.
-    fn step(&mut self, about: &About) -> Result<(), String> {
+    fn step(&mut self, about: &About) -> Result<(), FmuError> {
         let before = self.values.clone();
         if let Err(why) = self.model.step(&mut self.values) {
             self.values = before;
@@ -92,7 +95,7 @@ impl State {
     }
 
     /// Takes tunable parameters that were set, which history keeps even if they are the same: the model begins anew.
-    fn tune(&mut self, references: &[usize]) -> Result<(), String> {
+    fn tune(&mut self, references: &[usize]) -> Result<(), FmuError> {
         self.model.tune(&self.values)?;
         let tuned = references
             .iter()
@@ -102,7 +105,7 @@ impl State {
     }
 
     /// Drives to where a group of values was given, and gives them.
-    fn take(&mut self, about: &About, group: &Group) -> Result<(), String> {
+    fn take(&mut self, about: &About, group: &Group) -> Result<(), FmuError> {
         while self.steps < group.step {
             self.step(about)?;
         }
@@ -111,7 +114,7 @@ impl State {
             let variable = about
                 .variables
                 .get(reference)
-                .ok_or("a variable that there is not")?;
+                .ok_or(FmuError::Other("a variable that there is not"))?;
             self.values[reference] = value;
             if variable.role == Role::Tunable {
                 tuned.push(reference);
@@ -146,7 +149,7 @@ impl Instance {
     }
 
     /// Texts; all of them, or none.
-    pub(crate) fn texts(&self, references: &[u32]) -> Result<Vec<&str>, String> {
+    pub(crate) fn texts(&self, references: &[u32]) -> Result<Vec<&str>, FmuError> {
         let text = |&reference: &u32| {
             let place = self.place(reference, Kind::Text)?;
             Ok(self.state.texts.texts[place].as_str())
@@ -155,12 +158,12 @@ impl Instance {
     }
 
     /// Sets texts; all of them, or none.
-    pub(crate) fn set_texts(&mut self, given: Vec<(u32, String)>) -> Result<(), String> {
+    pub(crate) fn set_texts(&mut self, given: Vec<(u32, String)>) -> Result<(), FmuError> {
         let mut texts = self.state.texts.texts.clone();
         for (reference, text) in given {
             let place = self.place(reference, Kind::Text)?;
             if self.state.begun.is_some() {
-                return Err(format!("{} cannot be set now", self.about.variables[place].name));
+                return Err(FmuError::NotNow(self.about.variables[place].name));
             }
             texts[place] = text;
         }
@@ -169,12 +172,12 @@ impl Instance {
     }
 
     /// The place of a variable of a type.
-    fn place(&self, reference: u32, kind: Kind) -> Result<usize, String> {
+    fn place(&self, reference: u32, kind: Kind) -> Result<usize, FmuError> {
         let found = self.about.variables.get(reference as usize);
         found
             .filter(|variable| variable.kind == kind)
             .map(|_| reference as usize)
-            .ok_or_else(|| format!("value reference {reference} is no {kind:?} variable"))
+            .ok_or(FmuError::Reference(reference, kind))
     }
 
     /// Values of one type; the reference behind the last one is the time.
@@ -183,7 +186,7 @@ impl Instance {
         references: &[u32],
         kind: Kind,
         mut put: impl FnMut(usize, f64),
-    ) -> Result<(), String> {
+    ) -> Result<(), FmuError> {
         for (i, &reference) in references.iter().enumerate() {
             if reference as usize == self.about.variables.len() && kind == Kind::Real {
                 put(i, self.time_s());
@@ -200,7 +203,7 @@ impl Instance {
         references: &[u32],
         kind: Kind,
         value: impl Fn(usize) -> f64,
-    ) -> Result<(), String> {
+    ) -> Result<(), FmuError> {
         let mut values = self.state.values.clone();
         let (mut tuned, started) = (Vec::new(), self.state.begun.is_some());
         for (i, &reference) in references.iter().enumerate() {
@@ -208,18 +211,13 @@ impl Instance {
             let (variable, value) = (&self.about.variables[place], value(i));
             let name = variable.name;
             if variable.role == Role::Output || (variable.role == Role::Parameter && started) {
-                return Err(format!("{name} cannot be set now"));
+                return Err(FmuError::NotNow(name));
             }
             if !value.is_finite() {
-                return Err(format!("{name} = {value} is no finite number"));
+                return Err(FmuError::NotFinite(name, value));
             }
-            if let Some([min, max]) = variable.range
-                && !(min..=max).contains(&value)
-            {
-                let unit = variable.unit;
-                return Err(format!(
-                    "{name} = {value} {unit} is outside {min} to {max} {unit}"
-                ));
+            if let Some([min, max]) = variable.range {
+                in_range(name, value, min..=max, variable.unit)?;
             }
             values[place] = value;
             if variable.role == Role::Tunable && started {
@@ -232,14 +230,17 @@ impl Instance {
             let model = self.state.model.copy();
             if let Err(why) = self.state.tune(&tuned) {
                 (self.state.model, self.state.values) = (model, before);
-                return Err(format!("{}: {why}", self.about.variables[first].name));
+                return Err(FmuError::Variable(
+                    self.about.variables[first].name,
+                    Box::new(why),
+                ));
             }
         }
         Ok(())
     }
 
     /// The parameters take hold.
-    pub(crate) fn begin(&mut self) -> Result<(), String> {
+    pub(crate) fn begin(&mut self) -> Result<(), FmuError> {
         let mut state = self.state.clone();
         state.begin()?;
         self.state = state;
@@ -247,15 +248,13 @@ impl Instance {
     }
 
     /// Moves by a whole number of milliseconds, or not at all; inputs hold meanwhile.
-    pub(crate) fn advance(&mut self, step_s: f64) -> Result<(), String> {
+    pub(crate) fn advance(&mut self, step_s: f64) -> Result<(), FmuError> {
         let steps = (step_s * 1e3).round();
         if !(1.0..=MOST_STEPS).contains(&steps) || (step_s * 1e3 - steps).abs() > 1e-6 {
-            return Err(format!(
-                "communicationStepSize = {step_s} s is no multiple of 0.001 s"
-            ));
+            return Err(FmuError::StepSize(step_s));
         }
         if self.state.begun.is_none() {
-            return Err("a step before the end of the initialization".into());
+            return Err(FmuError::Other("a step before the end of the initialization"));
         }
         // The step that could fail is the one to go back from; the controller's never fails.
         let before = (steps > 1.0).then(|| self.state.clone());
@@ -271,11 +270,10 @@ impl Instance {
     }
 
     /// A state as bytes.
-    pub(crate) fn written(&self, state: &State) -> Result<Vec<u8>, String> {
-        let history = state
-            .history
-            .to_bytes()
-            .ok_or("the state of so long a drive cannot be written; it can be taken and given back")?;
+    pub(crate) fn written(&self, state: &State) -> Result<Vec<u8>, FmuError> {
+        let history = state.history.to_bytes().ok_or(FmuError::Other(
+            "the state of so long a drive cannot be written; it can be taken and given back",
+        ))?;
         let head = format!("{FORM}\n{}\n{}\n", self.about.token, env!("CARGO_PKG_VERSION"));
         let mut bytes = head.into_bytes();
         bytes.push(state.begun.is_some().into());
@@ -298,18 +296,18 @@ impl Instance {
     }
 
     /// The state that was written as these bytes, by this version, of this model.
-    pub(crate) fn read(&self, bytes: &[u8]) -> Result<State, String> {
+    pub(crate) fn read(&self, bytes: &[u8]) -> Result<State, FmuError> {
         let head = format!("{FORM}\n{}\n{}\n", self.about.token, env!("CARGO_PKG_VERSION"));
-        let body = bytes
-            .strip_prefix(head.as_bytes())
-            .ok_or("these bytes are no state that this version of this model wrote")?;
+        let body = bytes.strip_prefix(head.as_bytes()).ok_or(FmuError::Other(
+            "these bytes are no state that this version of this model wrote",
+        ))?;
         self.driven(body)
-            .ok_or("the state is cut short, or of another kind")?
-            .map_err(|why| format!("the state cannot be driven to again: {why}"))
+            .ok_or(FmuError::Other("the state is cut short, or of another kind"))?
+            .map_err(|why| FmuError::State(Box::new(why)))
     }
 
     /// Drives a unit to a state; `None` where there are not the bytes of one.
-    fn driven(&self, body: &[u8]) -> Option<Result<State, String>> {
+    fn driven(&self, body: &[u8]) -> Option<Result<State, FmuError>> {
         let mut from = Reader(body);
         let [started] = from.number()?;
         let steps = u64::from_le_bytes(from.number()?);
@@ -350,7 +348,7 @@ impl Instance {
                 state.values[place] = values[place];
             } else if state.values[place].to_bits() != values[place].to_bits() {
                 let [then, now] = [values[place], state.values[place]];
-                return Some(Err(format!("{} is {now}, and was {then}", variable.name)));
+                return Some(Err(FmuError::Differs(variable.name, now, then)));
             }
         }
         Some(Ok(state))

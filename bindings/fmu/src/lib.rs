@@ -7,6 +7,7 @@
 pub mod controller;
 mod declare;
 pub mod driver;
+pub mod error;
 pub mod fmi2;
 pub mod fmi3;
 mod history;

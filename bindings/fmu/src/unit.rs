@@ -7,6 +7,7 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::PathBuf;
 
 use crate::declare::functions;
+use crate::error::FmuError;
 use crate::instance::{Instance, State};
 use crate::variable::Kind;
 
@@ -46,9 +47,9 @@ impl Unit {
     }
 
     /// Says why, and that it is an error.
-    pub(crate) fn answer(&self, result: Result<(), String>) -> c_int {
+    pub(crate) fn answer(&self, result: Result<(), FmuError>) -> c_int {
         let Err(why) = result else { return OK };
-        (self.tell)(&CString::new(why).unwrap_or_default());
+        (self.tell)(&CString::new(why.to_string()).unwrap_or_default());
         ERROR
     }
 }
@@ -89,9 +90,9 @@ pub(crate) unsafe fn text(pointer: *const c_char) -> Option<String> {
         .map(str::to_owned)
 }
 
-fn check_places(count: usize, places: usize) -> Result<(), String> {
+fn check_places(count: usize, places: usize) -> Result<(), FmuError> {
     if places < count {
-        return Err(format!("{count} variables for {places} values"));
+        return Err(FmuError::Places(count, places));
     }
     Ok(())
 }
@@ -194,7 +195,7 @@ pub(crate) unsafe fn set_texts(
         let pairs = pairs.map(|(reference, value)| Some((*reference, unsafe { text(*value) }?)));
         pairs
             .collect::<Option<Vec<_>>>()
-            .ok_or_else(|| "a text is no UTF-8".into())
+            .ok_or(FmuError::Other("a text is no UTF-8"))
     });
     let result = given.and_then(|given| unit.instance.set_texts(given));
     unit.answer(result)

@@ -2,6 +2,10 @@
 
 use std::path::PathBuf;
 
+use haptic_sim::fields::Field;
+
+use crate::error::FmuError;
+
 /// What a variable is to FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -116,6 +120,16 @@ pub const fn parameter(
     }
 }
 
+/// A field of a scenario as a parameter; its start is the field's default, or zero if that is none.
+#[must_use]
+pub const fn of_field(field: &Field) -> Variable {
+    let start = match field.default {
+        Some(start) => start,
+        None => 0.0,
+    };
+    parameter(field.name, field.unit, start, field.ends(), field.meaning)
+}
+
 /// A model as an importing tool sees it.
 pub struct About {
     /// Name of the model and of its binary.
@@ -145,20 +159,20 @@ pub trait Model: Send {
     ///
     /// # Errors
     /// A parameter that cannot be, with its name.
-    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), String>;
+    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), FmuError>;
 
     /// One step of 1 ms under the inputs; writes the outputs.
     ///
     /// # Errors
     /// Why there is no next step.
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String>;
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError>;
 
     /// Takes tunable parameters that were set since the start.
     ///
     /// # Errors
     /// Why they cannot be, or not now.
-    fn tune(&mut self, _values: &[f64]) -> Result<(), String> {
-        Err("it cannot be set now".into())
+    fn tune(&mut self, _values: &[f64]) -> Result<(), FmuError> {
+        Err(FmuError::Other("it cannot be set now"))
     }
 
     /// The same again, for a state that is taken.

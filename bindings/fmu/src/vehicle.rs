@@ -1,15 +1,20 @@
 //! `HapticVehicle`: vehicle, column and the road before them, under two torques. It is the simulator's closed loop whose driver
 //! has no gain and whose guidance is an input.
 
+use haptic_sim::fields::from_numbers;
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
+use haptic_sim::input::InputError;
 use haptic_sim::models::road::{Course, LaneChoice, PAPER_COURSE};
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::parts::PaperPair;
-use haptic_sim::scenario::Condition;
+use haptic_sim::scenario::{Condition, SPEED_M_PER_S, Speed};
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Scenario, Simulation};
 
-use crate::variable::{About, Kind, Model, Role, Texts, Variable, input, limits, parameter, variable};
+use crate::error::FmuError;
+use crate::variable::{
+    About, Kind, Model, Role, Texts, Variable, input, limits, of_field, parameter, variable,
+};
 use Kind::{Real, Text};
 use Role::{Output, Parameter};
 
@@ -31,9 +36,35 @@ pub static ABOUT: About = About {
 const OUTPUTS: usize = 2;
 const SPEED: usize = 12;
 const FIRST: usize = 13;
-const COURSE: usize = 24;
+const COURSE: usize = FIRST + VehicleParameters::FIELDS.len();
 
-static VARIABLES: [Variable; 25] = [
+/// The road is the last of them, the fields of a scenario's vehicle before it.
+static VARIABLES: [Variable; COURSE + 1] = {
+    let mut all = [ROAD; COURSE + 1];
+    let mut i = 0;
+    while i < COURSE {
+        all[i] = if i < FIRST {
+            OWN[i]
+        } else {
+            of_field(&VehicleParameters::FIELDS[i - FIRST])
+        };
+        i += 1;
+    }
+    all
+};
+
+const ROAD: Variable = Variable {
+    text: PAPER_COURSE,
+    ..variable(
+        "course",
+        Text,
+        Parameter,
+        "",
+        "The road: paper-course, or a file (TOML, or OpenDRIVE if it ends with .xodr); a relative path is one in resources",
+    )
+};
+
+const OWN: [Variable; FIRST] = [
     input(
         "driver_torque_nm",
         "N.m",
@@ -110,79 +141,34 @@ static VARIABLES: [Variable; 25] = [
         "Arc length along the centreline; 200 values a second",
     ),
     variable("speed_m_per_s", Real, Output, "m/s", "Speed"),
-    parameter("v_m_per_s", "m/s", 60.0 / 3.6, [20.0 / 3.6, 250.0 / 3.6], "Speed"),
-    parameter("m_kg", "kg", 1100.0, [100.0, 50_000.0], "Mass"),
-    parameter("i_kg_m2", "kg.m2", 2940.0, [100.0, 500_000.0], "Yaw inertia"),
-    parameter("l_f_m", "m", 1.0, [0.1, 10.0], "Front axle to centre of gravity"),
-    parameter("l_r_m", "m", 1.635, [0.1, 10.0], "Rear axle to centre of gravity"),
     parameter(
-        "k_f_n_per_rad",
-        "N/rad",
-        53_300.0,
-        [1e3, 1e6],
-        "Cornering stiffness of a front tyre",
+        "v_m_per_s",
+        "m/s",
+        60.0 / 3.6,
+        [*SPEED_M_PER_S.start(), *SPEED_M_PER_S.end()],
+        "Speed",
     ),
-    parameter(
-        "k_r_n_per_rad",
-        "N/rad",
-        117_000.0,
-        [1e3, 1e6],
-        "Cornering stiffness of a rear tyre",
-    ),
-    parameter(
-        "k_s_nm_per_rad",
-        "N.m/rad",
-        48_510.0,
-        [1e2, 1e7],
-        "Stiffness around the kingpin",
-    ),
-    parameter("e_t_m", "m", 0.026, [0.001, 0.2], "Pneumatic and castor trail"),
-    parameter(
-        "b_s_nms_per_rad",
-        "N.m.s/rad",
-        0.57,
-        [0.01, 10.0],
-        "Damping of the column",
-    ),
-    parameter("j_s_kg_m2", "kg.m2", 0.11, [0.01, 2.0], "Inertia of the column"),
-    parameter(
-        "k_t",
-        "",
-        1.0 / 17.0,
-        [0.02, 0.2],
-        "Front wheel angle per steering wheel angle",
-    ),
-    Variable {
-        text: PAPER_COURSE,
-        ..variable(
-            "course",
-            Text,
-            Parameter,
-            "",
-            "The road: paper-course, or a file (TOML, or OpenDRIVE if it ends with .xodr); a relative path is one in resources",
-        )
-    },
 ];
 
 /// The road that was asked for.
-fn course(texts: &Texts) -> Result<Course, String> {
+fn course(texts: &Texts) -> Result<Course, FmuError> {
     let name = texts.texts[COURSE].as_str();
     if name == PAPER_COURSE {
         return Ok(Course::paper());
     }
     let path = texts.resources.join(name);
-    let bytes = std::fs::read(&path).map_err(|why| format!("course = {}: {why}", path.display()))?;
+    let bytes = std::fs::read(&path).map_err(|why| FmuError::Course(InputError::new(path.display(), why)))?;
     let text = String::from_utf8_lossy(&bytes);
-    Course::from_text(name, &text, &LaneChoice::default()).map_err(|why| format!("course = {why}"))
+    Course::from_text(name, &text, &LaneChoice::default()).map_err(FmuError::Course)
 }
 
 /// A guidance that applies what it is told.
 #[derive(Clone, Default)]
-struct Told {
+struct GivenTorque {
     torque_nm: f64,
 }
 
-impl Guidance for Told {
+impl Guidance for GivenTorque {
     fn looks_at_road(&self, _step: u32) -> bool {
         true
     }
@@ -197,16 +183,16 @@ impl Guidance for Told {
 
 #[derive(Clone)]
 struct Vehicle {
-    simulation: Option<Simulation<Told>>,
+    simulation: Option<Simulation<GivenTorque>>,
     lateral_error_m: f64,
     s_m: f64,
 }
 
 impl Vehicle {
     /// What there is to be seen now: a copy looks, and is thrown away.
-    fn look(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn look(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &self.simulation else {
-            return Err("the vehicle was not started".into());
+            return Err(FmuError::Other("the vehicle was not started"));
         };
         let action = Action {
             hand_torque_nm: values[0],
@@ -238,49 +224,35 @@ impl Vehicle {
 }
 
 /// Why there is no next step.
-fn ended(simulation: &Simulation<Told>) -> String {
+fn ended(simulation: &Simulation<GivenTorque>) -> FmuError {
     match simulation.ending() {
-        Some(Ending::Diverged { s_m }) => format!("the vehicle has left the road, at {s_m:.1} m"),
-        _ => "the course has ended".into(),
+        Some(Ending::Diverged { s_m }) => FmuError::LeftRoad(s_m),
+        _ => FmuError::Other("the course has ended"),
     }
 }
 
 impl Model for Vehicle {
-    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), String> {
-        let [m, i, l_f, l_r, k_f, k_r, k_s, e_t, b_s, j_s, k_t] = values[FIRST..COURSE] else {
-            return Err("variables are missing".into());
-        };
+    fn begin(&mut self, values: &mut [f64], texts: &Texts) -> Result<(), FmuError> {
+        let names = VehicleParameters::FIELDS.iter().map(|field| field.name);
+        let vehicle = from_numbers(names.zip(values[FIRST..COURSE].iter().copied()))?;
         let scenario = Scenario::builder()
             .course(course(texts)?)
             .condition(Condition::High)
-            .speed_kmh(values[SPEED] * 3.6)
-            .vehicle(VehicleParameters {
-                m,
-                i,
-                l_f,
-                l_r,
-                k_f,
-                k_r,
-                k_s,
-                e_t,
-                b_s,
-                j_s,
-                k_t,
-            })
-            .build()
-            .map_err(|e| e.to_string())?;
+            .speed(Speed::Constant(values[SPEED]))
+            .vehicle(vehicle)
+            .build()?;
         self.simulation = Some(Simulation::of(
             &scenario,
             PaperPair::without_driver(&scenario),
-            Told::default(),
+            GivenTorque::default(),
         ));
         (self.lateral_error_m, self.s_m) = (0.0, 0.0);
         self.look(values)
     }
 
-    fn step(&mut self, values: &mut [f64]) -> Result<(), String> {
+    fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &mut self.simulation else {
-            return Err("the vehicle was not started".into());
+            return Err(FmuError::Other("the vehicle was not started"));
         };
         simulation.guidance_mut().torque_nm = values[1];
         let action = Action {

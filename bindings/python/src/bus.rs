@@ -1,6 +1,6 @@
 //! The senders of the ECU's inputs: frames with counter and CRC, from SI values.
 
-use haptic_core::bus::messages::{Column, LanePreview, Message, Request, Vehicle};
+use haptic_core::bus::messages::{Column, LanePreview, MESSAGES, Message, Request, Vehicle};
 use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyIterator, PyTuple};
@@ -106,30 +106,36 @@ impl<'py> Arguments<'py> for Bound<'py, Frame> {
 #[pyclass(module = "haptic_guidance")]
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Bus {
-    counters: [u8; 4],
-    /// Frames of camera, column and host that `frames` has sent.
-    sent: [u32; 3],
+    /// The counter of each message of the list, and how many times it was due in `frames`.
+    counters: PerMessage<u8>,
+    due: PerMessage<u32>,
     start_us: Option<u64>,
 }
 
-const LANE: usize = 0;
-const COLUMN: usize = 1;
-const VEHICLE: usize = 2;
-const REQUEST: usize = 3;
+/// A number for each message of the list.
+type PerMessage<T> = [T; MESSAGES.len()];
+
+/// The place of a message in the list.
+fn place<M: Message>() -> usize {
+    // Every message has its line there.
+    MESSAGES.iter().position(|info| info.id == M::ID).unwrap_or(0)
+}
 
 impl Bus {
-    fn send<M: Message>(&mut self, sender: usize, message: &M) -> Frame {
-        let counter = self.counters[sender];
-        self.counters[sender] = counter.wrapping_add(1);
-        Frame::from(&message.encode(counter))
+    fn send<M: Message>(&mut self, message: &M) -> Frame {
+        let counter = &mut self.counters[place::<M>()];
+        let frame = message.encode(*counter);
+        *counter = counter.wrapping_add(1);
+        Frame::from(&frame)
     }
 
-    /// Whether the next frame of a sender is due, `elapsed_us` after the start.
-    fn is_due(&mut self, sender: usize, period_ms: f64, elapsed_us: u64) -> bool {
+    /// Whether the next frame of a message is due, `elapsed_us` after the start.
+    fn is_due<M: Message>(&mut self, elapsed_us: u64) -> bool {
+        let count = &mut self.due[place::<M>()];
         // Half a microsecond, because 15 times 8.333 ms is a little more than 125 ms in floating point.
-        let due = elapsed_us as f64 + 0.5 >= f64::from(self.sent[sender]) * period_ms * 1e3;
-        self.sent[sender] += u32::from(due);
-        due
+        let is_due = elapsed_us as f64 + 0.5 >= f64::from(*count) * M::INFO.period_ms * 1e3;
+        *count += u32::from(is_due);
+        is_due
     }
 }
 
@@ -142,16 +148,16 @@ impl Bus {
 
     /// From what `__reduce__` took apart.
     #[staticmethod]
-    fn _of(counters: [u8; 4], sent: [u32; 3], start_us: Option<u64>) -> Self {
+    fn _of(counters: PerMessage<u8>, due: PerMessage<u32>, start_us: Option<u64>) -> Self {
         Self {
             counters,
-            sent,
+            due,
             start_us,
         }
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Parts<'py>> {
-        let parts = (self.counters, self.sent, self.start_us);
+        let parts = (self.counters, self.due, self.start_us);
         Ok((py.get_type::<Self>().getattr("_of")?, parts.into_pyobject(py)?))
     }
 
@@ -188,7 +194,7 @@ impl Bus {
             age: Micros::from_us(age_us as u32),
             valid,
         };
-        Ok(self.send(LANE, &preview))
+        Ok(self.send(&preview))
     }
 
     /// The column's sensors, every 2 ms.
@@ -215,7 +221,7 @@ impl Bus {
             wheel_angle: Radians::from_rad(finite(py, "wheel_angle_rad", wheel_angle_rad, "rad")?),
             motor_torque: Torque::from_nm(finite(py, "motor_torque_nm", motor_torque_nm, "N.m")?),
         };
-        Ok(self.send(COLUMN, &column))
+        Ok(self.send(&column))
     }
 
     /// The vehicle's speed from two sources, every 10 ms.
@@ -250,7 +256,7 @@ impl Bus {
             speeds: [first, second].map(Speed::from_m_per_s),
             yaw_rate: yaw_rate.map(TurningRate::from_rad_per_s),
         };
-        Ok(self.send(VEHICLE, &vehicle))
+        Ok(self.send(&vehicle))
     }
 
     /// What the host wants, every 10 ms.
@@ -274,7 +280,7 @@ impl Bus {
             authority: Ratio::from_si(within(py, "authority", authority, [0.0, 1.0], "")?),
             probe,
         };
-        Ok(self.send(REQUEST, &request))
+        Ok(self.send(&request))
     }
 
     /// The frames that are due at an instant, each sender at its own pace, from the first call on.
@@ -321,16 +327,18 @@ impl Bus {
         let t_us = clock(py, t_us)?;
         let elapsed_us = t_us.saturating_sub(*bus.start_us.get_or_insert(t_us));
         let mut frames = Vec::with_capacity(4);
-        if bus.is_due(LANE, LanePreview::INFO.period_ms, elapsed_us)
+        if bus.is_due::<LanePreview>(elapsed_us)
             && let (Some(e_y_m), Some(e_theta_rad)) = (e_y_m, e_theta_rad)
         {
             frames.push(bus.lane_preview(py, e_y_m, e_theta_rad, 0, true)?);
         }
-        if bus.is_due(COLUMN, Column::INFO.period_ms, elapsed_us) {
+        if bus.is_due::<Column>(elapsed_us) {
             frames.push(bus.column(py, driver_torque_nm, wheel_angle_rad, motor_torque_nm)?);
         }
-        if bus.is_due(VEHICLE, Vehicle::INFO.period_ms, elapsed_us) {
+        if bus.is_due::<Vehicle>(elapsed_us) {
             frames.push(bus.vehicle(py, speed_m_per_s, None, yaw_rate_rad_per_s)?);
+        }
+        if bus.is_due::<Request>(elapsed_us) {
             frames.push(bus.request(py, engage, authority, probe)?);
         }
         *self = bus;

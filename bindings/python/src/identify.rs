@@ -109,7 +109,7 @@ pub(crate) fn identify<'py>(
             identify_pieces("drive", &logs.remove(0), &options).map_err(|error| error.to_string())
         }
         1 => one("drive", &logs.remove(0), &options, method).map_err(|error| error.to_string()),
-        _ => several("drives", &logs, &options),
+        _ => several("drives", &logs, &options).map_err(|error| error.to_string()),
     })?
     .map_err(|error| errors::input(py, error))?;
     let converted = notes.drain(..1).flatten();

@@ -2,6 +2,7 @@
 //! the command line uses too. What only arranges results is Python (`python/haptic_guidance`).
 
 mod bus;
+mod compare;
 mod driver_view;
 mod ecu;
 mod errors;
@@ -16,12 +17,18 @@ mod side_by_side;
 mod simulation;
 mod sweep;
 
-use pyo3::prelude::*;
+use pyo3::pymodule;
 
 #[pymodule]
 mod _native {
+    use haptic_core::bus::messages::{MESSAGES, is_input};
+    use pyo3::prelude::*;
+    use pyo3::types::PyFrozenSet;
+
     #[pymodule_export]
     use crate::bus::{Bus, Frame};
+    #[pymodule_export]
+    use crate::compare::{LawView, compare};
     #[pymodule_export]
     use crate::driver_view::DriverView;
     #[pymodule_export]
@@ -40,4 +47,14 @@ mod _native {
     use crate::simulation::{Action, Outcome, Simulation};
     #[pymodule_export]
     use crate::sweep::Sweep;
+
+    /// Identifiers of what the ECU hears, from the one list of messages.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let ids = MESSAGES
+            .iter()
+            .map(|message| message.id)
+            .filter(|id| is_input(*id));
+        module.add("INPUT_IDS", PyFrozenSet::new(module.py(), ids)?)
+    }
 }

@@ -23,9 +23,11 @@ use crate::errors;
 /// course : str, path or mapping, optional
 ///     ``"paper-course"``, a course file, or its content: ``{"lane_width": 3.6, "segment": [{"length": 100.0}]}``.
 ///     An OpenDRIVE file (.xodr) is one too; ``road``, ``lane`` and ``turn`` choose from it.
-/// speed : float or mapping, optional
-///     Constant speed, km/h, 20 to 250; or one that changes through points by time (s) or by place (m):
-///     ``{"time": [0, 10, 15], "kmh": [60, 60, 40]}``, ``{"place": [0, 200, 300], "kmh": [80, 80, 50]}``.
+/// speed_m_per_s : float, optional
+///     Constant speed, 5.5 to 70.
+/// speed : mapping, optional
+///     In its place one that changes through points by time or by place: ``{"time_s": [0, 10, 15],
+///     "speed_m_per_s": [16, 16, 11]}``, ``{"place_m": [0, 200, 300], "speed_m_per_s": [22, 22, 14]}``.
 /// condition : {"manual", "high", "mid", "low"}, optional
 ///     How much the driver relies on the guidance.
 /// sensors : {"paper", "exact"}, optional
@@ -33,7 +35,7 @@ use crate::errors;
 /// seed : int, optional
 ///     Root of all random numbers.
 /// driver, vehicle, guidance, failure, driver_change, world, sensor_errors : mapping, optional
-///     The tables of the file, such as ``driver={"t_p": 0.3}``.
+///     The tables of the file, such as ``driver={"t_p_s": 0.3}``.
 ///
 /// Raises
 /// ------

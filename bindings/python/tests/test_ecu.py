@@ -32,6 +32,7 @@ def settled(engage_at_ms=600, duration_ms=900, **values):
 def test_the_frames_of_a_run_give_its_answers_bit_for_bit():
     run = hg.simulate(hg.Scenario(course=SHORT, condition="high", guidance={"probe": True}), bus=True)
     ecu, inputs = hg.Ecu(run.scenario, engaged=True), {0x100, 0x110, 0x120, 0x130}
+    assert inputs <= hg.INPUT_IDS
     sent = [(int(t), int(i), bytes(d)) for t, i, d in zip(run.bus["t_us"], run.bus["id"], run.bus["data"])]
     by_step = {}
     for t_us, id, data in sent:
@@ -125,7 +126,7 @@ def test_a_step_can_be_pickled_and_copied():
                 assert getattr(again, name) == getattr(each, name), name
 
 
-@pytest.mark.parametrize("params", [None, {"k_1": 0.2, "torque_limit_nm": 2.0}, hg.Scenario(guidance={"K_1": 0.2})])
+@pytest.mark.parametrize("params", [None, {"k_1": 0.2, "torque_limit_nm": 2.0}, hg.Scenario(guidance={"k_1_nm": 0.2})])
 def test_a_pickled_ecu_goes_on_as_the_original(params):
     """Beyond the wrap of its clock, with a step that came late and frames that it refused."""
     start, inputs = 2**32 - 1_000_000, dict(driver_torque_nm=0.1, wheel_angle_rad=0.01, speed_m_per_s=16.7)

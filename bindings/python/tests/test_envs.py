@@ -27,9 +27,9 @@ def short(**fields):
 def test_gymnasium_finds_nothing_wrong(name):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        env = gymnasium.make(name, scenario=short(driver={"remnant_sd": 0.05}))
+        env = gymnasium.make(name, scenario=short(driver={"remnant_sd_nm": 0.05}))
         check_env(env.unwrapped)
-        check_environments_match(env, gymnasium.make(name, scenario=short(driver={"remnant_sd": 0.05})), 100, seed=3)
+        check_environments_match(env, gymnasium.make(name, scenario=short(driver={"remnant_sd_nm": 0.05})), 100, seed=3)
     # A torque stays one in N.m, whatever range a trainer would like best.
     others = [str(warning.message) for warning in caught if "symmetric and normalized" not in str(warning.message)]
     assert others == []
@@ -38,7 +38,7 @@ def test_gymnasium_finds_nothing_wrong(name):
 def test_the_drivers_torque_is_the_only_one_beside_the_guidances():
     env = envs.DriverEnv(short(), period_ms=20)
     observation, info = env.reset(seed=1)
-    slack = short().replace(driver={"a_1": 0, "a_2": 0, "a_3": 0, "K_d": 0, "K_hg": 0, "K_nms": 0})
+    slack = short().replace(driver={"a_1_rad_per_m": 0, "a_2_rad_per_m_s": 0, "a_3": 0, "k_d_nm_per_rad": 0, "k_hg": 0, "k_nms_nm_per_rad": 0})
     simulation = hg.Simulation(slack)
     names = list(envs.OBSERVATION)
     assert info["time_s"] == 0.0 and observation[names.index("speed_m_per_s")] == pytest.approx(60 / 3.6)
@@ -99,7 +99,7 @@ def test_authority_is_the_share_of_the_guidance():
 @pytest.mark.parametrize("name", NAMES)
 def test_many_side_by_side_are_as_many_single_ones(name):
     make = lambda mode: gymnasium.make_vec(
-        name, num_envs=5, vectorization_mode=mode, scenario=short(driver={"remnant_sd": 0.05}), period_ms=500
+        name, num_envs=5, vectorization_mode=mode, scenario=short(driver={"remnant_sd_nm": 0.05}), period_ms=500
     )
     ours, theirs = make("vector_entry_point"), make("sync")
     assert ours.single_action_space == theirs.single_action_space and ours.action_space == theirs.action_space
@@ -125,7 +125,7 @@ def test_many_side_by_side_are_as_many_single_ones(name):
 
 def test_a_seed_gives_the_same_drives_again():
     def drives(seed):
-        vector = envs.AuthorityVectorEnv(3, short(driver={"remnant_sd": 0.1}))
+        vector = envs.AuthorityVectorEnv(3, short(driver={"remnant_sd_nm": 0.1}))
         vector.reset(seed=seed)
         return np.stack([vector.step(np.full((3, 1), 0.5, dtype=np.float32))[0] for _ in range(60)])
 
@@ -158,10 +158,10 @@ def test_the_drivers_speed_is_drawn_from_50_to_80():
 
 
 def test_a_function_makes_a_scenario_for_each_drive():
-    env = envs.AuthorityEnv(lambda rng: short(speed=float(rng.uniform(40, 90))))
+    env = envs.AuthorityEnv(lambda rng: short(speed_m_per_s=float(rng.uniform(11, 25))))
     speeds = {float(env.reset(seed=seed)[0][-1]) for seed in (1, 2, 1, 3)}
     assert len(speeds) == 3
-    assert env.reset(options={"scenario": short(speed=100)})[0][-1] == pytest.approx(100 / 3.6)
+    assert env.reset(options={"scenario": short(speed_m_per_s=100 / 3.6)})[0][-1] == pytest.approx(100 / 3.6)
 
 
 def test_a_step_of_many_releases_the_interpreter():

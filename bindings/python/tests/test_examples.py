@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import haptic_guidance as hg
+
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples" / "python"
 
@@ -24,6 +26,44 @@ def test_a_driver_of_ones_own_stepped_from_outside_drives_as_in_rust():
     errors_m = runpy.run_path(str(EXAMPLES / "own_driver.py"))["drive"]()
     # tests/parts.rs has the same figure of examples/own_driver.rs, to the last digit.
     assert max(map(abs, errors_m)) == 0.4080224580491433
+
+
+def test_a_law_and_a_driver_of_ones_own_are_compared():
+    example = runpy.run_path(str(EXAMPLES / "compare_own.py"))
+    found = example["compared"]()
+    peaks_m = {(drive["law"], drive["driver"]): drive["peak_lateral_error_m"] for drive in found.drives}
+    assert set(peaks_m) == {(law, driver) for law in ("paper", "spring") for driver in ("paper", "intermittent")}
+    assert all(0 < peak_m < 1 for peak_m in peaks_m.values()), peaks_m
+    assert [law["source"] for law in found.results["laws"]] == ["Wang et al. 2022, (9), table 8", "Python"]
+    assert found.results["laws"][1]["values"] == [["stiffness_nm_per_rad", 3.0]]
+    assert all(drive["worst_peak_after_loss_m"] > 0 for drive in found.drives)
+    # The paper's law written in Python is the paper's law: the same torque asked for, to the last bit.
+    class Paper:
+        def ask(self, view):
+            terms = (2.0 * view.e_y_m, 0.05 * view.e_y_rate_m_per_s, 40.0 * view.e_theta_rad)
+            return 0.25 * (terms[0] + terms[1] + terms[2] + 1.0 * view.e_theta_rate_rad_per_s)
+
+    text = example["FILE"].replace('kind = "spring", stiffness_nm_per_rad = 3', 'kind = "mine"')
+    compared = example["compared"]
+    compared.__globals__["FILE"] = text.replace(', { kind = "intermittent" }', "")
+    compared.__globals__["Spring"] = Paper
+    with pytest.raises(hg.InputError, match='law.kind: there is no "mine", only none'):
+        compared()
+    compared.__globals__["FILE"] = compared.__globals__["FILE"].replace('"mine"', '"spring"')
+    rows = [{**drive, "law": ""} for drive in compared().drives]
+    assert rows[0] == rows[1]
+
+
+def test_what_a_law_raises_ends_the_comparison():
+    class Broken:
+        def ask(self, view):
+            raise ZeroDivisionError("at once")
+
+    compared = runpy.run_path(str(EXAMPLES / "compare_own.py"))["compared"]
+    compared.__globals__["Spring"] = Broken
+    compared.__globals__["FILE"] = compared.__globals__["FILE"].replace(", stiffness_nm_per_rad = 3", "")
+    with pytest.raises(ZeroDivisionError, match="at once"):
+        compared()
 
 
 @pytest.mark.parametrize("vehicle", ["SingleTrack", "MultiBody"])

@@ -44,7 +44,7 @@ def test_columns_tell_their_speed_as_a_file_does(tmp_path):
 
 
 def probed_run():
-    driver = {"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}
+    driver = {"t_p_s": 0.2, "k_d_nm_per_rad": 3.0, "k_hg": 0.4, "remnant_sd_nm": 0.02}
     return hg.simulate(hg.Scenario(driver=driver, guidance={"probe": True}))
 
 
@@ -119,7 +119,7 @@ def test_gaps_lanes_and_rows_are_taken_as_asked():
 
 
 def test_several_drives_of_one_driver_are_one_fit():
-    driver = {"t_p": 0.2, "K_d": 3.0, "K_hg": 0.4, "remnant_sd": 0.02}
+    driver = {"t_p_s": 0.2, "k_d_nm_per_rad": 3.0, "k_hg": 0.4, "remnant_sd_nm": 0.02}
     one, other = (hg.simulate(hg.Scenario(driver=driver, seed=seed, guidance={"probe": True})) for seed in (1, 2))
     alone, both = hg.identify(one), hg.identify(one, also=[other.columns])
     assert both.results["rows"] > 1.8 * alone.results["rows"]
@@ -186,14 +186,14 @@ def test_columns_and_files_of_other_names_and_units_are_mapped(tmp_path):
 
 
 def test_a_recording_of_the_bus_takes_another_vehicle_and_another_bus(tmp_path):
-    driver = {"t_p": 0.2, "K_hg": 0.4, "remnant_sd": 0.02}
+    driver = {"t_p_s": 0.2, "k_hg": 0.4, "remnant_sd_nm": 0.02}
     bus = hg.simulate(hg.Scenario(driver=driver, guidance={"probe": True}), bus=True).bus
     trace = tmp_path / "bus.log"
     lines = (f"({t / 1e6:.6f}) can0 {i:03X}#{d.tobytes().hex().upper()}" for t, i, d in zip(*map(bus.get, ("t_us", "id", "data"))))
     trace.write_text("\n".join(lines) + "\n")
     own = hg.identify(trace, dbc=Path(__file__).parents[3] / "core" / "haptic.dbc")
     assert own.results["parameters"] == hg.identify(trace).results["parameters"]
-    heavy = hg.identify(trace, vehicle=hg.Scenario(vehicle={"l_f": 1.4, "K_f": 30_000.0}))
+    heavy = hg.identify(trace, vehicle=hg.Scenario(vehicle={"l_f_m": 1.4, "k_f_n_per_rad": 30_000.0}))
     assert heavy.results["parameters"] != own.results["parameters"]
     with pytest.raises(hg.InputError, match="none.dbc"):
         hg.identify(trace, dbc="none.dbc")
@@ -245,9 +245,9 @@ def test_what_cannot_be_fixed_is_refused():
 def test_a_driver_who_changes_is_fitted_in_pieces():
     run = hg.simulate(
         hg.Scenario(
-            driver={"t_p": 0.2, "K_d": 3.0, "K_hg": 0.9, "remnant_sd": 0.072},
+            driver={"t_p_s": 0.2, "k_d_nm_per_rad": 3.0, "k_hg": 0.9, "remnant_sd_nm": 0.072},
             guidance={"probe": True},
-            driver_change={"time": 90.0, "K_d": 3.0, "K_hg": 0.4},
+            driver_change={"time_s": 90.0, "k_d_nm_per_rad": 3.0, "k_hg": 0.4},
         )
     )
     whole = hg.identify(run)

@@ -19,7 +19,7 @@ SHORT = {"segment": [{"length": 300.0}, {"length": 60.0, "curvature_start": 0.0,
 
 
 def test_a_run_is_the_curve_of_an_independent_program():
-    failing = hg.Scenario(condition="high", driver={"t_p": 0.5}, failure={"kind": "torque"}, sensors="exact")
+    failing = hg.Scenario(condition="high", driver={"t_p_s": 0.5}, failure={"kind": "torque"}, sensors="exact")
     run = hg.simulate(failing)
     lines = (DATA / "closed_loop_high_tp05_failure70.csv").read_text().splitlines()
     rows = [[float(value) for value in line.split(",")] for line in lines if line[:1].isdigit()]
@@ -76,7 +76,7 @@ def test_whatever_reads_arrow_reads_a_run():
 
 def test_a_run_has_a_figure(tmp_path):
     pytest.importorskip("matplotlib")
-    run = hg.simulate(hg.Scenario(course=SHORT, failure={"kind": "torque", "time": 5}))
+    run = hg.simulate(hg.Scenario(course=SHORT, failure={"kind": "torque", "time_s": 5}))
     figure = run.figure()
     error, torque, wheel = figure.axes
     assert np.array_equal(error.lines[0].get_ydata(), run["lateral_error_m"])
@@ -93,7 +93,7 @@ def test_a_run_can_be_pickled():
 
 
 def test_steps_give_the_samples_of_the_whole_run():
-    scenario = hg.Scenario(course=SHORT, condition="high", driver={"remnant_sd": 0.1})
+    scenario = hg.Scenario(course=SHORT, condition="high", driver={"remnant_sd_nm": 0.1})
     run, simulation = hg.simulate(scenario), hg.Simulation(scenario)
     row = 0
     while (outcome := simulation.step()) is not None:
@@ -104,7 +104,7 @@ def test_steps_give_the_samples_of_the_whole_run():
 
 
 def test_a_clone_and_a_pickle_go_on_as_the_original():
-    simulation = hg.Simulation(hg.Scenario(course=SHORT, driver={"remnant_sd": 0.1}))
+    simulation = hg.Simulation(hg.Scenario(course=SHORT, driver={"remnant_sd_nm": 0.1}))
     push = hg.Action(hand_torque_nm=0.7, authority=0.5)
     simulation.step(push, steps=700)
     simulation.step(steps=300)
@@ -155,8 +155,8 @@ def test_what_an_action_cannot_be_is_refused():
 
 def test_a_failure_after_the_end_is_refused():
     with pytest.raises(hg.RangeError) as caught:
-        hg.simulate(hg.Scenario(course=SHORT, failure={"kind": "torque", "time": 1000}))
-    assert caught.value.field == "failure.time"
+        hg.simulate(hg.Scenario(course=SHORT, failure={"kind": "torque", "time_s": 1000}))
+    assert caught.value.field == "failure.time_s"
 
 
 def test_a_bus_where_there_is_none_is_refused():
@@ -224,7 +224,7 @@ def test_what_is_no_experiment_is_refused(arguments, error, says):
 
 def test_ctrl_c_ends_a_long_call_and_the_gil_is_free():
     # 200 km at 20 km/h: ten hours of driving.
-    long = hg.Scenario(course={"segment": [{"length": 200_000.0}]}, speed=20)
+    long = hg.Scenario(course={"segment": [{"length": 200_000.0}]}, speed_m_per_s=20 / 3.6)
     turns, begun = [], time.monotonic()
 
     def interrupt():

@@ -30,8 +30,8 @@ length = 140.0
 curvature_start = 0.003
 curvature_end = 0.003
 [vary]
-"driver.t_p" = { uniform = [0.1, 0.5] }
-"failure.time" = { uniform = [4, 8] }
+"driver.t_p_s" = { uniform = [0.1, 0.5] }
+"failure.time_s" = { uniform = [4, 8] }
 """
 
 
@@ -53,8 +53,8 @@ def test_rows_are_the_runs_of_their_scenarios(spec, tmp_path):
     assert len(rows) == result.summary["drives"] == 200
     row = rows[137]
     scenario = hg.Scenario(
-        driver={"t_p": float(row["driver.t_p"])},
-        failure={"kind": "torque", "time": float(row["failure.time"])},
+        driver={"t_p_s": float(row["driver.t_p_s"])},
+        failure={"kind": "torque", "time_s": float(row["failure.time_s"])},
         seed=int(row["seed"]),
         course={
             "name": "one curve",
@@ -77,7 +77,7 @@ def test_the_table_is_read_by_pandas(spec, tmp_path):
     text = pandas.read_csv(result.csv)
     assert list(table.columns) == list(text.columns)
     assert (table["drive"] == list(range(200))).all()
-    for name in ["driver.t_p", "peak_lateral_error_m", "end_m", "min_time_to_lane_crossing_s"]:
+    for name in ["driver.t_p_s", "peak_lateral_error_m", "end_m", "min_time_to_lane_crossing_s"]:
         pandas.testing.assert_series_equal(table[name], text[name], check_exact=False, rtol=1e-15)
     assert table["diverged"].dtype == bool
 
@@ -130,8 +130,8 @@ def test_ctrl_c_ends_a_sweep_and_what_is_under_way(tmp_path, monkeypatch):
 
 def test_bad_input_is_not_tried_again(tmp_path):
     path = tmp_path / "bad.toml"
-    path.write_text("samples = 4\n[vary]\nspeed = { uniform = [50, 300] }\n")
-    with pytest.raises(hg.InputError, match="speed = .* is outside 20 to 250 km/h"):
+    path.write_text("samples = 4\n[vary]\nspeed_m_per_s = { uniform = [14, 80] }\n")
+    with pytest.raises(hg.InputError, match="speed_m_per_s = .* is outside 5.5 to 70 m/s"):
         hg.sweep(path, out=tmp_path / "out")
 
 

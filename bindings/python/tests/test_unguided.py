@@ -16,7 +16,7 @@ HELD = {
     ]
 }
 # A camera that is blind for 1.5 s now and then: the ECU hands over after a second of that.
-BLIND = {"dropouts": 720.0, "dropout": 1.5}
+BLIND = {"dropout_rate_per_s": 0.2, "dropout_duration_s": 1.5}
 RELIANCES = ("high", "mid", "low")
 MODES = ("Boot", "Standby", "Active", "Fade", "Handover", "Fault", "Locked")
 FAULTS = {0: "LaneTimeout", 19: "HandsOff"}
@@ -78,7 +78,7 @@ def test_each_step_says_what_the_bus_says():
 
 
 def test_what_a_scenario_lets_fail_is_asked_for():
-    run = hg.simulate(hg.Scenario(course=HELD, condition="low", failure={"kind": "torque", "time": 20}))
+    run = hg.simulate(hg.Scenario(course=HELD, condition="low", failure={"kind": "torque", "time_s": 20}))
     (stretch,) = run.unguided
     assert (stretch["why"], stretch["asked_for"], stretch["from_s"]) == ("torque lost", True, 20.0)
     assert not run.left_by_itself
@@ -97,7 +97,7 @@ def test_the_figure_shades_it():
 
 
 def test_an_evaluation_with_unguided_runs_is_not_held():
-    evaluation = hg.evaluate(hg.Scenario(course=HELD, failure={"time": 10.0}, sensor_errors=BLIND))
+    evaluation = hg.evaluate(hg.Scenario(course=HELD, failure={"time_s": 10.0}, sensor_errors=BLIND))
     left = [run for run in evaluation.results["runs"] if run["guidance_left_why"] in FAULTS.values()]
     assert len(left) >= 9 and not evaluation.all_claims_hold
     told = f"the ECU ended guidance by itself in {len(left)} of 30 runs"
@@ -114,12 +114,12 @@ def test_a_sweep_has_columns_for_it(tmp_path):
     spec.write_text(
         'metrics = ["sdlp_m"]\n[scenario.course]\nname = "c"\nlane_width = 3.6\n'
         + segments
-        + '[scenario.sensor_errors]\ndropout = 1.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropouts" = [0, 720]\n'
+        + '[scenario.sensor_errors]\ndropout_duration_s = 1.5\n[vary]\ncondition = ["manual", "high"]\n"sensor_errors.dropout_rate_per_s" = [0, 0.2]\n'
     )
     result = hg.sweep(spec, out=tmp_path / "out")
     rows = list(csv.DictReader(result.csv.open()))
-    whys = {(row["condition"], row["sensor_errors.dropouts"]): row["guidance_left_why"] for row in rows}
-    assert whys == {("manual", "0"): "", ("manual", "720"): "", ("high", "0"): "", ("high", "720"): "LaneTimeout"}
+    whys = {(row["condition"], row["sensor_errors.dropout_rate_per_s"]): row["guidance_left_why"] for row in rows}
+    assert whys == {("manual", "0"): "", ("manual", "0.2"): "", ("high", "0"): "", ("high", "0.2"): "LaneTimeout"}
     assert result.summary["left_by_itself"] == 1 and result.summary["left_why"] == {"LaneTimeout": 1}
     table = pyarrow_parquet.read_table(result.parquet).to_pylist()
     for row, other in zip(rows, table):

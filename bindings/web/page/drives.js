@@ -1,6 +1,6 @@
 // A drive's settings, as a scenario for the loop and the command line; and the drives that were made of them, in workers.
 
-const EYES = { a_1: 0.1, a_2: 0.05, a_3: 3.7 };
+const EYES = { a_1: 0.1, a_2: 0.05, a_3: 3.7 }, FIELDS = { a_1: "a_1_rad_per_m", a_2: "a_2_rad_per_m_s", a_3: "a_3" };
 const PLAIN = { driver: "own", ...EYES, t_p: 0.3, k_hg: 0.5, k_d: 3, speed: 60, guided: true, k_1: 0.25, law: "shipping", fail: "none", at: 70, probe: false,
   remnant: 0, course: "paper-course" };
 // Roads of the page's own: the first bend within 8 s at 60 km/h.
@@ -22,15 +22,15 @@ const onLine = k_hg => ({ k_hg, k_d: 2 + 2 * k_hg });
 function scenario(given, { person = false } = {}) {
   const s = { ...PLAIN, ...given };
   const course = COURSES[s.course] ?? JSON.stringify(s.course);
-  let text = `course = ${course}\nspeed = ${s.speed}\ncondition = "${s.guided ? "mid" : "manual"}"\n`;
+  let text = `course = ${course}\nspeed_m_per_s = ${s.speed / 3.6}\ncondition = "${s.guided ? "mid" : "manual"}"\n`;
   if (!person) {
-    text += `[driver]\nt_p = ${s.t_p}\nremnant_sd = ${s.remnant}\n`;
-    for (const [gain, plain] of Object.entries(EYES)) if (s[gain] !== plain) text += `${gain} = ${s[gain]}\n`;
-    text += s.guided ? `K_d = ${s.k_d}\nK_hg = ${s.k_hg}\n` : `K_d = 4\n`;
+    text += `[driver]\nt_p_s = ${s.t_p}\nremnant_sd_nm = ${s.remnant}\n`;
+    for (const [gain, plain] of Object.entries(EYES)) if (s[gain] !== plain) text += `${FIELDS[gain]} = ${s[gain]}\n`;
+    text += s.guided ? `k_d_nm_per_rad = ${s.k_d}\nk_hg = ${s.k_hg}\n` : `k_d_nm_per_rad = 4\n`;
   }
   if (s.guided) {
-    text += `[guidance]\nK_1 = ${s.k_1}\nprobe = ${s.probe}\n`;
-    if (s.fail !== "none" && !person) text += `[failure]\nkind = "${s.fail}"\ntime = ${s.at}\n`;
+    text += `[guidance]\nk_1_nm = ${s.k_1}\nprobe = ${s.probe}\n`;
+    if (s.fail !== "none" && !person) text += `[failure]\nkind = "${s.fail}"\ntime_s = ${s.at}\n`;
   }
   return text;
 }

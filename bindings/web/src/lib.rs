@@ -25,6 +25,9 @@ struct Lab {
     run: Option<Run>,
 }
 
+/// An answer for the page, or the error whose text it shows.
+type Answer<T> = Result<T, Box<dyn std::error::Error>>;
+
 static LAB: Mutex<Lab> = Mutex::new(Lab {
     input: Vec::new(),
     output: String::new(),
@@ -38,14 +41,14 @@ fn lab() -> MutexGuard<'static, Lab> {
 }
 
 /// Does what it says with the text that was written; puts the answer, or what is wrong, where the page reads it.
-fn answer(of: impl FnOnce(&mut Lab, &str) -> Result<String, String>) -> u32 {
+fn answer(of: impl FnOnce(&mut Lab, &str) -> Answer<String>) -> u32 {
     let mut lab = lab();
     let input = std::mem::take(&mut lab.input);
     let result = String::from_utf8(input)
-        .map_err(|e| e.to_string())
+        .map_err(Into::into)
         .and_then(|text| of(&mut lab, &text));
     let good = result.is_ok();
-    lab.output = result.unwrap_or_else(|wrong| wrong);
+    lab.output = result.unwrap_or_else(|wrong| wrong.to_string());
     good.into()
 }
 
@@ -88,7 +91,7 @@ pub extern "C" fn count() -> usize {
 pub extern "C" fn keep_course() -> u32 {
     answer(|lab, text| {
         let (name, text) = text.split_once('\n').ok_or("a road has a name and a text")?;
-        let course = Course::from_text(name, text, &LaneChoice::default()).map_err(|e| e.to_string())?;
+        let course = Course::from_text(name, text, &LaneChoice::default())?;
         let length_m = course.length_m().to_string();
         lab.courses.retain(|(known, _)| known != name);
         lab.courses.push((name.to_owned(), course));
@@ -101,7 +104,7 @@ pub extern "C" fn keep_course() -> u32 {
 pub extern "C" fn laws() -> u32 {
     answer(|_, _| {
         let names: Vec<&str> = haptic_sim::laws::LAWS.iter().map(|law| law.name).collect();
-        serde_json::to_string(&names).map_err(|e| e.to_string())
+        Ok(serde_json::to_string(&names)?)
     })
 }
 
@@ -110,7 +113,7 @@ pub extern "C" fn laws() -> u32 {
 pub extern "C" fn fourteen() -> u32 {
     answer(|_, _| {
         let guided: Vec<_> = participants().into_iter().map(|one| one.guided).collect();
-        serde_json::to_string(&guided).map_err(|e| e.to_string())
+        Ok(serde_json::to_string(&guided)?)
     })
 }
 
@@ -203,7 +206,7 @@ pub extern "C" fn csv() -> u32 {
 pub extern "C" fn metrics(from_m: f64, to_m: f64) -> u32 {
     answer(|lab, _| {
         let run = lab.run.as_ref().ok_or("there is no run")?;
-        serde_json::to_string(&run.metrics(from_m, to_m)).map_err(|e| e.to_string())
+        Ok(serde_json::to_string(&run.metrics(from_m, to_m))?)
     })
 }
 

@@ -3,24 +3,24 @@
 use std::fmt::Write;
 
 use haptic_core::bus::Frame;
+use haptic_core::bus::messages::is_input;
 use haptic_core::controller::config::Setup;
 use haptic_core::ecu::Ecu;
 use haptic_core::quantity::Instant;
 
-/// Identifiers of what the ECU hears.
-const INPUTS: [u16; 4] = [0x100, 0x110, 0x120, 0x130];
+use crate::Answer;
 
 /// Lines of `t_us id data` in order of time; what the ECU sends, in the same form, a step for each time.
-pub(crate) fn replay(bus: &str) -> Result<String, String> {
+pub(crate) fn replay(bus: &str) -> Answer<String> {
     let mut ecu = Ecu::engaged(&Setup::PAPER, Instant::from_us(0));
     let mut sent = String::new();
     let mut lines = bus.lines().peekable();
     while let Some(first) = lines.peek() {
-        let t_us = time(first)?;
+        let t_us = time(first).ok_or_else(|| format!("{first}: no time"))?;
         let now = Instant::from_us(t_us as u32);
-        while let Some(line) = lines.next_if(|line| time(line) == Ok(t_us)) {
+        while let Some(line) = lines.next_if(|line| time(line) == Some(t_us)) {
             let frame = frame(line)?;
-            if INPUTS.contains(&frame.id()) {
+            if is_input(frame.id()) {
                 ecu.receive(&frame, now)
                     .map_err(|why| format!("{line}: {why:?}"))?;
             }
@@ -41,12 +41,11 @@ pub(crate) fn replay(bus: &str) -> Result<String, String> {
     Ok(sent)
 }
 
-fn time(line: &str) -> Result<u64, String> {
-    let time = line.split(' ').next().and_then(|word| word.parse().ok());
-    time.ok_or_else(|| format!("{line}: no time"))
+fn time(line: &str) -> Option<u64> {
+    line.split(' ').next()?.parse().ok()
 }
 
-fn frame(line: &str) -> Result<Frame, String> {
+fn frame(line: &str) -> Answer<Frame> {
     let refuse = || format!("{line}: no frame");
     let mut words = line.split(' ').skip(1);
     let (id, data) = words.next().zip(words.next()).ok_or_else(refuse)?;
@@ -56,5 +55,5 @@ fn frame(line: &str) -> Result<Frame, String> {
         .chunks(2)
         .map(|pair| u8::from_str_radix(str::from_utf8(pair).ok()?, 16).ok())
         .collect();
-    Frame::new(id, &bytes.ok_or_else(refuse)?).ok_or_else(refuse)
+    Ok(Frame::new(id, &bytes.ok_or_else(refuse)?).ok_or_else(refuse)?)
 }

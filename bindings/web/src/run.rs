@@ -14,6 +14,8 @@ use haptic_sim::scenario::{Condition, FailureKind};
 use haptic_sim::simulation::{Ending, Outcome, SAMPLE_RATE_HZ};
 use haptic_sim::{Action, Scenario, Simulation};
 
+use crate::Answer;
+
 /// Numbers of [`Record::now`], by their places: time, arc length, lateral error, heading error, wheel angle, driver torque,
 /// applied torque, mode, limit, warning, e_y and e_theta at the driver's points, speed, wheel rate, steps, diverged, K_hg as
 /// the ECU tells it and its deviation (NaN until it does).
@@ -49,13 +51,12 @@ impl Run {
         courses: &[(String, Course)],
         law: Option<usize>,
         person: bool,
-    ) -> Result<Self, String> {
+    ) -> Answer<Self> {
         let scenario = Scenario::from_toml("this page", toml, |name, _| {
             let known = courses.iter().find(|(known, _)| known == name);
             let missing = || InputError::new(name, "this road is not in the page: drop its file on it");
             known.map(|(_, course)| course.clone()).ok_or_else(missing)
-        })
-        .map_err(|e| e.to_string())?;
+        })?;
         scenario.check_times()?;
         let pair = if person {
             PaperPair::without_driver(&scenario)
@@ -191,18 +192,19 @@ impl Record {
         }
     }
 
-    pub(crate) fn csv(&self) -> Result<String, String> {
+    pub(crate) fn csv(&self) -> Answer<String> {
         let mut csv = Vec::new();
-        self.trace.write_csv(&mut csv).map_err(|e| e.to_string())?;
-        String::from_utf8(csv).map_err(|e| e.to_string())
+        self.trace.write_csv(&mut csv)?;
+        Ok(String::from_utf8(csv)?)
     }
 }
 
-fn law_at(place: usize, scenario: &Scenario) -> Result<Box<dyn Law>, String> {
+fn law_at(place: usize, scenario: &Scenario) -> Answer<Box<dyn Law>> {
     let made = match LAWS.get(place) {
         None => return Ok(Box::new(PageLaw)),
         Some(kind) => match &kind.make {
             Make::Part(make) => make(scenario, &kind.defaults()),
+            Make::Given(make) => make(scenario, &kind.defaults()),
             // The only limit of the library is around its paper's law.
             Make::Around(make) => {
                 let paper = LAWS.iter().find(|kind| kind.name == "paper");
@@ -210,12 +212,12 @@ fn law_at(place: usize, scenario: &Scenario) -> Result<Box<dyn Law>, String> {
                     Some((Make::Part(paper), values)) => {
                         paper(scenario, &values).map(|law| make(scenario, &kind.defaults(), law))
                     }
-                    _ => return Err("the library has no law of the paper".to_owned()),
+                    _ => return Err("the library has no law of the paper".into()),
                 }
             }
         },
     };
-    made.map_err(|e| e.to_string())
+    Ok(made?)
 }
 
 /// The law that stands in the page: JavaScript, asked in every step.

@@ -5,6 +5,8 @@ use haptic_analysis::identify::{DriveLog, Identification, Options, Reason, ident
 use haptic_sim::participants::{PublishedDriver, participants};
 use serde_json::{Value, json};
 
+use crate::Answer;
+
 /// What the columns of a log are to a driver.
 const COLUMNS: [(&str, &str); 5] = [
     ("e_y_m", "the car's distance from its lane ahead"),
@@ -15,9 +17,9 @@ const COLUMNS: [(&str, &str); 5] = [
 ];
 
 /// Who drove a log: fit, parameters with their intervals and the paper's fourteen beside them, notes.
-pub(crate) fn identified(csv: &str, manual: bool) -> Result<String, String> {
+pub(crate) fn identified(csv: &str, manual: bool) -> Answer<String> {
     let log = DriveLog::read(csv.as_bytes(), manual).map_err(|why| refusal(&why.to_string(), csv))?;
-    let options = Options::given(manual, &[]).map_err(|e| e.to_string())?;
+    let options = Options::given(manual, &[])?;
     let found = identify_with_noise_model(&log, &options);
     let parameters: Vec<Value> = found
         .parameters

@@ -1,42 +1,56 @@
-//! A classic CAN data frame with an 11-bit identifier: all this bus carries.
+//! A CAN data frame with an 11-bit identifier: classic, or of CAN FD.
 
 use embedded_can::{Id, StandardId};
 
-/// Up to eight bytes under an 11-bit identifier.
+/// Up to `N` bytes under an 11-bit identifier, in one of the lengths that CAN FD has ([`is_can_length`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Frame {
+pub struct CanFrame<const N: usize> {
     id: u16,
     len: u8,
-    data: [u8; 8],
+    data: [u8; N],
 }
 
-impl Frame {
+/// A classic frame, up to eight bytes: all this bus carries today.
+pub type Frame = CanFrame<8>;
+
+/// A frame of CAN FD, up to 64 bytes.
+pub type FdFrame = CanFrame<64>;
+
+/// Lengths beyond eight bytes, by their data length codes 9 to 15 (ISO 11898-1).
+const LONG: [usize; 7] = [12, 16, 20, 24, 32, 48, 64];
+
+/// Whether a frame can have so many bytes: 0 to 8, 12, 16, 20, 24, 32, 48 or 64. A sender pads what lies between.
+#[must_use]
+pub const fn is_can_length(bytes: usize) -> bool {
+    bytes <= 8 || matches!(bytes, 12 | 16 | 20 | 24 | 32 | 48 | 64)
+}
+
+impl<const N: usize> CanFrame<N> {
     /// Largest identifier.
     pub const MAX_ID: u16 = 0x7FF;
 
-    /// A frame, or `None` for an identifier above 0x7FF or more than eight bytes.
+    /// A frame, or `None` for an identifier above 0x7FF, more than `N` bytes, or a length that no frame has.
     #[must_use]
-    #[expect(clippy::as_conversions, reason = "at most eight bytes")]
+    #[expect(clippy::as_conversions, reason = "at most 64 bytes")]
     pub fn new(id: u16, bytes: &[u8]) -> Option<Self> {
-        if id > Self::MAX_ID {
+        if id > Self::MAX_ID || !is_can_length(bytes.len()) {
             return None;
         }
-        let mut data = [0; 8];
+        let mut data = [0; N];
         data.get_mut(..bytes.len())?.copy_from_slice(bytes);
-        Some(Self {
-            id,
-            // At most eight, or there would have been no place for them.
-            len: bytes.len() as u8,
-            data,
-        })
+        let len = bytes.len() as u8;
+        Some(Self { id, len, data })
     }
 
-    /// A full frame. `id` is a message's own identifier, at most 0x7FF; higher bits are dropped.
+    /// A full frame. `id` is a message's own identifier, at most 0x7FF; higher bits are dropped. That a frame can be `N` bytes
+    /// long is checked when it is compiled.
     #[must_use]
-    pub const fn full(id: u16, data: [u8; 8]) -> Self {
+    #[expect(clippy::as_conversions, reason = "at most 64 bytes")]
+    pub const fn full(id: u16, data: [u8; N]) -> Self {
+        const { assert!(is_can_length(N), "no CAN frame has this length") };
         Self {
             id: id & Self::MAX_ID,
-            len: 8,
+            len: N as u8,
             data,
         }
     }
@@ -47,30 +61,31 @@ impl Frame {
         self.id
     }
 
-    /// The payload, 0 to 8 bytes.
+    /// The payload, 0 to `N` bytes.
     #[must_use]
     pub fn data(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// All eight bytes, those beyond the length zero.
-    pub(crate) const fn bytes(&self) -> &[u8; 8] {
+    /// The payload, if it is exactly `L` bytes long.
+    #[must_use]
+    pub fn payload<const L: usize>(&self) -> Option<&[u8; L]> {
+        self.data.first_chunk().filter(|_| usize::from(self.len) == L)
+    }
+
+    /// The whole buffer; bytes beyond the length are zero.
+    pub(crate) const fn bytes(&self) -> &[u8; N] {
         &self.data
     }
 
-    /// Whether all eight bytes are payload.
-    pub(crate) const fn is_full(&self) -> bool {
-        self.len == 8
-    }
-
-    /// All eight bytes, if the frame is full.
+    /// The payload, if it fills the frame.
     #[must_use]
-    pub fn full_data(&self) -> Option<[u8; 8]> {
-        (self.len == 8).then_some(self.data)
+    pub fn full_data(&self) -> Option<[u8; N]> {
+        self.payload().copied()
     }
 }
 
-impl embedded_can::Frame for Frame {
+impl<const N: usize> embedded_can::Frame for CanFrame<N> {
     fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
         match id.into() {
             Id::Standard(id) => Self::new(id.as_raw(), data),
@@ -95,8 +110,11 @@ impl embedded_can::Frame for Frame {
         Id::Standard(StandardId::new(self.id).unwrap_or(StandardId::ZERO))
     }
 
+    /// The data length code: the length up to eight bytes, 9 to 15 beyond.
     fn dlc(&self) -> usize {
-        usize::from(self.len)
+        let len = usize::from(self.len);
+        let long = LONG.iter().position(|long| *long == len);
+        long.map_or(len, |place| place.saturating_add(9))
     }
 
     fn data(&self) -> &[u8] {

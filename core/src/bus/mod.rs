@@ -13,4 +13,4 @@ pub mod messages;
 pub mod slcan;
 
 pub use e2e::Reject;
-pub use frame::Frame;
+pub use frame::{CanFrame, FdFrame, Frame};

@@ -1,5 +1,5 @@
-//! The controller: decoded inputs in, one torque command out. What it reads, decides and remembers stands here, and
-//! the order of a step in `step`: inputs, modes, torque, limit and feedback.
+//! The controller: decoded inputs in, one torque command out. This file declares its command and its memory; [`inputs`] what it
+//! reads; `step` computes one step in order: inputs, mode, torque, limits.
 //!
 //! Not here: bytes and their checks, the monitor, the motor ([`crate::ecu`]).
 
@@ -19,6 +19,7 @@ use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
 use crate::safety::envelope::{EnvelopeState, LimitReason};
 use crate::safety::faults::{Fault, FaultSet};
+use crate::safety::frozen_torque::FrozenTorqueState;
 use crate::safety::hands::HandsState;
 use crate::safety::modes::Mode;
 use crate::safety::motion_history::MotionHistory;
@@ -37,25 +38,25 @@ pub struct Command {
     pub torque: Torque,
     /// The part of it that is the probe, while there is one.
     pub probe: Option<Torque>,
-    /// Which limit held it back.
+    /// The limit that acted on it.
     pub limit: LimitReason,
     /// The mode it belongs to.
     pub mode: Mode,
-    /// What is wrong.
+    /// The faults present.
     pub faults: FaultSet,
     /// The driver has to take over.
     pub warning: bool,
 }
 
 words! {
-    /// Everything that a flipped bit must not change unseen. What a step may leave as it is are parts of their own.
+    /// State that is kept twice, so that a flipped bit is found. Each part is copied only in steps that change it.
     pub(crate) struct Memory {
         fast: FastState,
-        /// When each input was last new: how far back its loss reaches. Guidance ends before the clock wraps.
+        /// When each input was last new. Guidance ends long before these instants are a wrap of the clock old.
         input_times: InputTimes,
         law: LawState,
         plausibility: PlausibilityState,
-        /// The share of the law's torque that acts at the speed in use; 0 before there is one.
+        /// Gain of the law at the speed in use, 0 to 1; 0 before the first speed.
         share: Ratio,
         coast: Coast,
         ramp: Ramp,
@@ -63,18 +64,18 @@ words! {
 }
 
 words! {
-    /// What most steps change.
+    /// The part that most steps change.
     struct FastState {
         packed: PackedState,
         last_step: Instant,
         /// How long the inputs have been valid in Standby.
         ready: Micros,
-        /// [`Fault`] bits that stay: of inputs that were implausible when last new, and of class C until the next power-up.
+        /// [`Fault`] bits that last beyond a step: of inputs that were implausible when last new, and of class C until power-off.
         kept: u32,
-        /// The rate of turn when the last lane sample was true, and what the vehicle has turned since.
+        /// The rate of turn at the instant of the last lane sample, and the angle turned since; zero for a fresh sample.
         rate_then: TurningRate,
         turned: Radians,
-        /// The part of the torque applied that is the probe.
+        /// The probe's part of the torque applied.
         probe_applied: Torque,
         probe: ProbeState,
         hands: HandsState,
@@ -82,7 +83,7 @@ words! {
     }
 }
 
-/// The parts beside [`Hot`] that a step changed, one bit each.
+/// The parts beside `FastState` that a step changed, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ChangedParts(u32);
 
@@ -105,15 +106,17 @@ impl ChangedParts {
     }
 }
 
-/// The samples in use that have not gone through their checks. Not kept twice: a flip costs one check, whose sums the
-/// next one makes up for, or brings one more of the same sample, which changes nothing but how long it counts.
+/// Inputs whose newest sample is still to be checked. Not kept twice: a flipped bit skips one check, whose time the next one
+/// covers, or repeats one on the same sample, over no time.
+/// Beside them what the column's check alone knows of the driver torque.
 #[derive(Debug, Clone, Copy, Default)]
 struct PendingChecks {
     lane: bool,
     column: bool,
+    frozen_torque: FrozenTorqueState,
 }
 
-/// What is small shares a word.
+/// Four bytes that share a word, as memory is compared word by word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C, align(4))]
 struct PackedState {
@@ -209,7 +212,7 @@ pub struct ControllerState {
 }
 
 impl ControllerState {
-    /// At power-up: Boot.
+    /// The state at power-up: mode Boot.
     #[must_use]
     pub fn new(now: Instant) -> Self {
         Self::with(Mode::Boot, now)
@@ -231,7 +234,7 @@ impl ControllerState {
         }
     }
 
-    /// The copies of a redundant state differ: nothing of it can be used, and it stays so.
+    /// The copies of the state differ, so none can be used: starts anew in Fault, with the memory fault latched.
     fn lose_memory(&mut self, now: Instant) -> Command {
         let mut faults = FaultSet::NONE;
         faults.insert(Fault::Memory);
@@ -249,7 +252,7 @@ impl ControllerState {
     }
 }
 
-/// The whole control law with its limits; immutable.
+/// The controller's configuration: law, limits and checks; immutable.
 #[derive(Debug, Clone, Copy)]
 pub struct Controller {
     pub(crate) config: Redundant<Config>,
@@ -282,13 +285,13 @@ impl Controller {
         self.step_with(state, false, now, applied, inputs, &NoInjection)
     }
 
-    /// Whether configuration and state are whole.
+    /// Whether both copies of configuration and of state agree.
     #[inline(always)]
     pub(crate) fn is_intact(&self, state: &ControllerState) -> bool {
         self.config.agrees_apart() && state.memory.agrees_apart()
     }
 
-    /// `found_whole`: [`Self::is_whole`] was true in this step already.
+    /// `is_known_intact`: [`Self::is_intact`] was true in this step already.
     #[inline]
     pub(crate) fn step_with<I: Injection>(
         &self,
@@ -334,7 +337,7 @@ impl Controller {
     }
 }
 
-/// Copies what a step changed. A function of its own, as the comparison is.
+/// Brings the second copy of each changed part up to date. Not inlined, which costs fewer instructions.
 #[inline(never)]
 fn seal(memory: &mut Redundant<Memory>, changed: ChangedParts) {
     memory.seal_part(|v| &mut v.fast);

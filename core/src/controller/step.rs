@@ -22,35 +22,40 @@ use crate::safety::ramp::{Ramp, TorqueHistory, handover_length, pace, smaller_of
 
 /// A planned fade.
 const FADE_RATE: TorqueRate = TorqueRate::from_nm_per_s(4.0);
-/// A step that comes later than this after the last one missed its deadline.
+/// A step that comes more than this after the last one is late.
 const LATE: Micros = Micros::from_us(2_500);
-/// A step that comes this late is a fault by itself: the world has moved on by half a camera period.
+/// One step that comes this late is a fault by itself: the vehicle has moved for more than a period of the camera.
 const LOST_TIME: Micros = Micros::from_ms(10);
-/// So many late steps in a row are tolerated.
+/// How many late steps in a row are tolerated.
 const LATE_STEPS: u8 = 1;
-/// A step that comes sooner than this was not asked for.
+/// A step that comes less than this after the last one is early.
 const EARLY: Micros = Micros::from_us(500);
-/// So many early steps in a row are tolerated: they earn no rate limit, but a runaway timer is a fault.
+/// How many early steps in a row are tolerated. Each gains nothing, as every limit goes by the time passed; more mean a timer that
+/// runs away, which is a fault.
 const EARLY_STEPS: u8 = 3;
 
-/// A lane sample that is no older than this when it comes needs no other making up for than its rates.
+/// A lane sample no older than this when it arrives is continued at its own rates; an older one is also corrected by how the
+/// vehicle has turned since.
 const PROMPT: Micros = Micros::from_ms(10);
 
-/// Spans beyond half a wrap of the clock are negative.
+#[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+const STANDBY: u8 = Mode::Standby as u8;
+
+/// A span longer than half a wrap of the clock is negative: the other instant is the later one.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
-/// What does not end guidance while the lane goes on.
+/// Faults that do not end guidance while the lane is extrapolated.
 const BRIDGED: FaultSet = FaultSet::NONE
     .with(Fault::LaneTimeout)
     .with(Fault::LaneInvalid)
     .with(Fault::LaneStep);
 
-/// One step, with what it must not change.
+/// One step: what it reads and does not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
     pub(super) now: Instant,
     pub(super) applied: Torque,
     pub(super) inputs: &'a Inputs,
-    /// The lane that the law is shown: the input's, or in its place the one seen last as it went on.
+    /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
     /// The share of the law's torque that driver activity leaves.
@@ -99,7 +104,7 @@ impl<I: Injection> Step<'_, I> {
         }
         let (torque, probe, limit) = self.torque(v, changed, mode, faults);
         v.fast.probe_applied = probe.unwrap_or(Torque::ZERO);
-        // While it lets go of its line, whoever relies on guidance has to know.
+        // In Active with LaneStep the guidance fades away from its old line: the driver must know.
         let warning = (mode == Mode::Active && faults.contains(Fault::LaneStep))
             || matches!(mode, Mode::Handover | Mode::Fault | Mode::Locked)
             || faults.contains(Fault::HandsOff);
@@ -113,8 +118,8 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// The lane where its picture did not come, or did not agree. Returns the faults that do not end guidance because of it,
-    /// and what there is to say of the pictures.
+    /// Bridges a lane whose picture is missing or contradicts the last one: extrapolates it, and lets the trust in it fall. Returns
+    /// the faults that do not end guidance meanwhile, and the faults to report about the pictures.
     #[cold]
     #[inline(never)]
     fn coast(
@@ -139,14 +144,14 @@ impl<I: Injection> Step<'_, I> {
                 // FDCA stands on its rates, so they must not stand still while trust comes back.
                 let goes_by_pictures = self.config.fdca.get().is_some() && v.coast.sees();
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
-                    PictureVerdict::SameLine if goes_by_pictures => {}
-                    PictureVerdict::SameLine => v.law.relocate(sample),
-                    PictureVerdict::NewLine => {
+                    PictureVerdict::Expected if goes_by_pictures => {}
+                    PictureVerdict::Expected => v.law.relocate(sample),
+                    PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
                         v.plausibility.forget_lane();
                         motion_history.forget_line();
                     }
-                    PictureVerdict::OtherLine => {}
+                    PictureVerdict::Elsewhere => {}
                 }
                 changed.add(ChangedParts::LAW);
                 changed.add(ChangedParts::LANE);
@@ -160,20 +165,21 @@ impl<I: Injection> Step<'_, I> {
             return [FaultSet::NONE, reported];
         }
         let passed = self.now.since(v.input_times.lane);
-        // A camera may be later than before, or jitter: where the lane went on to waits for a picture to compare.
+        // A picture that is older than the extrapolation cannot be compared with it: no further extrapolation until it has caught up.
         let waits = self.inputs.lane.value().is_some_and(is_older);
-        // It is of no use yet.
+        // Until then it counts as missing.
         reported.insert_if(waits && !v.coast.sees_other_line(), Fault::LaneTimeout);
         self.lane = if passed < EXTRAPOLATION_PERIOD || waits {
             Input::Held(last)
         } else {
-            // As old as the pictures were.
+            // Extrapolated to the age that pictures have when they arrive.
             Input::New(extrapolated_lane(v, motion_history, last.at.after(passed)))
         };
         [BRIDGED, reported]
     }
 
-    /// Takes the inputs: what is new goes through the plausibility checks. Returns what is lost.
+    /// Takes new inputs through the plausibility checks, and forgets what the checks know of lost ones. Returns the faults of
+    /// lost inputs.
     fn update_inputs(
         &self,
         v: &mut Memory,
@@ -223,7 +229,10 @@ impl<I: Injection> Step<'_, I> {
                 v.input_times.column = self.now;
                 changed.add(ChangedParts::INPUT_TIMES);
                 changed.add(ChangedParts::COLUMN);
-                v.fast.hands.update(c.driver_torque);
+                // The rim of a free wheel answers the probe too: driver torques are compared at the same place of its wave.
+                if v.fast.probe.is_passing_zero() {
+                    v.fast.hands.update(c.driver_torque);
+                }
                 v.plausibility.set_wheel_angle(c.wheel_angle);
             }
             Input::Held(_) => {}
@@ -257,7 +266,7 @@ impl<I: Injection> Step<'_, I> {
         self.lost_inputs()
     }
 
-    /// The checks whose time has come.
+    /// Runs the plausibility checks that are pending.
     #[inline(always)]
     fn check(
         &self,
@@ -270,6 +279,11 @@ impl<I: Injection> Step<'_, I> {
         let checks = &self.config.plausibility;
         if let Some(c) = to_check(&self.inputs.column, &mut pending.column) {
             changed.add(ChangedParts::COLUMN);
+            let is_tested = v.fast.packed.mode == STANDBY || v.fast.probe != ProbeState::SILENT;
+            let passed = v.plausibility.since_column(self.now);
+            let is_alive = pending
+                .frozen_torque
+                .is_alive(c.driver_torque, c.wheel_angle, passed, is_tested);
             let plausible = checks.column(
                 &mut v.plausibility,
                 self.now,
@@ -277,7 +291,7 @@ impl<I: Injection> Step<'_, I> {
                 c.wheel_angle,
                 self.applied,
             );
-            kept.set(!plausible, Fault::ColumnImplausible);
+            kept.set(!(is_alive && plausible), Fault::ColumnImplausible);
         }
         if let Some(sample) = to_check(&self.lane, &mut pending.lane) {
             changed.add(ChangedParts::LANE);
@@ -297,7 +311,7 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// The inputs that are lost.
+    /// A time-out fault for each input without a usable value.
     #[inline(always)]
     fn lost_inputs(&self) -> FaultSet {
         let Inputs {
@@ -308,7 +322,7 @@ impl<I: Injection> Step<'_, I> {
             ..
         } = self.inputs;
         let mut lost = FaultSet::NONE;
-        // A frame that arrives and is refused is no time-out: the fault that says so came with the inputs.
+        // Where frames arrive and are refused, LaneStep or SpeedStep says so, and there is no time-out.
         let refused = |fault| self.inputs.faults.contains(fault);
         lost.insert_if(
             lane.value().is_none() && !refused(Fault::LaneStep),
@@ -323,7 +337,7 @@ impl<I: Injection> Step<'_, I> {
         lost
     }
 
-    /// What the vehicle turned since the lane sample in use, if that was old when it came.
+    /// How far the vehicle has turned since the lane sample in use, where that was old when it arrived.
     fn compensate_age(&self, v: &mut Memory, motion_history: &MotionHistory) {
         let Some(sample) = self.lane.value() else {
             return;
@@ -334,27 +348,25 @@ impl<I: Injection> Step<'_, I> {
         } else if let Input::New(_) = self.lane {
             (v.fast.turned, v.fast.rate_then) = motion_history.turned(self.now, sample.at);
         } else {
-            let turned = per_second(v.plausibility.turning().bits(), self.elapsed);
-            v.fast.turned = Radians::from_bits(v.fast.turned.bits().saturating_add(turned));
+            let turned = per_second(v.plausibility.turning().fixed(), self.elapsed);
+            v.fast.turned = v.fast.turned.plus(Radians::from_fixed(turned));
         }
     }
 
-    /// How its motion since then differs from going on as it did, if that was so.
+    /// How the vehicle's motion since an old sample differs from going on at the rate of turn that it had then; `None` for a
+    /// sample that was not old.
     #[inline(always)]
     fn ego_motion(&self, v: &Memory, sample: LaneSample) -> Option<EgoMotion> {
         let age = self.now.since(sample.at);
         if age.us().saturating_sub(self.now.since(v.input_times.lane).us()) <= PROMPT.us() {
             return None;
         }
-        let went_on = per_second(v.fast.rate_then.bits(), age);
-        let turned = i64::from(v.fast.turned.bits()).saturating_sub(i64::from(went_on));
-        let faster =
-            i64::from(v.plausibility.turning().bits()).saturating_sub(i64::from(v.fast.rate_then.bits()));
+        let went_on = per_second(v.fast.rate_then.fixed(), age);
         let speed = v.plausibility.speed();
-        let near = product(self.config.plausibility.near_time.bits(), speed.bits());
+        let near = product(self.config.plausibility.near_time.fixed(), speed.fixed());
         Some(EgoMotion::new(
-            Radians::from_wide(turned),
-            TurningRate::from_wide(faster),
+            v.fast.turned.minus(Radians::from_fixed(went_on)),
+            v.plausibility.turning().minus(v.fast.rate_then),
             speed,
             Metres::from_wide(near),
         ))
@@ -387,7 +399,7 @@ impl<I: Injection> Step<'_, I> {
             .map(|motion| motion.speeds.iter().all(|speed| *speed >= least))
     }
 
-    /// Counts steps that came late or early, in a row. A very late one counts for all it missed.
+    /// Counts late and early steps in a row. One after more than [`LOST_TIME`] counts as too many at once.
     fn keep_time(&self, v: &mut Memory) -> (u8, u8) {
         v.fast.packed.late = match self.elapsed {
             e if e > LOST_TIME => LATE_STEPS.saturating_add(1),
@@ -402,7 +414,7 @@ impl<I: Injection> Step<'_, I> {
         (v.fast.packed.late, v.fast.packed.early)
     }
 
-    /// The most urgent event that changes the mode decides.
+    /// The next mode: of all events of this step the most urgent one that leads out of the present mode decides.
     fn next_mode(&self, v: &mut Memory, mode: Mode, faults: FaultSet, fast_enough: Option<bool>) -> Mode {
         let inputs_ok = !faults.intersects(FaultSet::INPUT);
         let request = self.inputs.request.value().map(|r| r.engage);
@@ -417,7 +429,7 @@ impl<I: Injection> Step<'_, I> {
         };
         let mut raised = Events::only(Event::BootPassed);
         raised.insert_if(rising && v.fast.ready >= READY, Event::Engage);
-        // Late steps carry the ramp further than the reduction limit lets the torque follow.
+        // After a late step the ramp may be done before the torque, whose fall is limited, is zero.
         raised.insert_if(v.ramp.is_done() && self.applied == Torque::ZERO, Event::Faded);
         let no_hand = v.fast.hands.time_hands_off() >= END;
         let is_over = request == Some(false) || fast_enough == Some(false) || no_hand;
@@ -435,7 +447,7 @@ impl<I: Injection> Step<'_, I> {
         v.coast = Coast::NEW;
         v.fast.probe = ProbeState::SILENT;
         match mode {
-            // Both may be from before the last wrap of the clock.
+            // Both hold instants, which may be older than a wrap of the clock.
             Mode::Active => {
                 (v.law, v.fast.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
                 v.fast.hands.reset();
@@ -443,8 +455,8 @@ impl<I: Injection> Step<'_, I> {
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
                 let suspect = self.suspect_since(v, faults);
-                // Half a wave of the probe must not stand in the wheel for two seconds, and what the other half
-                // took away does not come back.
+                // The ramp starts from the torque without the probe, so that no half wave of it is held for two seconds; where the
+                // probe had reduced the torque, from the reduced one.
                 let applied = smaller_of_same_sign(
                     self.applied,
                     subtract_probe(self.applied, Some(v.fast.probe_applied)),
@@ -456,7 +468,8 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
-    /// How long ago the earliest sample came that must not be trusted.
+    /// For how long the outputs may have been wrong: since the inputs of these faults were last good, or the time that a check
+    /// needs to find a fault.
     fn suspect_since(&self, v: &Memory, faults: FaultSet) -> Micros {
         let lost_for = |fault, last_new| {
             if faults.contains(fault) {
@@ -494,7 +507,7 @@ impl<I: Injection> Step<'_, I> {
                 let probe = self.probe(v);
                 (add_probe(demanded, probe), probe)
             }
-            // A driver who pushed the torque below its ramp does not get it back.
+            // Where the envelope or the driver has brought the torque below its ramp, it does not rise again.
             Mode::Fade | Mode::Handover => {
                 let is_plausible = !faults.contains(Fault::ColumnImplausible);
                 let pace = if mode == Mode::Handover {
@@ -506,19 +519,19 @@ impl<I: Injection> Step<'_, I> {
                 let passed = Micros::from_us(self.elapsed.us().saturating_mul(pace));
                 changed.add(ChangedParts::RAMP);
                 let ending = smaller_of_same_sign(v.ramp.step(passed), self.applied);
-                // While the lane still comes, no more than the law asks for: the curve may end before the ramp does.
+                // While the lane is known, no more than the law demands: a curve may end before the ramp does.
                 if mode == Mode::Handover && self.lane.value().is_some() {
                     (smaller_of_same_sign(ending, demanded), None)
                 } else {
                     (ending, None)
                 }
             }
-            // At once: what is behind these modes must not move the wheel for another tick.
+            // These modes have no torque, from their first step on.
             Mode::Boot | Mode::Standby | Mode::Fault | Mode::Locked => {
                 return (Torque::ZERO, None, LimitReason::Mode);
             }
         };
-        // Without a column there is no override to judge; without a column there is also no Active.
+        // Without a column the override limit cannot act; the mode is not Active then either.
         let driver = self
             .inputs
             .column
@@ -540,20 +553,20 @@ impl<I: Injection> Step<'_, I> {
         match limit {
             LimitReason::None if mode != Mode::Active => (torque, probe, LimitReason::Mode),
             LimitReason::None => (torque, probe, limit),
-            // Where a limit acts, no more may count as guidance than was applied.
+            // Where a limit acts, the probe is at most as much of the torque as was left.
             _ => (torque, probe.map(|probe| common_part(probe, torque)), limit),
         }
     }
 
     /// The probe's torque, while it is wanted or on its way out.
     fn probe(&self, v: &mut Memory) -> Option<Torque> {
-        // Without trust left there is no guidance to ride on.
+        // The probe needs a lane that is fully trusted.
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
         self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
-    /// The law's torque, scaled by the authority: of the last request, or all of it where none is heard any more. Zero without
-    /// a lane.
+    /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
+    /// ends guidance then. Without a lane the torque is zero.
     fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.is_latest(&sample) {
@@ -564,21 +577,21 @@ impl<I: Injection> Step<'_, I> {
         });
         let mut demanded = v.coast.limited(demanded);
         if self.activity < Ratio::ONE {
-            demanded = Torque::from_bits(share_of(self.activity.bits(), demanded.bits()));
+            demanded = Torque::from_fixed(share_of(self.activity.fixed(), demanded.fixed()));
         }
         let demanded = self.injection.law(demanded);
-        // A share: more than all or less than nothing is a host's mistake.
+        // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
-        // Neither is more than one.
-        let share = share_of(authority.bits(), v.share.bits());
-        let share = share_of(share, v.coast.trust.bits());
-        Torque::from_bits(share_of(share, demanded.bits()))
+        // Neither factor exceeds 1, so the product cannot overflow.
+        let share = share_of(authority.fixed(), v.share.fixed());
+        let share = share_of(share, v.coast.trust.fixed());
+        Torque::from_fixed(share_of(share, demanded.fixed()))
     }
 }
 
-/// The value whose check has come: that of the step before. A step that takes a new value has work enough; where there is
-/// one in every step, every other one is checked, for as much time as both.
+/// The value to check in this step: one that was new in the step before, so that a step with a new value, which costs most,
+/// checks nothing. Where every step has a new value, every second one is checked, over the time of both.
 fn to_check<T: Copy>(input: &Input<T>, is_pending: &mut bool) -> Option<T> {
     let was_pending = core::mem::replace(is_pending, matches!(input, Input::New(_)) && !*is_pending);
     input.value().filter(|_| was_pending)
@@ -592,7 +605,7 @@ pub(super) fn subtract_probe(torque: Torque, probe: Option<Torque>) -> Torque {
     add_probe(torque, probe.map(Torque::opposite))
 }
 
-/// As much of `part` as `whole` can hold.
+/// `part`, cut to what lies between zero and `whole`.
 fn common_part(part: Torque, whole: Torque) -> Torque {
     part.max(whole.min(Torque::ZERO)).min(whole.max(Torque::ZERO))
 }

@@ -1,5 +1,5 @@
-//! A step with another law in the place of (9), for simulators that compare laws. All behind the law is the product's: the
-//! probe, the envelope, the mode machine, the monitor ([`crate::safety::monitor::Monitor::of_another_law`]).
+//! A step with another law in the place of (9), for simulators that compare laws. Everything after the law is the product's: the
+//! probe, the envelope, the mode machine, the monitor ([`crate::safety::monitor::Monitor::with_another_law`]).
 //!
 //! Not here: faults that are injected (`injection`), and any law.
 
@@ -7,7 +7,7 @@ use super::{Ecu, Step};
 use crate::controller::injection::Injection;
 use crate::quantity::{Instant, Torque};
 
-/// What another law asks for.
+/// The torque that another law demands.
 struct Asked(Torque);
 
 impl Injection for Asked {

@@ -56,7 +56,7 @@ pub struct Step {
 }
 
 words! {
-    /// What the ECU must not lose to a flipped bit, beside its receivers.
+    /// State that is kept twice, beside that of the receivers.
     struct Memory {
         step: LastStep,
         monitor: MonitorState,
@@ -100,9 +100,9 @@ pub struct Ecu {
     receivers: Receivers,
     history: FaultHistory,
     reset: ResetCause,
-    /// In which step the warnings of a mode began.
+    /// The step and the mode in which the present warning began.
     warned_at: Option<(u32, Mode)>,
-    /// The monitor's test is due. Not kept twice: a flip costs one test or brings one more.
+    /// A self-test of the monitor is due. Not kept twice: a flipped bit skips one test or adds one.
     is_test_due: bool,
     background: Background,
 }
@@ -146,7 +146,7 @@ impl Ecu {
         )
     }
 
-    /// The state is made in its place: a copy of it would be half of the stack.
+    /// Builds the state in place: a copy of it would take half of the stack.
     fn with(
         setup: &Setup,
         mode: Mode,
@@ -176,7 +176,7 @@ impl Ecu {
     // A function of its own in every image, from which the tools follow the torque path.
     #[inline(never)]
     pub fn receive(&mut self, frame: &Frame, now: Instant) -> Result<(), Reject> {
-        // Even a rejected frame may have moved a counter. A damaged receiver is found and reported by the next step.
+        // A damaged receiver takes no frame; the next step finds and reports it.
         self.receivers.receive(frame, now).unwrap_or(Ok(()))
     }
 
@@ -203,7 +203,7 @@ impl Ecu {
         let (applied, steps) = (last.applied, last.count);
         let elapsed_us = now.since(last.at).us();
         let mut faults = FaultSet::from_bits(last.faults);
-        // One whose limits are damaged permits nothing.
+        // A monitor whose copies differ permits nothing.
         let monitor = if intact {
             Some(self.monitor.value())
         } else {
@@ -243,7 +243,7 @@ impl Ecu {
             count: steps.wrapping_add(1),
         };
         seal(&mut self.memory, evidence.lane.is_some());
-        // The next frames are for the next step.
+        // Each accepted frame is shown to the monitor once.
         self.receivers.accepted = Accepted::NONE;
         if !permitted {
             command = Command {
@@ -274,7 +274,7 @@ impl Ecu {
         self.background.step()
     }
 
-    /// Whether all that is kept twice is whole. A function of its own, for the reasons of `redundant::are_whole`.
+    /// Whether all copies agree. Not inlined, for the reasons of `redundant::are_intact`.
     #[inline(never)]
     fn is_intact(&self) -> bool {
         self.memory.agrees_apart()
@@ -283,8 +283,7 @@ impl Ecu {
             && self.controller.is_intact(&self.state)
     }
 
-    /// The redundant state is damaged: nothing of it can be used. What comes in its place knows nothing but the
-    /// memory fault, which latches.
+    /// Replaces a damaged state by a new one with the memory fault, which latches.
     #[cold]
     #[inline(never)]
     fn reset_state(&mut self, now: Instant) {
@@ -360,7 +359,7 @@ impl Ecu {
     }
 }
 
-/// Copies what a step changed. A function of its own, as the controller's.
+/// Brings the second copies of what a step changed up to date. Not inlined, as the controller's.
 #[inline(never)]
 fn seal(memory: &mut Redundant<Memory>, is_new_picture: bool) {
     let memory = black_box(memory);
@@ -386,7 +385,7 @@ fn has_test_come(is_due: &mut bool, steps: u32, inputs: &Inputs) -> bool {
     !*is_due
 }
 
-/// A new sample of the column, for the estimator.
+/// A new sample of the column for the estimator, if one came.
 #[inline(always)]
 fn sample(column: &Input<ColumnState>, now: Instant, applied: Torque) -> Option<Sample> {
     match column {
@@ -400,8 +399,8 @@ fn sample(column: &Input<ColumnState>, now: Instant, applied: Torque) -> Option<
     }
 }
 
-/// The self-test: each turn the monitor must refuse what only one of its rules refuses. One whose limits are damaged
-/// refuses everything.
+/// The self-test: in each turn the monitor must refuse a frame that only one of its rules refuses. A monitor whose copies differ
+/// refuses everything, and so passes.
 #[inline(never)]
 fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injection: &I) -> bool {
     monitor.is_none_or(|monitor| {
@@ -418,7 +417,7 @@ fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injectio
     })
 }
 
-/// Asks the monitor. One whose limits are damaged permits nothing.
+/// Whether the monitor permits the guidance frame. A monitor whose copies differ permits nothing.
 fn permits<I: Injection>(
     monitor: Option<&Monitor>,
     state: &mut MonitorState,

@@ -1,13 +1,10 @@
-//! What the ECU hears: for each input the latest value, with what judges the next.
+//! The ECU's receivers: for each input the latest accepted value, and what the next one is checked against.
 //!
-//! Every receiver is guarded apart, so that a frame costs the check of its own and not of all. Not here: what the
-//! values lead to.
+//! Each receiver is kept twice by itself, so that a frame costs the comparison of one. Not here: what the values lead to
+//! ([`crate::controller`]).
 
 use crate::bus::e2e::ReceiverState;
-use crate::bus::messages::{
-    Column, FaultRecord, Guidance, Identity, LanePreview, Message, ParameterStatus, ParameterValue,
-    Rejection, Request, TIMEOUT, Telemetry, Vehicle, Warning,
-};
+use crate::bus::messages::{Column, LanePreview, Message, Request, Sender, TIMEOUT, Vehicle, sender_of};
 use crate::bus::{Frame, Reject};
 use crate::controller::inputs::{ColumnState, Input, Inputs, Motion};
 use crate::law::LaneSample;
@@ -19,14 +16,15 @@ use crate::safety::redundant::{Redundant, Words};
 
 /// The column's frames come at this rate.
 const COLUMN_PERIOD_US: u32 = 2000;
-/// Spans beyond half a wrap of the clock are negative.
+/// A span longer than half a wrap of the clock is negative: the other instant is the later one.
 const HALF_WRAP: Micros = Micros::from_us(u32::MAX / 2);
-/// Slower is standing.
+/// A vehicle slower than this stands.
 const STANDSTILL: Speed = Speed::from_m_per_s(0.25);
-/// Messages of the vehicle that have to be used in a row where it is to stand.
+/// How many Vehicle messages in a row must be accepted before the vehicle counts as standing.
 const UNDISTURBED: u32 = 100;
 
-/// The latest value of one input, with what judges the next. What is small shares a word: a step checks every one.
+/// The latest value of one input, with what the next is checked against. The four bytes share a word, as every step compares
+/// all words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub(super) struct Slot<T> {
@@ -36,9 +34,9 @@ pub(super) struct Slot<T> {
     /// Why the last frame was not used: [`INVALID`] or [`STEP`]; 0 if it was, or for another reason. Of speeds, how many
     /// messages in a row had one that stepped.
     doubt: u8,
-    /// When it was heard.
+    /// When the value arrived.
     at: Instant,
-    /// How far apart its sender's messages come, or [`LEAST_PERIOD`].
+    /// The sender's period, at least [`LEAST_PERIOD`].
     period: Micros,
     value: T,
 }
@@ -53,18 +51,18 @@ const REQUEST_PERIOD: Micros = Micros::from_ms(25);
 const PERIOD_SHIFT: u32 = 6;
 /// A sender whose messages come closer is waited for as long as one of this: [`TIMEOUT`].
 const LEAST_PERIOD: Micros = Micros::from_us(TIMEOUT.us() / 3);
-/// A lane sample that is older than this when it comes is none.
+/// A lane sample older than this on arrival is refused.
 const OLDEST_SAMPLE: Micros = Micros::from_ms(150);
 
-/// Its sender did not vouch for it.
+/// The sender marked it as not valid.
 const INVALID: u8 = 1;
-/// It was too far from the last one used.
+/// It was too far from the last accepted one.
 const STEP: u8 = 2;
 
-/// So many steps after a frame under an identifier of this ECU, that is still a fault: a second.
+/// For how many steps OwnIdentifier lasts after a frame under an identifier of this ECU: a second.
 const FOREIGN_STEPS: u32 = 1000;
 
-/// Nothing heard, or not for too long.
+/// No value, or too old.
 const LOST: u8 = 0;
 /// A value that a step has seen.
 const HELD: u8 = 1;
@@ -146,8 +144,8 @@ impl<T: Words> Slot<T> {
     }
 }
 
-/// What a step sees of a slot that is whole. A stale value is dropped, so that no instant outlives a wrap of the clock, and
-/// its sender has to be trusted anew. Only what changes is written: in most steps nothing.
+/// A slot as a step's input. A value past its time-out is dropped, before its instant could outlive a wrap of the clock, and its
+/// sender must show clean frames again. Writes only what changes: in most steps nothing.
 #[inline(always)]
 fn take<T: Words, U: From<T>>(guarded: &mut Redundant<Slot<T>>, now: Instant, seen: &mut Input<U>) {
     let slot = guarded.value();
@@ -175,7 +173,7 @@ fn halves(word: u32) -> [u16; 2] {
     [word as u16, (word >> 16) as u16]
 }
 
-/// Takes a preview.
+/// Takes a decoded lane preview into its slot.
 fn take_preview(slot: &mut Slot<LaneSample>, lane: &LanePreview, now: Instant) -> Result<(), Reject> {
     slot.doubt = u8::from(!lane.valid);
     if !lane.valid {
@@ -187,8 +185,7 @@ fn take_preview(slot: &mut Slot<LaneSample>, lane: &LanePreview, now: Instant) -
         at: now.before(lane.age),
     };
     if let Some(last) = slot.last() {
-        // A span of almost a whole wrap of the clock is a step back in time: what differences samples would take it
-        // for a gap and start anew.
+        // A span of more than half a wrap is a step back in time; the law's filter would take it for a long gap.
         if sample.at.since(last.at) > HALF_WRAP {
             return Err(Reject::Older);
         }
@@ -212,10 +209,7 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
         return Some(speeds);
     };
     let ([a, b], [a_before, b_before]) = (speeds, last.speeds);
-    let moved = |from: Speed, other: Speed, other_before: Speed| {
-        let by = other.bits().wrapping_sub(other_before.bits());
-        Speed::from_bits(from.bits().saturating_add(by))
-    };
+    let moved = |from: Speed, other: Speed, other_before: Speed| from.plus(other.minus(other_before));
     // A message comes every 10 to 25 ms: no product of a count and a period wraps.
     let lasts = |doubt: u8| Micros::from_us(u32::from(doubt).wrapping_mul(slot.period.us()));
     let follow_within = |held: Micros| {
@@ -242,7 +236,7 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
     is_short.then_some(followed)
 }
 
-/// Bytes of frames accepted since the last step, for the monitor's own decoding.
+/// Bytes of the frames accepted since the last step: the monitor decodes them by itself.
 #[derive(Debug, Clone)]
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
@@ -322,8 +316,8 @@ struct Standing {
 
 impl Standing {
     fn hear(&mut self, [a, b]: [Speed; 2], passed: Micros) {
-        let braked = per_second(BRAKES.bits(), passed);
-        let still = Speed::from_bits(self.at_most.bits().saturating_sub(braked));
+        let braked = Speed::from_fixed(per_second(BRAKES.fixed(), passed));
+        let still = self.at_most.minus(braked);
         (self.at_most, self.in_a_row) = (still.max(a).max(b), self.in_a_row.saturating_add(1));
     }
 }
@@ -413,8 +407,8 @@ impl Receivers {
                 accepted.request = Some(*frame.bytes());
                 Ok(())
             }),
-            // On a bus nobody hears itself.
-            id if is_own(id) => {
+            // A node does not receive its own frames: another one sends in this ECU's name.
+            id if sender_of(id) == Some(Sender::Ecu) => {
                 self.foreign = FOREIGN_STEPS;
                 Some(Err(Reject::OwnIdentifier))
             }
@@ -430,7 +424,7 @@ impl Receivers {
         is_known && at_most <= STANDSTILL && in_a_row >= UNDISTURBED
     }
 
-    /// The last lane preview passes for one that came now.
+    /// Makes the last lane preview count as one that arrived now, for an injected fault.
     pub(super) fn renew_lane(&mut self, now: Instant) {
         let _ = self.lane.change(|slot| (slot.at, slot.value.at) = (now, now));
     }
@@ -441,7 +435,7 @@ impl Receivers {
         self.lane.agrees() && self.column.agrees() && self.motion.agrees() && self.request.agrees()
     }
 
-    /// What a step sees of receivers that are whole, into [`Inputs::lost`].
+    /// Fills in the inputs of a step, from receivers that are intact into [`Inputs::lost`].
     #[inline(always)]
     pub(super) fn take(&mut self, now: Instant, inputs: &mut Inputs) {
         take(&mut self.lane, now, &mut inputs.lane);
@@ -449,7 +443,7 @@ impl Receivers {
         take(&mut self.motion, now, &mut inputs.motion);
         take(&mut self.request, now, &mut inputs.request);
         let faults = &mut inputs.faults;
-        // What is wrong with the last frame is the reason of a loss, not a fault by itself: one may be a blink.
+        // A bad last frame explains a loss, and is no fault by itself: a single one happens.
         if inputs.lane == Input::Lost {
             let doubt = self.lane.value().doubt;
             faults.insert_if(doubt == INVALID, Fault::LaneInvalid);
@@ -465,27 +459,12 @@ impl Receivers {
     }
 }
 
-/// The step of the column's counter that may have been lost in a silence. The longer it lasted, the more: at once no more
-/// than three, so that few of the sixteen counters let an old frame pass.
+/// The largest step of the column's counter to accept after a silence: three at first, more the longer it lasts. A narrow window
+/// lets few of the sixteen counters of a replayed frame pass.
 #[expect(clippy::as_conversions, reason = "at most 14")]
 fn column_window(silence: Micros) -> u8 {
     let periods = silence.us() / COLUMN_PERIOD_US;
     periods.saturating_add(u32::from(Column::MAX_DELTA)).min(14) as u8
-}
-
-/// Whether an identifier is this ECU's (`core/tests/attacks.rs` holds it to the list of messages).
-const fn is_own(id: u16) -> bool {
-    matches!(
-        id,
-        Guidance::ID
-            | Warning::ID
-            | FaultRecord::ID
-            | Telemetry::ID
-            | ParameterStatus::ID
-            | ParameterValue::ID
-            | Rejection::ID
-            | Identity::ID
-    )
 }
 
 #[cfg(test)]

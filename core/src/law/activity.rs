@@ -10,11 +10,13 @@
 //! Products of pseudo-powers are in 2^-48 (N.m.rad/s)^2: what an LSB of the bus in each torque makes with 0.25 mrad/s is one.
 //! Error: at most 1 % of the share from a float64 evaluation of the same samples (`core/tests/laws.rs` asserts it).
 
-use super::{GAP, Law, RATE_BITS};
-use crate::quantity::{FRAC_BITS, Instant, Radians, Ratio, Torque, product, quotient, saturate, share_of};
+use fixed::types::{I8F24, I12F20};
+
+use super::{GAP, Law};
+use crate::quantity::{Instant, Radians, Ratio, Torque, product, quotient, saturate, share_of};
 
 /// The square of a wheel's rate that counts: a hand turns no wheel faster than 8 rad/s.
-const MOST_SQUARE: i64 = (64 << FRAC_BITS) - 1;
+const MOST_SQUARE: i64 = (64 << I8F24::FRAC_NBITS) - 1;
 
 /// What it remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,8 +24,8 @@ pub struct Activity {
     /// phi when it came last, and when that was.
     wheel: Radians,
     at: Instant,
-    /// dphi/dt, filtered as the rates of the errors, in 2^-20 rad/s.
-    rate: i32,
+    /// dphi/dt, filtered as the rates of the errors, rad/s.
+    rate: I12F20,
     /// L[P_d*P_h] and L[abs(P_d*P_h)].
     agreement: i64,
     size: i64,
@@ -34,7 +36,7 @@ impl Activity {
     pub const NEW: Self = Self {
         wheel: Radians::ZERO,
         at: Instant::from_us(0),
-        rate: 0,
+        rate: I12F20::ZERO,
         agreement: 0,
         size: 0,
     };
@@ -43,39 +45,40 @@ impl Activity {
     pub fn turn(&mut self, law: &Law, now: Instant, wheel: Radians) {
         let passed = now.since(self.at);
         self.rate = if passed > GAP {
-            0
+            I12F20::ZERO
         } else {
-            law.filter(self.rate, self.wheel.bits(), wheel.bits(), passed)
+            law.filter(self.rate, self.wheel.fixed(), wheel.fixed(), passed)
         };
         (self.wheel, self.at) = (wheel, now);
     }
 
     /// A step of 1 ms with these torques of driver and guidance: the share that is left.
     pub fn share(&mut self, least: Ratio, driver: Torque, guidance: Torque) -> Ratio {
-        let rate = i64::from(self.rate);
+        let rate = i64::from(self.rate.to_bits());
         // 62 bits, cut to 24 fractional ones: a flipped bit must not make it wrap.
-        let square = (rate.wrapping_mul(rate) >> (2 * RATE_BITS - FRAC_BITS)).min(MOST_SQUARE);
-        let torques = i64::from(saturate(product(driver.bits(), guidance.bits())));
+        let square =
+            (rate.wrapping_mul(rate) >> (2 * I12F20::FRAC_NBITS - I8F24::FRAC_NBITS)).min(MOST_SQUARE);
+        let torques = saturate(product(driver.fixed(), guidance.fixed()));
+        let torques = i64::from(torques.to_bits());
         // At most 31 bits times 30.
         let both = torques.wrapping_mul(square);
         self.agreement = low_pass(self.agreement, both);
         self.size = low_pass(self.size, both.saturating_abs());
         let against = self.against();
-        let taken = share_of(Ratio::ONE.bits().saturating_sub(least.bits()), against);
-        Ratio::from_bits(Ratio::ONE.bits().saturating_sub(taken))
+        let taken = share_of(Ratio::ONE.minus(least).fixed(), against);
+        Ratio::ONE.minus(Ratio::from_fixed(taken))
     }
 
-    /// `max(0, -c)`, in 2^-24.
-    fn against(&self) -> i32 {
+    /// `max(0, -c)`.
+    fn against(&self) -> I8F24 {
         let size = self.size.max(0).cast_unsigned();
         let against = self.agreement.min(0).unsigned_abs().min(size);
         // The upper 32 bits of both from the first that is set; a quotient by zero is zero.
         let up = size.leading_zeros();
         let upper = |bits: u64| bits.wrapping_shl(up) >> 32;
         let divisor = u32::try_from(upper(size)).unwrap_or(u32::MAX);
-        quotient(upper(against) << FRAC_BITS, divisor)
-            .min(1 << FRAC_BITS)
-            .cast_signed()
+        let share = quotient(upper(against) << I8F24::FRAC_NBITS, divisor).min(1 << I8F24::FRAC_NBITS);
+        I8F24::from_bits(share.cast_signed())
     }
 }
 

@@ -11,9 +11,11 @@
 //!
 //! Error: at most 1 mN.m from a float64 evaluation at speeds that guide (`core/tests/laws.rs` asserts it).
 
+use fixed::types::{I8F24, I40F24};
+
 use super::{EgoMotion, LaneSample, Law, LawState};
 use crate::quantity::{
-    AnglePerLength, FRAC_BITS, Instant, Radians, Ratio, Speed, Torque, TorquePerAcceleration, TorquePerAngle,
+    AnglePerLength, Instant, Radians, Ratio, Speed, Torque, TorquePerAcceleration, TorquePerAngle,
     TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TurningRate, TurningRatePerAngle, product,
     saturate, signed_quotient,
 };
@@ -48,10 +50,9 @@ pub struct Car {
     pub wheel: Radians,
 }
 
-/// Largest gains on the errors and on the rate of the yaw error: more than those of (9), which has four terms, and the wide sum of
-/// [`Law`] stays inside an `i64`: three times 2^61. `config` refuses choices that need more at a speed that guides.
-const MOST: i64 = 64 << FRAC_BITS;
-const MOST_RATE: i64 = (127 << FRAC_BITS) + (1 << FRAC_BITS) - 1;
+/// Largest gain on an error, more than those of (9), which has four terms; that on the rate of the yaw error ends where its format does.
+/// The wide sum of [`Law`] stays inside 64 bits: three times 2^61. `config` refuses choices that need more at a speed that guides.
+const MOST: I40F24 = I40F24::const_from_int(64);
 
 impl Fdca {
     /// None, for another law.
@@ -91,33 +92,38 @@ impl Fdca {
     ) -> Torque {
         let gains = self.at(law.tau, car);
         let lane = gains.demanded(state, now, ego);
-        let path = product(gains.e_theta_rate.bits(), car.turning.bits());
-        let held = product(self.loha.bits(), car.wheel.bits());
-        Torque::from_wide(i64::from(lane.bits()).saturating_add(path).saturating_sub(held))
+        let path = product(gains.e_theta_rate.fixed(), car.turning.fixed());
+        let held = product(self.loha.fixed(), car.wheel.fixed());
+        Torque::from_wide(
+            I40F24::from(lane.fixed())
+                .saturating_add(path)
+                .saturating_sub(held),
+        )
     }
 
     /// The gains at a speed.
     fn at(&self, tau: u32, car: &Car) -> Law {
-        let v = car.speed.bits();
+        let v = car.speed.fixed();
         let stiffness = product(
-            saturate(product(self.aligning.bits(), v)),
-            car.turning_gain.bits(),
+            saturate(product(self.aligning.fixed(), v)),
+            car.turning_gain.fixed(),
         );
-        let both = saturate(stiffness.saturating_add(i64::from(self.loha.bits())));
-        let gain = |of: i32| saturate(product(both, of).min(MOST));
+        let both = saturate(stiffness.saturating_add(self.loha.fixed().into()));
+        let gain = |of: I8F24| saturate(product(both, of).min(MOST));
         let turning_gain = u32::try_from(car.turning_gain.bits()).unwrap_or(0);
         // Only who wants authority pays for the division.
         let held = if self.loha == TorquePerAngle::ZERO {
-            0
+            I8F24::ZERO
         } else {
-            signed_quotient(i64::from(self.loha.bits()) << FRAC_BITS, turning_gain)
+            let dividend = i64::from(self.loha.bits()) << I8F24::FRAC_NBITS;
+            I8F24::from_bits(signed_quotient(dividend, turning_gain))
         };
-        let path = product(self.path.bits(), v).saturating_add(i64::from(held));
+        let path = product(self.path.fixed(), v).saturating_add(held.into());
         Law {
-            e_y: TorquePerLength::from_bits(gain(self.k_y.bits())),
+            e_y: TorquePerLength::from_fixed(gain(self.k_y.fixed())),
             e_y_rate: TorquePerSpeed::ZERO,
-            e_theta: TorquePerAngle::from_bits(gain(self.k_psi.bits())),
-            e_theta_rate: TorquePerTurningRate::from_bits(saturate(path.min(MOST_RATE))),
+            e_theta: TorquePerAngle::from_fixed(gain(self.k_psi.fixed())),
+            e_theta_rate: TorquePerTurningRate::from_fixed(saturate(path)),
             tau,
         }
     }

@@ -23,10 +23,12 @@ pub mod probe;
 pub mod schedule;
 pub(crate) mod sine;
 
+use fixed::types::extra::U20;
+use fixed::types::{I8F24, I12F20, I40F24};
+
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Speed, Torque, TorquePerAngle, TorquePerLength, TorquePerSpeed,
-    TorquePerTurningRate, TurningRate, per_second, per_second_times, product, quotient, saturate,
-    shift_round,
+    TorquePerTurningRate, TurningRate, per_second, per_second_times, product, quotient, rounded, saturate,
 };
 use crate::safety::redundant::words;
 
@@ -39,7 +41,7 @@ words! {
         pub e_y: Metres,
         /// Yaw error e_theta' at the far point.
         pub e_theta: Radians,
-        /// When it was true.
+        /// The instant that it describes.
         pub at: Instant,
     }
 }
@@ -61,20 +63,20 @@ pub struct Law {
 }
 
 words! {
-    /// What the law remembers: the last sample and the filtered rates.
+    /// Memory of the law: the last sample and the filtered rates.
     pub struct LawState {
         /// 0 before the first sample.
         has_last: u32,
         last: LaneSample,
-        /// de_y'/dt in 2^-20 m/s.
-        e_y_rate: i32,
-        /// de_theta'/dt in 2^-20 rad/s.
-        e_theta_rate: i32,
+        /// de_y'/dt, m/s.
+        e_y_rate: I12F20,
+        /// de_theta'/dt, rad/s.
+        e_theta_rate: I12F20,
     }
 }
 
 impl LawState {
-    /// No sample yet.
+    /// Before the first sample.
     pub const NEW: Self = Self {
         has_last: 0,
         last: LaneSample {
@@ -82,26 +84,27 @@ impl LawState {
             e_theta: Radians::ZERO,
             at: Instant::from_us(0),
         },
-        e_y_rate: 0,
-        e_theta_rate: 0,
+        e_y_rate: I12F20::ZERO,
+        e_theta_rate: I12F20::ZERO,
     };
 }
 
-/// What the vehicle did since a sample that was old when it came: how its motion differs from going on as it did then.
+/// The vehicle's motion since a sample that was old when it arrived, as the difference from turning on at the rate that it had at
+/// the instant of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EgoMotion {
-    /// The heading that it turned beyond its rate of turn at the sample.
+    /// The angle turned beyond that.
     pub turned: Radians,
-    /// How much faster it turns now.
+    /// The present rate of turn less the one then.
     pub faster: TurningRate,
-    /// Its speed.
+    /// Speed.
     pub speed: Speed,
-    /// How far ahead the near point is.
+    /// Distance to the near point.
     pub near: Metres,
 }
 
 impl EgoMotion {
-    /// It went on as it did.
+    /// No difference.
     pub const STEADY: Self = Self {
         turned: Radians::ZERO,
         faster: TurningRate::ZERO,
@@ -109,17 +112,14 @@ impl EgoMotion {
         near: Metres::ZERO,
     };
 
-    /// Bounded to what a vehicle can turn in 200 ms beyond its rate: a flipped bit of the past must not ask for more.
+    /// Both are clamped to what a vehicle can turn in 200 ms beyond its rate: a flipped bit of the motion history, which is not kept
+    /// twice, must not move the torque further.
     #[must_use]
     pub fn new(turned: Radians, faster: TurningRate, speed: Speed, near: Metres) -> Self {
         let (most, fastest) = (Radians::from_rad(0.04), TurningRate::from_rad_per_s(0.3));
         Self {
-            turned: turned
-                .min(most)
-                .max(Radians::from_bits(most.bits().saturating_neg())),
-            faster: faster
-                .min(fastest)
-                .max(TurningRate::from_bits(fastest.bits().saturating_neg())),
+            turned: turned.within(most),
+            faster: faster.within(fastest),
             speed,
             near,
         }
@@ -127,29 +127,31 @@ impl EgoMotion {
 }
 
 impl LawState {
-    /// The state from which [`Law::torque`], which lets the errors go on at their rates, finds the errors and rates of now.
+    /// The state from which [`Law::torque`], which continues the errors at their rates, computes the present errors and rates.
     /// Both errors turn with the vehicle; the near point moves aside by the way that it is ahead, and drifts at the speed
     /// times the heading, of which a third of the age counts where the heading grew with the square of the time.
     fn moved_with(&self, age: Micros, ego: &EgoMotion) -> Self {
-        let turned = i64::from(ego.turned.bits());
-        let aside = product(ego.near.bits(), ego.turned.bits());
-        // What the yaw error's own rate makes of the lateral error's, and the heading beyond it.
-        let going = per_second_times(i64::from(self.e_theta_rate) << 4, age);
-        let drift = product(ego.speed.bits(), saturate(turned.saturating_sub(going)));
-        let drifted = per_second_times(product(ego.speed.bits(), ego.turned.bits()), age) / 3;
-        let bent = per_second_times(product(ego.speed.bits(), saturate(going)), age) / 2;
-        let slower_y = drift.saturating_add(product(ego.near.bits(), ego.faster.bits()));
-        let slower_theta = i64::from(ego.faster.bits());
-        let error = |error: i32, away: i64, slower: i64| {
-            // The rates that are taken away below did not act all the time.
+        let [turned, faster] = [ego.turned.fixed(), ego.faster.fixed()];
+        let [speed, near] = [ego.speed.fixed(), ego.near.fixed()];
+        let wide = |value: I8F24| I40F24::from(value);
+        let aside = product(near, turned);
+        // The lateral error drifts with the heading, of which the yaw error's own rate explains a part.
+        let going = per_second_times(self.e_theta_rate.into(), age);
+        let drift = product(speed, saturate(wide(turned).saturating_sub(going)));
+        let drifted = per_second_times(product(speed, turned), age).wrapping_div_int(3);
+        let bent = per_second_times(product(speed, saturate(going)), age).wrapping_div_int(2);
+        let slower_y = drift.saturating_add(product(near, faster));
+        let slower_theta = wide(faster);
+        let error = |error: I8F24, away: I40F24, slower: I40F24| {
+            // `torque` continues the error at the lower rate for the whole age; this cancels it.
             let ahead = per_second_times(slower, age);
-            i64::from(error).saturating_sub(away).saturating_add(ahead)
+            wide(error).saturating_sub(away).saturating_add(ahead)
         };
         let away_y = aside.saturating_add(drifted).saturating_sub(bent);
-        let to_rate = |bits: i64| saturate(shift_round(bits, 4));
+        let to_rate = |wide: I40F24| saturate(rounded::<_, U20>(wide));
         let mut late = *self;
-        late.last.e_y = Metres::from_wide(error(self.last.e_y.bits(), away_y, slower_y));
-        late.last.e_theta = Radians::from_wide(error(self.last.e_theta.bits(), turned, slower_theta));
+        late.last.e_y = Metres::from_wide(error(self.last.e_y.fixed(), away_y, slower_y));
+        late.last.e_theta = Radians::from_wide(error(self.last.e_theta.fixed(), wide(turned), slower_theta));
         late.e_y_rate = self.e_y_rate.saturating_sub(to_rate(slower_y));
         late.e_theta_rate = self.e_theta_rate.saturating_sub(to_rate(slower_theta));
         late
@@ -165,7 +167,7 @@ impl LawState {
         (self.has_last != 0).then_some(self.last)
     }
 
-    /// The line is where this sample has it, and goes on at the rates that it had.
+    /// Takes the errors of a sample and keeps the rates.
     pub fn relocate(&mut self, sample: LaneSample) {
         self.last = sample;
     }
@@ -175,16 +177,12 @@ impl LawState {
 /// 100 ms is twelve lost samples at 120 Hz, past every time-out on the inputs.
 const GAP: Micros = Micros::from_ms(100);
 
-/// Fractional bits of a rate.
-const RATE_BITS: u32 = 20;
-
-/// Largest rate the filter may hold, 1000 m/s or rad/s. No road or vehicle comes near it; the clamp keeps
-/// every product of the step inside an `i64` whatever the samples are.
-pub const MAX_RATE: u32 = 1000 << RATE_BITS;
+/// Largest rate the filter may hold, m/s or rad/s. No road or vehicle comes near it; the clamp keeps
+/// every product of the step inside 64 bits whatever the samples are.
+pub const MAX_RATE: u32 = 1000;
 
 impl Law {
-    /// The torque that the law asks for now, from the latest sample received; `since` is what the vehicle did since that
-    /// sample that its rates do not say.
+    /// The torque that the law demands now, from the latest sample received and the vehicle's motion since.
     #[must_use]
     pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, ego: &EgoMotion) -> Torque {
         if !state.is_latest(&sample) {
@@ -193,19 +191,16 @@ impl Law {
         self.demanded(state, now, Some(ego))
     }
 
-    /// Takes a sample: the rates of the errors.
+    /// Takes a sample: updates the filtered rates of the errors.
     pub(crate) fn update(&self, state: &mut LawState, sample: LaneSample) {
         let dt = sample.at.since(state.last.at);
         if state.has_last == 0 || dt > GAP {
             *state = LawState::NEW;
         } else if dt > Micros::from_us(0) {
-            state.e_y_rate = self.filter(state.e_y_rate, state.last.e_y.bits(), sample.e_y.bits(), dt);
-            state.e_theta_rate = self.filter(
-                state.e_theta_rate,
-                state.last.e_theta.bits(),
-                sample.e_theta.bits(),
-                dt,
-            );
+            let (last, new) = (state.last.e_y.fixed(), sample.e_y.fixed());
+            state.e_y_rate = self.filter(state.e_y_rate, last, new, dt);
+            let (last, new) = (state.last.e_theta.fixed(), sample.e_theta.fixed());
+            state.e_theta_rate = self.filter(state.e_theta_rate, last, new, dt);
         }
         (state.has_last, state.last) = (1, sample);
     }
@@ -220,7 +215,7 @@ impl Law {
         }
     }
 
-    /// The same from a sample that was old when it came. A function of its own, out of the way of the usual case.
+    /// The same from a sample that was old when it arrived. Not inlined, so that the usual case stays short.
     #[inline(never)]
     fn demanded_from_old_sample(&self, state: &LawState, age: Micros, ego: &EgoMotion) -> Torque {
         self.torque(&state.moved_with(age, ego), age)
@@ -229,37 +224,40 @@ impl Law {
     /// One update of a rate. Magnitudes: `tau` < 2^27 and `rate` < 2^30 give 2^57, the difference of two
     /// `i32` times 10^6 times 2^4 gives 2^57 too: the sum cannot overflow.
     #[inline(always)]
-    fn filter(&self, rate: i32, from: i32, to: i32, dt: Micros) -> i32 {
+    fn filter(&self, rate: I12F20, from: I8F24, to: I8F24, dt: Micros) -> I12F20 {
+        const MOST: u32 = MAX_RATE << I12F20::FRAC_NBITS;
         let tau = i64::from(self.tau);
         // 2^8 for the format of tau, 2^-4 from the errors' 24 fractional bits to the rates' 20.
-        let change = i64::from(to)
-            .saturating_sub(i64::from(from))
+        let change = i64::from(to.to_bits())
+            .saturating_sub(i64::from(from.to_bits()))
             .saturating_mul(1_000_000 << 4);
         // 32 bits times 31.
-        let sum = tau.wrapping_mul(i64::from(rate)).saturating_add(change);
+        let sum = tau.wrapping_mul(i64::from(rate.to_bits())).saturating_add(change);
         // At most 100 ms and 320 ms, in 2^-8 us.
         let span = self.tau.saturating_add(dt.us().saturating_mul(1 << 8));
         // Rounded to nearest.
         let size = sum.unsigned_abs().saturating_add(u64::from(span >> 1));
-        let size = quotient(size, span).min(MAX_RATE).cast_signed();
-        if sum < 0 { size.saturating_neg() } else { size }
+        let size = I12F20::from_bits(quotient(size, span).min(MOST).cast_signed());
+        if sum < 0 { size.wrapping_neg() } else { size }
     }
 
     /// Exact wide products, one rounding. Gains have 24 fractional bits, errors are cut to 20 like the
     /// rates, so that every product has 44: an error's 2^-21 of rounding costs at most 0.02 mN.m at the
     /// largest gain of 32. With that gain a product has at most 2^60, and the sum of four 2^62.
     fn torque(&self, state: &LawState, age: Micros) -> Torque {
-        // Errors continued at their rates, in 2^-20: at most 128 and half of what a rate may be.
-        let now = |error: i32, rate: i32| {
-            let rounded = (error >> 3).saturating_add(1) >> 1;
+        // Errors continued at their rates: at most 128 and half of what a rate may be.
+        let now = |error: I8F24, rate: I12F20| {
+            let rounded = I12F20::wrapping_from_num(error.saturating_add(HALF));
             rounded.saturating_add(per_second(rate, age))
         };
-        let term = |gain: i32, value: i32| i64::from(gain).wrapping_mul(i64::from(value));
-        let (e_y, e_theta) = (state.last.e_y.bits(), state.last.e_theta.bits());
-        let sum = term(self.e_y.bits(), now(e_y, state.e_y_rate))
-            .wrapping_add(term(self.e_y_rate.bits(), state.e_y_rate))
-            .wrapping_add(term(self.e_theta.bits(), now(e_theta, state.e_theta_rate)))
-            .wrapping_add(term(self.e_theta_rate.bits(), state.e_theta_rate));
-        Torque::from_wide(shift_round(sum, RATE_BITS))
+        let (e_y, e_theta) = (state.last.e_y.fixed(), state.last.e_theta.fixed());
+        let sum = (self.e_y.fixed().wide_mul(now(e_y, state.e_y_rate)))
+            .wrapping_add(self.e_y_rate.fixed().wide_mul(state.e_y_rate))
+            .wrapping_add(self.e_theta.fixed().wide_mul(now(e_theta, state.e_theta_rate)))
+            .wrapping_add(self.e_theta_rate.fixed().wide_mul(state.e_theta_rate));
+        Torque::from_wide(rounded(sum))
     }
 }
+
+/// Half a unit of a rate's format.
+const HALF: I8F24 = I8F24::from_bits(1 << 3);

@@ -12,8 +12,11 @@
 //! Not here: when a probe is allowed (the controller: in Active only), any limit (the envelope has the last
 //! word on the sum), and what the answer tells ([`crate::estimator`]).
 
+use fixed::types::I1F31;
+use fixed::types::extra::U30;
+
 use crate::law::sine::sine;
-use crate::quantity::{Micros, Torque, saturate, shift_round};
+use crate::quantity::{Micros, Torque, rounded, saturate};
 use crate::safety::redundant::words;
 
 words! {
@@ -38,7 +41,17 @@ words! {
 impl ProbeState {
     /// Silent.
     pub const SILENT: Self = Self { phase: 0, gain: 0 };
+
+    /// Whether it is silent, or a sixteenth of a turn about its rise through zero: where what the wheel answers to it by its inertia
+    /// is the same every time, and little.
+    #[must_use]
+    pub(crate) const fn is_passing_zero(&self) -> bool {
+        self.gain == 0 || self.phase.wrapping_add(SIXTEENTH >> 1) < SIXTEENTH
+    }
 }
+
+/// Of a turn: 25 ms at 2.5 Hz, so that the slowest sender of a driver torque has a message in it.
+pub const SIXTEENTH: u32 = 1 << 28;
 
 /// As the envelope's rate limits count it: two ticks.
 const MAX_ELAPSED_US: u32 = 2_000;
@@ -58,13 +71,11 @@ impl Probe {
             return None;
         }
         state.phase = state.phase.wrapping_add(advance);
-        // 31 bits of gain times 30 of the sine, then times 24 of the torque: each fits an i64.
-        let share = shift_round(
-            i64::from(state.gain >> 1).saturating_mul(i64::from(sine(state.phase))),
-            31,
-        );
-        let torque = i64::from(saturate(share)).saturating_mul(i64::from(self.amplitude.bits()));
-        Some(Torque::from_wide(shift_round(torque, 30)))
+        let gain = I1F31::from_bits((state.gain >> 1).cast_signed());
+        // No more than one.
+        let share = saturate(rounded::<_, U30>(gain.wide_mul(sine(state.phase))));
+        let torque = self.amplitude.fixed().wide_mul(share);
+        Some(Torque::from_wide(rounded(torque)))
     }
 }
 

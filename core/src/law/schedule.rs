@@ -48,8 +48,7 @@ impl Schedule {
         } else {
             (self.per_faster, self.fast)
         };
-        let away = speed.bits().saturating_sub(MIDDLE.bits()).saturating_abs();
-        let taken = product(per.bits(), away);
-        Ratio::from_wide(i64::from(Ratio::ONE.bits()).saturating_sub(taken)).max(least)
+        let taken = product(per.fixed(), speed.minus(MIDDLE).abs().fixed());
+        Ratio::ONE.minus(Ratio::from_wide(taken)).max(least)
     }
 }

@@ -1,110 +1,111 @@
-//! Products, shares and quotients of fixed-point values for a 32-bit core: nothing here takes a product of 128 bits or a
-//! division of 64.
+//! What `fixed` lacks, or does in more instructions: rounded products, shares of a second, quotients. Nothing here takes a
+//! product of 128 bits or a division of 64, which are a hundred instructions and more on a 32-bit core.
 
-use super::{FRAC_BITS, Micros};
+use fixed::types::extra::LeEqU64;
+use fixed::types::{I0F32, I8F24, I32F0, I40F24};
+use fixed::{FixedI32, FixedI64};
 
-/// `a * b` of two I8F24 values as I8F24 bits, rounded to nearest: within +-2^38.
-pub(crate) const fn product(a: i32, b: i32) -> i64 {
-    // At most 2^62 and half an LSB: nothing wraps.
-    (a as i64)
-        .wrapping_mul(b as i64)
-        .wrapping_add(1 << (FRAC_BITS - 1))
-        >> FRAC_BITS
+use super::Micros;
+
+/// With fewer fractional bits, rounded to nearest (ties away from minus infinity). Half a unit of the result more than
+/// `wide` fits its format too.
+pub(crate) const fn rounded<From: LeEqU64, To: LeEqU64>(wide: FixedI64<From>) -> FixedI64<To> {
+    let cut = From::U32.wrapping_sub(To::U32);
+    let half = 1_i64.wrapping_shl(cut.wrapping_sub(1));
+    FixedI64::from_bits(wide.to_bits().wrapping_add(half).wrapping_shr(cut))
+}
+
+/// The nearest of 32 bits: 7 instructions on a Cortex-M4, where `saturating_from_num` has 24.
+pub(crate) const fn saturate<Frac>(wide: FixedI64<Frac>) -> FixedI32<Frac> {
+    let near = wide.to_bits() as i32;
+    if near as i64 == wide.to_bits() {
+        FixedI32::from_bits(near)
+    } else if wide.to_bits() < 0 {
+        FixedI32::MIN
+    } else {
+        FixedI32::MAX
+    }
+}
+
+/// `a * b`, rounded to nearest: within +-2^14.
+pub(crate) const fn product(a: I8F24, b: I8F24) -> I40F24 {
+    rounded(a.wide_mul(b))
 }
 
 /// A share of a value, rounded to nearest. `share` is 0 to 1, so that the result is no larger than the value.
-pub(crate) const fn share_of(share: i32, value: i32) -> i32 {
-    product(share, value) as i32
+pub(crate) fn share_of(share: I8F24, value: I8F24) -> I8F24 {
+    I8F24::wrapping_from_num(product(share, value))
 }
 
-/// [`product`] rounded down, saturating.
-pub(crate) const fn product_below(a: i32, b: i32) -> i32 {
-    saturate((a as i64).wrapping_mul(b as i64) >> FRAC_BITS)
+/// [`product`] rounded down, saturating: 17 instructions, where `saturating_mul` has 28.
+pub(crate) fn product_below(a: I8F24, b: I8F24) -> I8F24 {
+    saturate(I40F24::wrapping_from_num(a.wide_mul(b)))
 }
 
 /// The same, held within +-`most`.
-pub(crate) const fn product_within(a: i32, b: i32, most: i32) -> i32 {
-    let (wide, most) = ((a as i64).wrapping_mul(b as i64) >> FRAC_BITS, most as i64);
-    if wide > most {
-        most as i32
-    } else if wide < most.wrapping_neg() {
-        most.wrapping_neg() as i32
-    } else {
-        wide as i32
-    }
+pub(crate) fn product_within(a: I8F24, b: I8F24, most: I8F24) -> I8F24 {
+    let (wide, most) = (I40F24::wrapping_from_num(a.wide_mul(b)), I40F24::from(most));
+    I8F24::wrapping_from_num(wide.min(most).max(most.wrapping_neg()))
 }
 
-/// The upper half of `a * b`, which a 32-bit core has in one instruction.
-pub(crate) const fn upper_product(a: i32, b: i32) -> i32 {
-    ((a as i64).wrapping_mul(b as i64) >> 32) as i32
+/// A [`product`] times a third factor, rounded down.
+pub(crate) fn product_of_three(product: I40F24, factor: I8F24) -> I40F24 {
+    // The product's whole part has 15 bits, so that neither term nor the sum wraps, and the first is exact.
+    let whole = factor.wide_mul(I32F0::wrapping_from_num(product));
+    let fraction = factor.wide_mul(I8F24::wrapping_from_num(product.frac()));
+    whole.wrapping_add(I40F24::wrapping_from_num(fraction))
 }
 
-/// `wide * factor`, saturating. `i64::saturating_mul` takes a product of 128 bits, which is a hundred instructions on a
-/// 32-bit core.
-pub(crate) const fn wide_product(wide: i64, factor: i32) -> i64 {
-    let factor = factor as i64;
-    // The usual case first.
-    if wide as i32 as i64 == wide {
-        return wide.wrapping_mul(factor);
-    }
-    // Nothing wraps: 32 bits times 31, then 31 times 31 and as much as 31 more.
-    let low = (wide as u32 as i64).wrapping_mul(factor);
-    let high = (wide >> 32).wrapping_mul(factor).wrapping_add(low >> 32);
-    if high as i32 as i64 == high {
-        (high << 32) | (low & 0xFFFF_FFFF)
-    } else if high < 0 {
-        i64::MIN
-    } else {
-        i64::MAX
-    }
-}
-
-/// `bits * span / 1 s`, rounded to nearest and saturated to an `i32`, for a span of at most [`LONGEST_US`]: 2^32 / 10^6 as
-/// a multiplier, 8e-6 of relative error.
+/// `value * span / 1 s`, rounded to nearest and saturated to what an I8F24 holds, for a span of at most [`LONGEST_US`]:
+/// 2^32 / 10^6 as a multiplier, 8e-6 of relative error.
 #[inline(always)]
-pub(crate) const fn per_second_times(bits: i64, span: Micros) -> i64 {
+pub(crate) fn per_second_times(value: I40F24, span: Micros) -> I40F24 {
     // The usual case first.
-    if bits as i32 as i64 == bits {
-        per_second(bits as i32, span) as i64
+    let near = I8F24::wrapping_from_num(value);
+    let share = if near == value {
+        per_second(near, span)
     } else {
-        wide_per_second(bits, span) as i64
-    }
+        wide_per_second(value.to_bits(), span)
+    };
+    I40F24::from(share)
 }
 
-const fn wide_per_second(bits: i64, span: Micros) -> i32 {
-    let share = share_of_second(span);
+fn wide_per_second(bits: i64, span: Micros) -> I8F24 {
+    let share = share_of_second(span).to_bits();
     // Nothing wraps: a share has 31 bits, and the lower product no sign.
     let low = (bits as u32 as u64)
         .wrapping_mul(share as u64)
         .wrapping_add(1 << 31)
         >> 32;
-    saturate((bits >> 32).wrapping_mul(share as i64).wrapping_add(low as i64))
+    let high = (bits >> 32).wrapping_mul(share as i64);
+    saturate(I40F24::from_bits(high.wrapping_add(low as i64)))
 }
 
-/// The same of 32 bits, which never saturates: at most half of them is left.
-pub(crate) const fn per_second(bits: i32, span: Micros) -> i32 {
-    let wide = (bits as i64).wrapping_mul(share_of_second(span) as i64);
-    (wide.wrapping_add(1 << 31) >> 32) as i32
+/// The same of 32 bits in any format, which never saturates: at most half of them is left.
+pub(crate) const fn per_second<Frac>(value: FixedI32<Frac>, span: Micros) -> FixedI32<Frac> {
+    let wide = I8F24::from_bits(value.to_bits()).wide_mul(share_of_second(span));
+    let near: I40F24 = rounded(wide);
+    FixedI32::from_bits(near.to_bits() as i32)
 }
 
-/// A leaking sum in 2^-24: `sum + change - sum*dt/(1 s)`.
-pub(crate) const fn leak(sum: i32, change: i32, dt: Micros) -> i32 {
+/// A leaking sum: `sum + change - sum*dt/(1 s)`.
+pub(crate) const fn leak(sum: I8F24, change: I8F24, dt: Micros) -> I8F24 {
     // What leaks is at most half of the sum.
     sum.wrapping_sub(per_second(sum, dt)).saturating_add(change)
 }
 
-/// The longest span that counts: half a second, less what would make a share of it more than an `i32` holds. So its
+/// The longest span that counts: half a second, less what would make a share of it more than an I0F32 holds. So its
 /// product with 32 bits is one instruction of a 32-bit core.
 const LONGEST_US: u32 = 499_996;
 
-/// A span as a share of a second in 2^-32, not quite half of one at most.
-const fn share_of_second(span: Micros) -> i32 {
+/// A span as a share of a second, not quite half of one at most.
+const fn share_of_second(span: Micros) -> I0F32 {
     let us = if span.us() > LONGEST_US {
         LONGEST_US
     } else {
         span.us()
     };
-    us.wrapping_mul(4295) as i32
+    I0F32::from_bits(us.wrapping_mul(4295) as i32)
 }
 
 /// `dividend / divisor`, rounded down, saturating; 0 for a divisor of zero. A long division with two digits of 16 bits:
@@ -154,28 +155,10 @@ pub(crate) const fn signed_quotient(dividend: i64, divisor: u32) -> i32 {
     if dividend < 0 { size.wrapping_neg() } else { size }
 }
 
-/// Nearest `i32`, saturating.
-pub(crate) const fn saturate(wide: i64) -> i32 {
-    if wide as i32 as i64 == wide {
-        wide as i32
-    } else if wide < 0 {
-        i32::MIN
-    } else {
-        i32::MAX
-    }
-}
-
-/// `value / 2^shift`, rounded to nearest (ties away from minus infinity). `shift` is 1 to 62, and half of its unit more
-/// than `value` is an `i64` too.
-pub(crate) const fn shift_round(value: i64, shift: u32) -> i64 {
-    value
-        .wrapping_add(1_i64.wrapping_shl(shift.wrapping_sub(1)))
-        .wrapping_shr(shift)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fixed::types::extra::{U20, U44};
 
     /// xorshift64*, seeded: words whose sizes are spread evenly over the powers of two, of both signs, and their edges.
     struct Numbers(u64);
@@ -202,47 +185,55 @@ mod tests {
 
     const CASES: u32 = 1_000_000;
 
+    /// As many bits of 2^-24.
+    fn narrow(bits: i32) -> I8F24 {
+        I8F24::from_bits(bits)
+    }
+
     /// Plain formulas in 128 bits, which no target computes with.
     #[test]
     fn products_are_those_of_128_bits() {
         let mut numbers = Numbers(1);
         for _ in 0..CASES {
-            let (wide, factor) = (numbers.any() as i64, numbers.any() as i32);
-            let exact = i128::from(wide) * i128::from(factor);
-            let expected = exact.clamp(i64::MIN.into(), i64::MAX.into());
-            assert_eq!(
-                i128::from(wide_product(wide, factor)),
-                expected,
-                "{wide} {factor}"
-            );
-            let narrow = wide as i32;
-            let exact = i128::from(narrow) * i128::from(factor);
+            let (a, b) = (numbers.any() as i32, numbers.any() as i32);
+            let exact = i128::from(a) * i128::from(b);
             let rounded = (exact + (1 << 23)).div_euclid(1 << 24);
-            assert_eq!(i128::from(product(narrow, factor)), rounded, "{narrow} {factor}");
-            let share = narrow.clamp(0, 1 << 24);
-            let exact_share = i128::from(share) * i128::from(factor);
-            let rounded = (exact_share + (1 << 23)).div_euclid(1 << 24);
-            assert_eq!(i128::from(share_of(share, factor)), rounded, "{share} {factor}");
+            let product = product(narrow(a), narrow(b));
+            assert_eq!(i128::from(product.to_bits()), rounded, "{a} {b}");
+            let third = numbers.any() as i32;
+            let expected = (rounded * i128::from(third)).div_euclid(1 << 24);
+            let found = product_of_three(product, narrow(third));
+            assert_eq!(i128::from(found.to_bits()), expected, "{a} {b} {third}");
+            let share = a.clamp(0, 1 << 24);
+            let rounded = (i128::from(share) * i128::from(b) + (1 << 23)).div_euclid(1 << 24);
+            let found = share_of(narrow(share), narrow(b));
+            assert_eq!(i128::from(found.to_bits()), rounded, "{share} {b}");
             let below = exact.div_euclid(1 << 24);
             let below = below.clamp(i32::MIN.into(), i32::MAX.into());
-            assert_eq!(
-                i128::from(product_below(narrow, factor)),
-                below,
-                "{narrow} {factor}"
-            );
+            let found = product_below(narrow(a), narrow(b));
+            assert_eq!(i128::from(found.to_bits()), below, "{a} {b}");
             let most = numbers.any() as i32 & i32::MAX;
             let within = below.clamp(-i128::from(most), most.into());
+            let found = product_within(narrow(a), narrow(b), narrow(most));
+            assert_eq!(i128::from(found.to_bits()), within, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn what_is_rounded_or_saturated_is_that_of_128_bits() {
+        let mut numbers = Numbers(4);
+        for _ in 0..CASES {
+            let bits = numbers.any() as i64;
+            let expected = bits.clamp(i32::MIN.into(), i32::MAX.into());
             assert_eq!(
-                i128::from(product_within(narrow, factor, most)),
-                within,
-                "{narrow} {factor}"
+                i64::from(saturate(I40F24::from_bits(bits)).to_bits()),
+                expected,
+                "{bits}"
             );
-            let upper = exact.div_euclid(1 << 32);
-            assert_eq!(
-                i128::from(upper_product(narrow, factor)),
-                upper,
-                "{narrow} {factor}"
-            );
+            let wide = bits >> 1;
+            let near: FixedI64<U20> = rounded(FixedI64::<U44>::from_bits(wide));
+            let expected = (i128::from(wide) + (1 << 23)).div_euclid(1 << 24);
+            assert_eq!(i128::from(near.to_bits()), expected, "{wide}");
         }
     }
 
@@ -260,13 +251,11 @@ mod tests {
             let share = 4295 * i128::from(us.min(LONGEST_US));
             let exact = |bits: i128| (bits * share + (1 << 31)).div_euclid(1 << 32);
             let expected = exact(bits.into()).clamp(i32::MIN.into(), i32::MAX.into());
-            assert_eq!(i128::from(per_second_times(bits, span)), expected, "{bits} {us}");
-            let narrow = bits as i32;
-            assert_eq!(
-                i128::from(per_second(narrow, span)),
-                exact(narrow.into()),
-                "{narrow} {us}"
-            );
+            let found = per_second_times(I40F24::from_bits(bits), span).to_bits();
+            assert_eq!(i128::from(found), expected, "{bits} {us}");
+            let bits = bits as i32;
+            let found = per_second(narrow(bits), span).to_bits();
+            assert_eq!(i128::from(found), exact(bits.into()), "{bits} {us}");
         }
     }
 

@@ -1,10 +1,13 @@
 //! Physical quantities in fixed point, one type each; the one file where SI values become bits.
 //!
-//! All signed quantities share one format, I8F24: 24 fractional bits, LSB 2^-24 (6e-8), range
+//! All signed quantities share one format, `fixed`'s I8F24: 24 fractional bits, LSB 2^-24 (6e-8), range
 //! -128..+127.99999994 in the SI unit. That holds +-4 m of lateral error, +-20 rad of wheel angle and
 //! +-32 N.m of driver torque with a resolution far below any sensor's, and a product of two of them fits
-//! an `i64`. Conversions from SI round to nearest and saturate at the ends of the range (NaN becomes 0):
+//! 64 bits. Conversions from SI round to nearest and saturate at the ends of the range (NaN becomes 0):
 //! an extreme input must stay extreme, never wrap.
+//!
+//! Products, sums and changes of the format are those of the package `fixed`, on the bare value
+//! (`Metres::fixed`). What it lacks, or does in more instructions on a 32-bit core, is in `arithmetic.rs`.
 //!
 //! Not here: ranges that make sense for a signal. Those belong to the bus messages and the parameters.
 
@@ -19,10 +22,12 @@ mod arithmetic;
 
 use core::fmt;
 
+use fixed::types::{I8F24, I32F0, I40F24};
+
 use crate::safety::redundant::Words;
 pub(crate) use arithmetic::{
-    leak, per_second, per_second_times, product, product_below, product_within, quotient, saturate, share_of,
-    shift_round, signed_quotient, upper_product, wide_product,
+    leak, per_second, per_second_times, product, product_below, product_of_three, product_within, quotient,
+    rounded, saturate, share_of, signed_quotient,
 };
 
 macro_rules! quantity {
@@ -30,15 +35,16 @@ macro_rules! quantity {
         $(#[$doc])*
         /// Format I8F24: LSB 2^-24, range -128 to 128 (exclusive).
         #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-        pub struct $name(i32);
+        pub struct $name(I8F24);
 
+        #[allow(dead_code, reason = "not every quantity is computed with in every way")]
         impl $name {
             /// Zero.
-            pub const ZERO: Self = Self(0);
+            pub const ZERO: Self = Self(I8F24::ZERO);
             /// The least value, -128.
-            pub const MIN: Self = Self(i32::MIN);
+            pub const MIN: Self = Self(I8F24::MIN);
             /// The largest value, 128 - 2^-24.
-            pub const MAX: Self = Self(i32::MAX);
+            pub const MAX: Self = Self(I8F24::MAX);
 
             #[doc = concat!("From ", $unit, ": rounds to nearest, saturates at the ends of the range.")]
             #[must_use]
@@ -49,19 +55,20 @@ macro_rules! quantity {
             #[doc = concat!("The value in ", $unit, " (exact).")]
             #[must_use]
             pub const fn $get(self) -> f64 {
-                self.0 as f64 / ONE as f64
+                self.bits() as f64 / ONE as f64
             }
 
             /// As f32, rounded to nearest: for what is advisory only.
             #[must_use]
             pub const fn to_f32(self) -> f32 {
-                self.0 as f32 * (1.0 / ONE as f32)
+                self.bits() as f32 * (1.0 / ONE as f32)
             }
 
             /// So many times itself, saturating: from counts of a converter, itself being one of them.
             #[must_use]
             pub const fn times(self, count: i32) -> Self {
-                Self::from_wide((self.bits() as i64).saturating_mul(count as i64))
+                // 8 instructions of a Cortex-M4; `saturating_mul_int` has 14.
+                Self(saturate(self.0.wide_mul(I32F0::from_bits(count))))
             }
 
             /// How many times it holds `part`, which is above zero; toward zero. To counts of a converter.
@@ -70,17 +77,66 @@ macro_rules! quantity {
                 self.bits().saturating_div(part.bits().max(1))
             }
 
-            pub(crate) const fn from_bits(bits: i32) -> Self {
-                Self(bits)
+            /// The magnitude. The least value saturates.
+            #[must_use]
+            pub const fn abs(self) -> Self {
+                if self.0.is_negative() {
+                    self.opposite()
+                } else {
+                    self
+                }
             }
 
-            /// From a count of 2^-24, saturating.
-            pub(crate) const fn from_wide(bits: i64) -> Self {
-                Self::from_bits(saturate(bits))
+            /// The sum, saturating.
+            #[must_use]
+            pub const fn plus(self, other: Self) -> Self {
+                Self(self.0.saturating_add(other.0))
+            }
+
+            /// The difference, saturating.
+            #[must_use]
+            pub const fn minus(self, other: Self) -> Self {
+                Self(self.0.saturating_sub(other.0))
+            }
+
+            /// As much the other way. The least value saturates.
+            #[must_use]
+            pub const fn opposite(self) -> Self {
+                // One instruction of a Cortex-M4; `saturating_neg` has five.
+                Self::ZERO.minus(self)
+            }
+
+            /// Whether it is no further than `most` from another.
+            #[must_use]
+            pub(crate) fn is_near(self, other: Self, most: Self) -> bool {
+                self.0.unsigned_dist(other.0) <= most.0.unsigned_abs()
+            }
+
+            /// The nearest within +-`most`, which is not negative.
+            #[must_use]
+            pub(crate) fn within(self, most: Self) -> Self {
+                self.min(most).max(most.opposite())
+            }
+
+            pub(crate) const fn from_fixed(value: I8F24) -> Self {
+                Self(value)
+            }
+
+            /// Saturating.
+            pub(crate) fn from_wide(value: I40F24) -> Self {
+                Self(saturate(value))
+            }
+
+            pub(crate) const fn fixed(self) -> I8F24 {
+                self.0
+            }
+
+            pub(crate) const fn from_bits(bits: i32) -> Self {
+                Self(I8F24::from_bits(bits))
             }
 
             pub(crate) const fn bits(self) -> i32 {
-                self.0
+                self.0.to_bits()
             }
         }
 
@@ -92,19 +148,17 @@ macro_rules! quantity {
 
         impl Words for $name {
             fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
-                Self::from_bits(self.bits().map_words(change))
+                Self(self.0.map_words(change))
             }
 
             fn agreement(&self, other: &Self) -> u32 {
-                self.bits().agreement(&other.bits())
+                self.0.agreement(&other.0)
             }
         }
     };
 }
 
-/// Fractional bits of every signed quantity.
-pub(crate) const FRAC_BITS: u32 = 24;
-const ONE: i64 = 1 << FRAC_BITS;
+const ONE: i32 = I8F24::ONE.to_bits();
 
 quantity!(
     /// A length, m.
@@ -122,26 +176,6 @@ quantity!(
     /// A torque on the steering column, N.m, positive turns left.
     Torque, from_nm, nm, "newton metres"
 );
-
-impl Torque {
-    /// The magnitude. The most negative value saturates.
-    #[must_use]
-    pub const fn abs(self) -> Self {
-        Self(self.0.saturating_abs())
-    }
-
-    /// The sum, saturating.
-    #[must_use]
-    pub const fn plus(self, other: Self) -> Self {
-        Self(self.0.saturating_add(other.0))
-    }
-
-    /// The torque of opposite direction. The most negative value saturates.
-    #[must_use]
-    pub const fn opposite(self) -> Self {
-        Self(self.0.saturating_neg())
-    }
-}
 
 quantity!(
     /// A rate of a torque, N.m/s.
@@ -202,7 +236,7 @@ quantity!(
 
 impl Ratio {
     /// One.
-    pub const ONE: Self = Self::from_bits(1 << FRAC_BITS);
+    pub const ONE: Self = Self(I8F24::ONE);
 
     /// From f32: truncates, saturates, NaN becomes 0.
     pub(crate) const fn from_f32(si: f32) -> Self {

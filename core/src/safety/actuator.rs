@@ -14,7 +14,9 @@
 //! silent column into a faulty motor. Not kept twice: a flip here raises a fault or hides one until the next few
 //! samples; fixed arrays, so that it can do nothing else.
 
-use crate::quantity::{Torque, upper_product};
+use fixed::types::{I0F32, I8F24};
+
+use crate::quantity::Torque;
 
 /// Sensor error and ripple of a motor torque.
 const MARGIN: Torque = Torque::from_nm(0.1);
@@ -89,9 +91,10 @@ impl Actuator {
                 (self.astray, self.weak) = (0, 0);
                 return Motor::Obeys;
             }
-            let error = |t: Torque| Torque::from_bits(t.abs().bits() >> ERROR_SHIFT).plus(MARGIN);
+            let error =
+                |t: Torque| Torque::from_fixed(t.abs().fixed().wrapping_shr(ERROR_SHIFT)).plus(MARGIN);
             let above = |t: Torque| self.delivered > t.plus(error(t));
-            let below = |t: Torque| self.delivered < t.plus(error(t).opposite());
+            let below = |t: Torque| self.delivered < t.minus(error(t));
             let is_astray = above(self.high.max(Torque::ZERO)) || below(self.low.min(Torque::ZERO));
             let is_weak = !is_astray && (above(self.high) || below(self.low));
             let count = |so_far: u32, goes_on: bool| if goes_on { so_far.saturating_add(1) } else { 0 };
@@ -111,8 +114,9 @@ impl Actuator {
 /// An end of the band, a step of 1 ms on its way back to the command: 3/64 of it, a lag of 21 ms. Rounded down, so that it
 /// never passes the command.
 fn lagging(end: Torque, command: Torque) -> Torque {
-    const SHARE: i32 = 3 << (32 - 6);
+    const SHARE: I0F32 = I0F32::from_bits(3 << (32 - 6));
     // Nothing wraps: a frame has room for commands of 5 N.m, and the ends lie between commands.
-    let way = command.bits().wrapping_sub(end.bits());
-    Torque::from_bits(end.bits().wrapping_add(upper_product(way, SHARE)))
+    let way = command.fixed().wrapping_sub(end.fixed());
+    let back = I8F24::wrapping_from_num(way.wide_mul(SHARE));
+    Torque::from_fixed(end.fixed().wrapping_add(back))
 }

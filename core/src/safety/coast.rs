@@ -30,12 +30,12 @@ const ALONG: Radians = Radians::from_rad(0.2);
 /// Change of trust in a second without a picture: as a handover falls.
 pub const BLIND_FALL: Ratio = Ratio::from_si(-0.5);
 /// With pictures of a line elsewhere it is as fast as a fade of 2 N.m; and with pictures that agree.
-const APART_FALL: i32 = Ratio::from_si(-2.0).bits();
-const RISE: i32 = Ratio::from_si(1.0).bits();
+const APART_FALL: Ratio = Ratio::from_si(-2.0);
+const RISE: Ratio = Ratio::ONE;
 
 /// What the lane that goes on asks for may move away from what the last picture asked for, in 2^-24 N.m per microsecond: not
 /// quite 1 N.m/s, by which the monitor's band grows. A vehicle that is thrown aside must not end in its veto.
-pub const AWAY_PER_US: i32 = 16;
+pub const AWAY_PER_US: Torque = Torque::from_bits(16);
 /// The lane goes on by so much at a time.
 pub const EXTRAPOLATION_PERIOD: Micros = Micros::from_ms(10);
 
@@ -63,11 +63,11 @@ words! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PictureVerdict {
     /// The line, where it must be.
-    SameLine,
+    Expected,
     /// A line that is taken in its place.
-    NewLine,
+    Adopted,
     /// A line elsewhere.
-    OtherLine,
+    Elsewhere,
 }
 
 impl Coast {
@@ -108,9 +108,9 @@ impl Coast {
             return demanded;
         }
         let lost_us = self.lost.min(MOST_BLIND).us().cast_signed();
-        let away = Torque::from_bits(lost_us.saturating_mul(AWAY_PER_US));
+        let away = AWAY_PER_US.times(lost_us);
         demanded
-            .max(self.demanded.plus(away.opposite()))
+            .max(self.demanded.minus(away))
             .min(self.demanded.plus(away))
     }
 
@@ -134,20 +134,19 @@ impl Coast {
     ) -> PictureVerdict {
         if agrees && self.lost <= MOST_BLIND {
             self.sight = SEES;
-            return PictureVerdict::SameLine;
+            return PictureVerdict::Expected;
         }
-        let is_near = sample.e_y.bits().unsigned_abs() <= NEAR.bits().unsigned_abs()
-            && sample.e_theta.bits().unsigned_abs() <= ALONG.bits().unsigned_abs();
+        let is_near = sample.e_y.abs() <= NEAR && sample.e_theta.abs() <= ALONG;
         if self.trust == Ratio::ZERO && is_near {
             *self = Self {
                 trust: Ratio::ZERO,
                 ..Self::NEW
             };
-            return PictureVerdict::NewLine;
+            return PictureVerdict::Adopted;
         }
         self.picture_missing(demanded);
         self.sight = APART;
-        PictureVerdict::OtherLine
+        PictureVerdict::Elsewhere
     }
 
     /// Time passes.
@@ -156,14 +155,10 @@ impl Coast {
         let (per_s, blind, lost) = match self.sight {
             SEES => (RISE, blind.saturating_sub(us >> 1), 0),
             APART => (APART_FALL, blind, lost.saturating_add(us)),
-            _ => (
-                BLIND_FALL.bits(),
-                blind.saturating_add(us),
-                lost.saturating_add(us),
-            ),
+            _ => (BLIND_FALL, blind.saturating_add(us), lost.saturating_add(us)),
         };
         (self.blind, self.lost) = (Micros::from_us(blind), Micros::from_us(lost));
-        let trust = self.trust.bits().saturating_add(per_second(per_s, elapsed));
-        self.trust = Ratio::from_bits(trust).max(Ratio::ZERO).min(Ratio::ONE);
+        let change = Ratio::from_fixed(per_second(per_s.fixed(), elapsed));
+        self.trust = self.trust.plus(change).max(Ratio::ZERO).min(Ratio::ONE);
     }
 }

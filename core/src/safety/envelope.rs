@@ -126,7 +126,7 @@ impl Envelope {
     #[cold]
     pub fn distrusted(&self) -> Self {
         Self {
-            reduction: TorqueRate::from_bits(self.reduction.bits().saturating_mul(DISTRUSTED)),
+            reduction: self.reduction.times(DISTRUSTED),
             ..*self
         }
     }
@@ -170,18 +170,18 @@ impl Envelope {
     /// Growth against lateral jerk, reduction against the hole that a sudden loss tears into the steering.
     fn hold_rates(&self, command: &mut (Torque, LimitReason), at: &Situation) {
         let elapsed = at.elapsed.min(MAX_ELAPSED);
-        let step = |rate: TorqueRate| Torque::from_bits(per_second(rate.bits(), elapsed));
+        let step = |rate: TorqueRate| Torque::from_fixed(per_second(rate.fixed(), elapsed));
         let growth = step(self.wind_up);
-        let fall = step(self.reduction).plus(ROUNDING.opposite()).max(Torque::ZERO);
+        let fall = step(self.reduction).minus(ROUNDING).max(Torque::ZERO);
         // Judged in the frame where the applied torque is positive.
-        let mirror = at.applied.bits().is_negative();
+        let mirror = at.applied < Torque::ZERO;
         let turn = |t: Torque| if mirror { t.opposite() } else { t };
         let applied = at.applied.abs();
         let mut turned = (turn(command.0), command.1);
         let high = applied.plus(growth);
         hold(&mut turned, Torque::MIN, high, LimitReason::WindUp);
         if applied > fall {
-            let low = applied.plus(fall.opposite());
+            let low = applied.minus(fall);
             hold(&mut turned, low, Torque::MAX, LimitReason::Reduction);
         } else {
             // Across zero: the old torque can fall to zero in this step, and the new one grows from there.
@@ -199,11 +199,10 @@ impl Envelope {
             if margin >= Torque::ZERO {
                 return self.absolute;
             }
-            let shrunk =
-                i64::from(self.absolute.bits()).saturating_add(product(OVERRIDE_SLOPE.bits(), margin.bits()));
+            let shrunk = Torque::from_wide(product(OVERRIDE_SLOPE.fixed(), margin.fixed()));
             // Between nothing, which leaves the wheel to the driver, and L, which is the limit anyway. Not
             // `clamp`, which panics where its bounds are out of order.
-            Torque::from_wide(shrunk.min(i64::from(self.absolute.bits())).max(0))
+            self.absolute.plus(shrunk).min(self.absolute).max(Torque::ZERO)
         };
         (bound(driver.opposite()).opposite(), bound(driver))
     }

@@ -1,4 +1,4 @@
-//! What can be wrong, and its short history on the ECU.
+//! The faults that the ECU declares, and their history since power-up.
 //!
 //! [`faults!`](self) below is the one list of faults. One more fault is one more line of it, with the next free code;
 //! its class decides what the ECU does. `core/tests/dbc.rs` then asks for its names in `core/haptic.dbc`, and
@@ -51,7 +51,7 @@ macro_rules! faults {
                 }
             }
 
-            /// For how long it may have been there before it is declared, beside the age of its input.
+            /// For how long it may have acted before it is declared, beside the age of its input.
             #[must_use]
             pub const fn unseen(self) -> Micros {
                 match self {
@@ -74,7 +74,7 @@ macro_rules! faults {
 faults! {
     /// B: no usable lane preview for 30 ms, or for 1 s more of guidance.
     0 LaneTimeout: B, 0;
-    /// B: the lane preview's sender does not vouch for it.
+    /// B: the camera marks its preview as not valid.
     1 LaneInvalid: B, 0;
     /// B: the lateral error does not move as yaw error, wheel and speed say it must.
     2 LaneImplausible: B, 10_000;
@@ -86,7 +86,7 @@ faults! {
     5 SpeedTimeout: B, 0;
     /// B: the two speeds differ by 2 m/s or more.
     6 SpeedImplausible: B, 800;
-    /// B: no usable command for 30 ms.
+    /// B: no usable request for 30 ms.
     7 RequestTimeout: B, 0;
     /// C: steps late or missing.
     8 Deadline: C, 0;
@@ -220,19 +220,19 @@ impl FaultSet {
         self.insert_if(present, fault);
     }
 
-    /// What is in both.
+    /// The faults in both sets.
     #[must_use]
     pub const fn common(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
-    /// All of both.
+    /// The faults in either set.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// What is here and not in `other`.
+    /// The faults of this set that are not in `other`.
     #[must_use]
     pub const fn difference(self, other: Self) -> Self {
         Self(self.0 & !other.0)
@@ -262,12 +262,12 @@ pub struct Record {
 /// Not kept twice: it moves nothing. Fixed arrays, so that a flipped bit can only spoil a count or an age.
 #[derive(Debug, Clone)]
 pub struct FaultHistory {
-    /// How often, by fault.
+    /// How often each fault appeared.
     counts: [u8; Fault::COUNT],
-    /// In which second, by fault. A step counts one second on, and no age.
+    /// The second in which each fault last appeared.
     seen_s: [u32; Fault::COUNT],
     present: FaultSet,
-    /// Appeared since power-up.
+    /// Every fault that appeared since power-up.
     ever: FaultSet,
     /// Whole seconds since power-up, saturating: no instant that could outlive a wrap of the clock.
     seconds: u32,

@@ -7,6 +7,8 @@
 //! [`crate::law`], so that a flip moves the torque by less than the monitor's band; what the checks take can declare
 //! or hide a fault for one second.
 
+use fixed::types::{I8F24, I22F10, I40F24};
+
 use crate::quantity::{Instant, Micros, Radians, TurningRate, per_second, saturate, signed_quotient};
 
 /// A power of two, so that the place is a mask.
@@ -20,14 +22,14 @@ const BEND: usize = 15;
 
 /// The time over which the rate before a sample is taken, and how often it is in a second.
 const BEFORE: Micros = Micros::from_ms(50);
-const BEFORE_PER_S: i64 = 20;
+const BEFORE_PER_S: i32 = 20;
 
 /// The vehicle's heading at an instant, and the rate at which it turned from there.
 #[derive(Debug, Clone, Copy)]
 pub struct Heading {
     at: Instant,
     /// Against where it was when the ECU started, modulo 256 rad.
-    psi: i32,
+    psi: I8F24,
     /// The rate of turn.
     pub rate: TurningRate,
 }
@@ -35,14 +37,25 @@ pub struct Heading {
 impl Heading {
     const NONE: Self = Self {
         at: Instant::from_us(0),
-        psi: 0,
+        psi: I8F24::ZERO,
         rate: TurningRate::ZERO,
     };
 
+    /// The same at an instant before it, if it turned as fast before: for half a second at most.
+    #[cold]
+    fn earlier(&self, at: Instant) -> Self {
+        let turned = per_second(self.rate.fixed(), self.at.since(at));
+        Self {
+            at,
+            psi: self.psi.wrapping_sub(turned),
+            rate: self.rate,
+        }
+    }
+
     /// The heading at an instant not before this one.
-    fn psi_at(&self, at: Instant) -> i32 {
+    fn psi_at(&self, at: Instant) -> I8F24 {
         self.psi
-            .wrapping_add(per_second(self.rate.bits(), at.since(self.at)))
+            .wrapping_add(per_second(self.rate.fixed(), at.since(self.at)))
     }
 }
 
@@ -52,7 +65,7 @@ pub struct MotionHistory {
     headings: [Heading; RING],
     newest: usize,
     /// Directions of the line at the far point, in the frame of the headings.
-    lines: [(Instant, i32); RING],
+    lines: [(Instant, I8F24); RING],
     last_line: usize,
     /// How many of them count.
     known_lines: usize,
@@ -65,7 +78,7 @@ impl MotionHistory {
         Self {
             headings: [Heading::NONE; RING],
             newest: 0,
-            lines: [(Instant::from_us(0), 0); RING],
+            lines: [(Instant::from_us(0), I8F24::ZERO); RING],
             last_line: 0,
             known_lines: 0,
         }
@@ -79,14 +92,14 @@ impl MotionHistory {
         self.headings[self.newest % RING] = Heading { at: now, psi, rate };
     }
 
-    /// The heading known last before an instant, or the oldest.
+    /// The heading known last before an instant, or that of then if the vehicle turned as it did at the oldest.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     #[must_use]
     pub fn heading(&self, now: Instant, at: Instant) -> Heading {
         let age = now.since(at);
         let place = |back: usize| &self.headings[self.newest.wrapping_sub(back) % RING];
         let found = (0..RING).map(place).find(|heading| now.since(heading.at) >= age);
-        *found.unwrap_or_else(|| place(RING.wrapping_sub(1)))
+        found.map_or_else(|| place(RING.wrapping_sub(1)).earlier(at), |heading| *heading)
     }
 
     /// How far the vehicle turned from an instant until now, and the rate at which it turned before then: over 50 ms, the
@@ -97,14 +110,14 @@ impl MotionHistory {
         let turned = self.heading(now, now).psi_at(now).wrapping_sub(then.psi_at(from));
         let earlier = from.before(BEFORE);
         let before = self.heading(now, earlier).psi_at(earlier);
-        let rate = i64::from(then.psi_at(from).wrapping_sub(before)).saturating_mul(BEFORE_PER_S);
-        (Radians::from_bits(turned), TurningRate::from_wide(rate))
+        let rate = TurningRate::from_fixed(then.psi_at(from).wrapping_sub(before)).times(BEFORE_PER_S);
+        (Radians::from_fixed(turned), rate)
     }
 
     /// The direction of the line at the far point, `e_theta` from the vehicle's heading at `at`.
     #[expect(clippy::indexing_slicing, reason = "a place is modulo the ring")]
     pub fn record_line(&mut self, now: Instant, at: Instant, e_theta: Radians) {
-        let direction = self.heading(now, at).psi_at(at).wrapping_add(e_theta.bits());
+        let direction = self.heading(now, at).psi_at(at).wrapping_add(e_theta.fixed());
         if self.known_lines == 0 || at.since(self.lines[self.last_line % RING].0) >= APART {
             self.last_line = self.last_line.wrapping_add(1);
             self.lines[self.last_line % RING] = (at, direction);
@@ -143,10 +156,11 @@ impl MotionHistory {
             .checked_div(span)
             .unwrap_or(0)
             .min(1 << 10);
-        let way = i64::from(next.wrapping_sub(direction)).saturating_mul(i64::from(share)) >> 10;
+        let share = I22F10::from_bits(share.cast_signed());
+        let way = I40F24::wrapping_from_num(next.wrapping_sub(direction).wide_mul(share));
         let direction = direction.wrapping_add(saturate(way));
         let psi = self.heading(now, at).psi_at(at);
-        Some(Radians::from_bits(direction.wrapping_sub(psi)))
+        Some(Radians::from_fixed(direction.wrapping_sub(psi)))
     }
 
     /// By how much the direction of the line at the far point changes, against the vehicle's heading, from one instant to a
@@ -157,11 +171,11 @@ impl MotionHistory {
         let place = |back: usize| self.lines[self.last_line.wrapping_sub(back) % RING];
         let (newest, direction) = place(0);
         let (oldest, before) = place(self.known_lines.saturating_sub(1).min(BEND));
-        let bent = i64::from(direction.wrapping_sub(before)).saturating_mul(1_000_000);
-        let rate = signed_quotient(bent, newest.since(oldest).us());
+        let bent = i64::from(direction.wrapping_sub(before).to_bits()).saturating_mul(1_000_000);
+        let rate = I8F24::from_bits(signed_quotient(bent, newest.since(oldest).us()));
         let psi = |at: Instant| self.heading(now, at).psi_at(at);
         let turned = psi(to).wrapping_sub(psi(from));
-        Radians::from_bits(per_second(rate, to.since(from)).saturating_sub(turned))
+        Radians::from_fixed(per_second(rate, to.since(from)).saturating_sub(turned))
     }
 
     /// The line was lost.

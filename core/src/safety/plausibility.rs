@@ -29,12 +29,13 @@
 //! Honest driving, the participants of the paper's tables 5 and 6 and lane changes of 1 m/s at 40 to
 //! 120 km/h stay below the margins (`tests/plausibility.rs` prints by how much).
 
+use fixed::types::{I0F32, I8F24, I40F24};
+
 use crate::law::LaneSample;
 use crate::quantity::{
-    AngularImpulse, CurvaturePerAngle, FRAC_BITS, Instant, Metres, Micros, Radians, Seconds, Speed,
+    AngularImpulse, CurvaturePerAngle, Instant, Metres, Micros, Radians, Ratio, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
-    leak, per_second, product, product_below, product_within, saturate, signed_quotient, upper_product,
-    wide_product,
+    leak, per_second, product, product_below, product_of_three, product_within, saturate, signed_quotient,
 };
 use crate::safety::motion_history::MotionHistory;
 use crate::safety::redundant::words;
@@ -151,8 +152,7 @@ impl PlausibilityState {
         if self.motion.has_yaw_rate != 0 {
             self.motion.yaw_rate
         } else {
-            let more = self.motion.yaw.bias.bits();
-            TurningRate::from_bits(self.turning_by_wheel().bits().saturating_add(more))
+            self.turning_by_wheel().plus(self.motion.yaw.bias)
         }
     }
 
@@ -172,7 +172,19 @@ impl PlausibilityState {
 
     /// How fast the wheel angle lets the vehicle turn where nothing pushes it.
     fn turning_by_wheel(&self) -> TurningRate {
-        TurningRate::from_wide(product(self.motion.turning_gain.bits(), self.column.wheel.bits()))
+        TurningRate::from_wide(product(
+            self.motion.turning_gain.fixed(),
+            self.column.wheel.fixed(),
+        ))
+    }
+
+    /// How long ago the column was checked last; no time if that is not known.
+    pub(crate) fn since_column(&self, now: Instant) -> Micros {
+        if self.column.is_known != 0 {
+            now.since(self.column.at)
+        } else {
+            Micros::from_us(0)
+        }
     }
 
     /// Takes a wheel angle that is not checked yet.
@@ -213,11 +225,10 @@ impl PlausibilityState {
     }
 
     /// What of a predicted movement was not seen, positive in its direction; negative where more was seen than was predicted.
-    /// 2^-24 m.
-    fn missing(&self, predicted: i32) -> i32 {
-        let missing = predicted.saturating_sub(self.lane.seen.bits());
-        if predicted.is_negative() {
-            missing.saturating_neg()
+    fn missing(&self) -> Metres {
+        let missing = self.lane.predicted.minus(self.lane.seen);
+        if self.lane.predicted < Metres::ZERO {
+            missing.opposite()
         } else {
             missing
         }
@@ -262,46 +273,46 @@ const SPEED_SPREAD: Speed = Speed::from_m_per_s(2.0);
 /// Whether a new lane sample is no further from the last than a vehicle can move.
 #[must_use]
 pub fn lane_step_is_possible(last: &LaneSample, new: &LaneSample) -> bool {
-    last.e_y.bits().abs_diff(new.e_y.bits()) <= LANE_STEP.bits().unsigned_abs()
-        && last.e_theta.bits().abs_diff(new.e_theta.bits()) <= YAW_STEP.bits().unsigned_abs()
+    last.e_y.is_near(new.e_y, LANE_STEP) && last.e_theta.is_near(new.e_theta, YAW_STEP)
 }
 
 /// Whether a speed follows from the last one, which has been held for so long.
 #[must_use]
 pub fn speed_step_is_possible(last: Speed, new: Speed, held: Micros) -> bool {
-    let braked = per_second(BRAKES.bits(), held);
-    last.bits().abs_diff(new.bits()) <= SPEED_STEP.bits().saturating_add(braked).unsigned_abs()
+    let braked = Speed::from_fixed(per_second(BRAKES.fixed(), held));
+    last.is_near(new, SPEED_STEP.plus(braked))
 }
 
 /// Whether two sources of speed agree: less than 2 m/s apart.
 #[must_use]
 pub fn speeds_agree(a: Speed, b: Speed) -> bool {
-    a.bits().abs_diff(b.bits()) < SPEED_SPREAD.bits().unsigned_abs()
+    a.fixed().unsigned_dist(b.fixed()) < SPEED_SPREAD.fixed().unsigned_abs()
 }
 
 /// What a lane may miss of the motion predicted within a second.
 pub const LANE_MARGIN: Metres = Metres::from_m(0.4);
 /// What torques may lack on the column within a second.
 pub const COLUMN_MARGIN: AngularImpulse = AngularImpulse::from_nm_s(0.6);
-/// So far within a second no vehicle goes beyond what its yaw rate says, 2^-24 m.
-pub const UNREAL: i32 = Metres::from_m(0.8).bits();
+/// So far within a second no vehicle goes beyond what its yaw rate says.
+pub const UNREAL: Metres = Metres::from_m(0.8);
 /// The same by wheel angle and speed.
 const LANE_MARGIN_BY_WHEEL: Metres = Metres::from_m(1.0);
-const UNREAL_BY_WHEEL: i32 = Metres::from_m(2.0).bits();
+const UNREAL_BY_WHEEL: Metres = Metres::from_m(2.0);
 /// Power assist: all that acts on the column is at most so many times the driver's torque.
 pub const ASSIST: i32 = 5;
 /// Friction of the column, and what else holds it without a sign.
 pub const FRICTION: Torque = Torque::from_nm(0.5);
 /// What is beyond these is as wrong as they are: driver and aligning torque, and what damping takes in the time between two
 /// checks. With them, and a guidance of 5 N.m that its frame has room for, no sum of the column check reaches 128, the end
-/// of an `i32`: 100 + 5 + 16.3 at most before the time, which at least halves it, and 60.7 + 60 + 0.3 + 2.7 after.
+/// of an I8F24: 100 + 5 + 16.3 at most before the time, which at least halves it, and 60.7 + 60 + 0.3 + 2.7 after.
 const MOST_DRIVER: Torque = Torque::from_nm(20.0);
-const MOST_ALIGNING: i32 = Torque::from_nm(16.0).bits();
-const MOST_DAMPED: i32 = AngularImpulse::from_nm_s(60.0).bits();
-/// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank, 2^-24 N.m.
-pub const PUSHED: i32 = Torque::from_nm(0.3).bits();
-/// So much of the aligning torque may be wrong, in 2^-32: 77/256, 30 %.
-pub const ALIGNING_ERROR: i32 = 77 << (32 - 8);
+const MOST_ALIGNING: I8F24 = Torque::from_nm(16.0).fixed();
+const MOST_DAMPED: I8F24 = AngularImpulse::from_nm_s(60.0).fixed();
+/// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank.
+pub const PUSHED: Torque = Torque::from_nm(0.3);
+/// So much of the aligning torque may be wrong: 77/256, 30 %.
+pub const ALIGNING_ERROR: Ratio = Ratio::from_si(77.0 / 256.0);
+const ALIGNING_SHARE: I0F32 = I0F32::from_bits(ALIGNING_ERROR.bits() << 8);
 /// Inertia of column and wheel: 2^-3 kg.m2, a little more than the 0.11 of table 9.
 const INERTIA_SHIFT: u32 = 3;
 /// Bounds of what is learnt slowly: a bank of 5 %, or a pull; 5 mrad of camera and yaw rate at 30 m/s.
@@ -321,11 +332,11 @@ impl Plausibility {
         if is_known {
             return;
         }
-        let v = speed.bits();
-        let slip = wide_product(product(v, v), self.stability_factor.bits()) >> FRAC_BITS;
+        let v = speed.fixed();
+        let slip = product_of_three(product(v, v), self.stability_factor.fixed());
         // 82 at most: at 90 m/s with the largest factor.
-        let divisor = u32::try_from(slip.saturating_add(1 << FRAC_BITS)).unwrap_or(0);
-        let gain = i64::from(self.curvature_gain.bits()).saturating_mul(i64::from(v));
+        let divisor = u32::try_from(slip.saturating_add(I40F24::ONE).to_bits()).unwrap_or(0);
+        let gain = self.curvature_gain.fixed().wide_mul(v).to_bits();
         state.motion.turning_gain = TurningRatePerAngle::from_bits(signed_quotient(gain, divisor));
     }
 
@@ -341,68 +352,67 @@ impl Plausibility {
         wheel: Radians,
         applied: Torque,
     ) -> bool {
-        let moved = wheel.bits().saturating_sub(state.column.checked.bits());
+        let moved = wheel.minus(state.column.checked).fixed();
         let dt = now.since(state.column.at);
         if state.column.is_known != 0 {
             // Steady-state aligning torque: c_a * v * chi_dot.
             let aligning_at = |turning: TurningRate| {
-                let lateral = saturate(product(state.motion.speed.bits(), turning.bits()));
-                product_within(lateral, self.aligning_gain.bits(), MOST_ALIGNING)
+                let lateral = saturate(product(state.motion.speed.fixed(), turning.fixed()));
+                product_within(lateral, self.aligning_gain.fixed(), MOST_ALIGNING)
             };
             let aligning = aligning_at(state.turning());
             // A yaw rate that pictures and wheel angle deny may be as wrong as it is large.
             let pushed = if state.lane.is_alive != 0 && state.motion.yaw.is_suspect() {
                 MOST_ALIGNING
             } else {
-                PUSHED
+                PUSHED.fixed()
             };
             let by_wheel = aligning_at(state.turning_by_wheel())
                 .max(aligning.wrapping_sub(pushed))
                 .min(aligning.wrapping_add(pushed));
-            let applied = applied.bits();
+            let applied = applied.fixed();
             // What driver and assist may give together.
-            let driver = driver.min(MOST_DRIVER).max(MOST_DRIVER.opposite()).bits();
-            let assisted = driver.wrapping_mul(ASSIST);
+            let driver = driver.within(MOST_DRIVER).fixed();
+            let assisted = driver.wrapping_mul_int(ASSIST);
             let least = applied
                 .wrapping_add(driver.min(assisted))
                 .wrapping_sub(aligning.max(by_wheel));
             let most = applied
                 .wrapping_add(driver.max(assisted))
                 .wrapping_sub(aligning.min(by_wheel));
-            let damped = product_within(moved, self.column_damping.bits(), MOST_DAMPED);
+            let damped = product_within(moved, self.column_damping.fixed(), MOST_DAMPED);
             // All times dt, for the wheel's movement is that of dt.
-            let impulse = |torque: i32| per_second(torque, dt);
+            let impulse = |torque: I8F24| per_second(torque, dt);
             let (least, most) = (
                 impulse(least).wrapping_sub(damped),
                 impulse(most).wrapping_sub(damped),
             );
-            let learnt = impulse(state.column.bias.bits());
+            let learnt = impulse(state.column.bias.fixed());
             let lacking = nearest_to_zero(least, most).wrapping_sub(learnt);
-            let bias = state.column.bias.bits().wrapping_add(lacking >> BIAS_SHIFT);
-            state.column.bias = Torque::from_bits(bias)
-                .min(COLUMN_BIAS)
-                .max(COLUMN_BIAS.opposite());
-            let tolerance = upper_product(aligning.wrapping_abs(), ALIGNING_ERROR);
-            let tolerance = impulse(tolerance.wrapping_add(FRICTION.bits()));
+            let bias = (state.column.bias.fixed()).wrapping_add(lacking.wrapping_shr(BIAS_SHIFT));
+            state.column.bias = Torque::from_fixed(bias).within(COLUMN_BIAS);
+            let tolerance =
+                I8F24::wrapping_from_num(aligning.max(aligning.wrapping_neg()).wide_mul(ALIGNING_SHARE));
+            let tolerance = impulse(tolerance.wrapping_add(FRICTION.fixed()));
             // The tolerance is that of the sum: what is not used up between two pushes explains a part of the last.
-            let sum = state.column.sum.bits();
+            let sum = state.column.sum.fixed();
             let (least, most) = (
                 leak(sum, lacking.wrapping_sub(tolerance), dt),
                 leak(sum, lacking.wrapping_add(tolerance), dt),
             );
-            state.column.sum = AngularImpulse::from_bits(nearest_to_zero(least, most));
+            state.column.sum = AngularImpulse::from_fixed(nearest_to_zero(least, most));
         }
         (state.column.is_known, state.column.at) = (1, now);
         (state.column.wheel, state.column.checked) = (wheel, wheel);
-        let sum = state.column.sum.bits();
-        let above = sum.saturating_abs().wrapping_sub(COLUMN_MARGIN.bits());
+        let sum = state.column.sum;
+        let above = sum.abs().fixed().wrapping_sub(COLUMN_MARGIN.fixed());
         // Inertia times way over time is the wheel's momentum, in the direction of the sum.
-        let along = if sum.is_negative() {
-            moved.saturating_neg()
+        let along = if sum < AngularImpulse::ZERO {
+            I8F24::ZERO.saturating_sub(moved)
         } else {
             moved
         };
-        above <= 0 || per_second(above, dt) <= along >> INERTIA_SHIFT
+        above <= I8F24::ZERO || per_second(above, dt) <= along.wrapping_shr(INERTIA_SHIFT)
     }
 
     /// Takes a new lane sample that came now, and says whether its error moved as it must have. Apart, as [`Self::column`].
@@ -425,62 +435,64 @@ impl Plausibility {
         };
         let dt = sample.at.since(state.lane.last.at);
         if state.lane.is_known != 0 && dt.us() != 0 {
-            let seen = sample.e_y.bits().saturating_sub(state.lane.last.e_y.bits());
+            let seen = sample.e_y.minus(state.lane.last.e_y).fixed();
             let rate = self.line_rate(state, motion_history, now, state.lane.last.at);
             // Where the line is not known for long enough, nothing is predicted.
             let predicted = rate.map_or(seen, |rate| per_second(rate, dt));
-            let bias = state.lane.bias.bits();
+            let bias = state.lane.bias.fixed();
             let predicted = predicted.saturating_add(per_second(bias, dt));
-            let learnt = bias.saturating_add(seen.saturating_sub(predicted) >> BIAS_SHIFT);
-            state.lane.bias = Speed::from_bits(learnt)
-                .min(most)
-                .max(Speed::from_bits(most.bits().saturating_neg()));
-            state.lane.predicted = Metres::from_bits(leak(state.lane.predicted.bits(), predicted, dt));
-            state.lane.seen = Metres::from_bits(leak(state.lane.seen.bits(), seen, dt));
-            state.lane.is_alive = u32::from(seen != 0 || sample.e_theta != state.lane.last.e_theta);
+            let learnt = seen.saturating_sub(predicted).wrapping_shr(BIAS_SHIFT);
+            state.lane.bias = Speed::from_fixed(bias.saturating_add(learnt)).within(most);
+            let summed = |sum: Metres, change: I8F24| Metres::from_fixed(leak(sum.fixed(), change, dt));
+            state.lane.predicted = summed(state.lane.predicted, predicted);
+            state.lane.seen = summed(state.lane.seen, seen);
+            state.lane.is_alive = u32::from(seen != I8F24::ZERO || sample.e_theta != state.lane.last.e_theta);
         }
         (state.lane.is_known, state.lane.last) = (1, sample);
         // Half the margin has to be predicted: a small movement that nothing predicts is no proof of a fault. A large one is: no
         // vehicle goes there.
-        let predicted = state.lane.predicted.bits();
-        let missing = state.missing(predicted);
-        let is_missing = missing > margin.bits() && predicted.saturating_abs() > margin.bits() >> 1;
-        if !is_missing && missing.saturating_abs() <= unreal {
+        let (predicted, missing) = (state.lane.predicted, state.missing());
+        let is_missing = missing > margin && predicted.abs().fixed() > margin.fixed().wrapping_shr(1);
+        if !is_missing && missing.abs() <= unreal {
             return LaneMotion::Consistent;
         }
         // A yaw rate that is too large predicts so much less: over the time from near to far point, and at the near point. What it
         // does so comes up to 0.4 s later, so that a quarter of what is missing is enough.
-        let far = saturate(product(self.far_time.bits(), state.motion.speed.bits()));
-        let less = product_below(far, state.motion.yaw.sum.bits());
-        let is_too_much = predicted >= state.lane.seen.bits();
-        let explained = if is_too_much { less.saturating_neg() } else { less };
-        if measured && state.lane.is_alive != 0 && explained > missing.saturating_abs() >> 2 {
+        let far = saturate(product(self.far_time.fixed(), state.motion.speed.fixed()));
+        let less = product_below(far, state.motion.yaw.sum.fixed());
+        let is_too_much = predicted >= state.lane.seen;
+        let explained = if is_too_much {
+            I8F24::ZERO.saturating_sub(less)
+        } else {
+            less
+        };
+        if measured && state.lane.is_alive != 0 && explained > missing.abs().fixed().wrapping_shr(2) {
             (state.lane.predicted, state.lane.seen) = (Metres::ZERO, Metres::ZERO);
             return LaneMotion::ContradictsYawRate;
         }
         LaneMotion::Inconsistent
     }
 
-    /// How fast the near-point error must move at an instant, 2^-24 m/s, by the measured yaw rate.
+    /// How fast the near-point error must move at an instant, m/s, by the measured yaw rate.
     fn line_rate(
         &self,
         state: &PlausibilityState,
         motion_history: &MotionHistory,
         now: Instant,
         at: Instant,
-    ) -> Option<i32> {
+    ) -> Option<I8F24> {
         let near = motion_history.line_direction(now, at, self.between)?;
         let turning = motion_history.heading(now, at).rate;
-        let along = saturate(product(state.motion.speed.bits(), near.bits()));
-        let reach = saturate(product(self.near_time.bits(), state.motion.speed.bits()));
-        Some(along.saturating_sub(product_below(reach, turning.bits())))
+        let along = saturate(product(state.motion.speed.fixed(), near.fixed()));
+        let reach = saturate(product(self.near_time.fixed(), state.motion.speed.fixed()));
+        Some(along.saturating_sub(product_below(reach, turning.fixed())))
     }
 
-    /// How fast it must move where the line bends as the vehicle turns, 2^-24 m/s.
-    fn bend_rate(&self, state: &PlausibilityState, e_theta: Radians) -> i32 {
-        let heading = saturate(product(state.motion.speed.bits(), e_theta.bits()));
-        let far = saturate(product(self.far_time.bits(), state.motion.speed.bits()));
-        heading.saturating_sub(product_below(far, state.turning().bits()))
+    /// How fast it must move where the line bends as the vehicle turns, m/s.
+    fn bend_rate(&self, state: &PlausibilityState, e_theta: Radians) -> I8F24 {
+        let heading = saturate(product(state.motion.speed.fixed(), e_theta.fixed()));
+        let far = saturate(product(self.far_time.fixed(), state.motion.speed.fixed()));
+        heading.saturating_sub(product_below(far, state.turning().fixed()))
     }
 
     /// The lane at an instant after a sample of it, along the line that the far point has passed and by the rate of turn: what
@@ -499,8 +511,8 @@ impl Plausibility {
         let moved = per_second(rate, at.since(last.at));
         let turned = motion_history.direction_change(now, last.at, at);
         LaneSample {
-            e_y: Metres::from_bits(last.e_y.bits().saturating_add(moved)),
-            e_theta: Radians::from_bits(last.e_theta.bits().saturating_add(turned.bits())),
+            e_y: last.e_y.plus(Metres::from_fixed(moved)),
+            e_theta: last.e_theta.plus(turned),
             at,
         }
     }
@@ -508,8 +520,7 @@ impl Plausibility {
     /// How much of the margins is used up: lane (m), column (N.m.s).
     #[must_use]
     pub fn used_margins(state: &PlausibilityState) -> (Metres, AngularImpulse) {
-        let missing = state.missing(state.lane.predicted.bits());
-        (Metres::from_bits(missing), state.column.sum)
+        (state.missing(), state.column.sum)
     }
 }
 
@@ -525,8 +536,8 @@ pub enum LaneMotion {
 }
 
 /// What of an interval is nearest to zero: zero itself if it is inside.
-fn nearest_to_zero(least: i32, most: i32) -> i32 {
-    least.max(0).wrapping_add(most.min(0))
+fn nearest_to_zero(least: I8F24, most: I8F24) -> I8F24 {
+    least.max(I8F24::ZERO).wrapping_add(most.min(I8F24::ZERO))
 }
 
 #[cfg(test)]
@@ -554,11 +565,38 @@ mod tests {
             state.set_wheel_angle(Radians::from_rad(-0.2));
             // The bicycle model in steady state.
             let steady = CURVATURE_GAIN_PER_M * speed / (1.0 + STABILITY_FACTOR_S2_PER_M2 * speed * speed);
-            let turning = f64::from(state.turning().bits()) / f64::from(1 << FRAC_BITS);
+            let turning = state.turning().rad_per_s();
             assert!(
                 (turning + 0.2 * steady).abs() < 1e-4,
                 "{speed}: {turning} {steady}"
             );
+        }
+    }
+
+    /// A yaw rate of 0.02 rad/s more than the wheel's, as on a bank: learnt with a lag of 16 s.
+    #[test]
+    fn without_a_yaw_rate_the_wheel_turns_by_what_it_was_more() {
+        let wheel = 0.05 / (CURVATURE_GAIN_PER_M * 20.0) * (1.0 + STABILITY_FACTOR_S2_PER_M2 * 400.0);
+        for (sign, by_wheel) in [(1.0, 0.0), (-1.0, 0.0), (1.0, 0.05), (-1.0, 0.05)] {
+            let mut state = PlausibilityState::NEW;
+            let (speed, passed) = (Speed::from_m_per_s(20.0), Micros::from_ms(10));
+            CHECKS.motion(&mut state, speed, None);
+            state.set_wheel_angle(Radians::from_rad(wheel * by_wheel / 0.05));
+            let measured = TurningRate::from_rad_per_s(by_wheel + sign * 0.02);
+            for _ in 0..2000 {
+                let accepted = state.accepted_yaw_rate(measured, passed);
+                assert_eq!(accepted, Some(measured));
+                CHECKS.motion(&mut state, speed, accepted);
+                assert_eq!(state.turning(), measured);
+            }
+            let expected = by_wheel + sign * 0.02 * (1.0 - f64::exp(-20.0 / 16.0));
+            // In the step in which the lane denies it, and from the next message on.
+            state.distrust_yaw_rate();
+            for _ in 0..2 {
+                let turning = state.turning().rad_per_s();
+                assert!((turning - expected).abs() < 1e-3, "{turning}, not {expected}");
+                CHECKS.motion(&mut state, speed, None);
+            }
         }
     }
 
@@ -699,6 +737,9 @@ mod tests {
                     moved,
                     "{sum_rad}, {is_alive}"
                 );
+                // What a wrong yaw rate predicted is not held against the lane.
+                let used = Plausibility::used_margins(&state).0;
+                assert_eq!(used == Metres::ZERO, moved == LaneMotion::ContradictsYawRate);
             }
         }
     }

@@ -1,30 +1,30 @@
-//! Torques that end by themselves: the last trusted torque, and its way to zero.
+//! Ramps: the last trusted torque, and its way to zero.
 //!
 //! A sudden loss of guidance in a curve takes a relying driver 0.44 to 0.62 m off the centreline; the same
 //! torque faded over 2 s while the driver takes over keeps the peak near what it was (docs/decisions has the
-//! table). Where the driver pushes against the torque there is nothing left to keep, and it goes faster. Neither ramp
+//! table). Where the driver pushes against the torque, the ramp is faster. No ramp
 //! ever grows.
+
+use fixed::types::I8F24;
 
 use crate::quantity::{Instant, Micros, Ratio, Torque, TorqueRate, share_of, signed_quotient};
 use crate::safety::redundant::words;
 
 /// A handover lasts this long. 0.12 s gains almost nothing over a sudden loss, 3 s overshoots.
 pub const HANDOVER: Micros = Micros::from_ms(2000);
-/// The least that is left of it where the lane was gone on with.
+/// Its least length after the lane was extrapolated.
 pub const GONE_ON: Micros = Micros::from_ms(1000);
-/// Without a driver torque no hand can take the torque away, so a handover goes so many times as fast: 1 s.
+/// Without a driver torque the override limit cannot act, so a handover goes so many times as fast: 1 s.
 const WITHOUT_COLUMN: u32 = 2;
-/// A column that contradicts itself may hide a hand that pushes, and has misled the override already: 0.5 s. From 5 N.m the
-/// reduction limit is slower.
+/// An implausible column may hide a driver who pushes, so a handover takes 0.5 s. From 5 N.m the reduction limit is slower.
 const IMPLAUSIBLE_COLUMN: u32 = 4;
-/// Where the driver pushes against it, it goes so many times as fast. From 5 N.m that is 7.5 N.m/s: the largest whole
+/// Where the driver pushes against the torque, a handover goes so many times as fast. From 5 N.m that is 7.5 N.m/s: the largest whole
 /// number that keeps the reduction limit.
 pub const OPPOSED: u32 = 3;
-/// From here on the driver pushes against it: the largest offset of an ordinary torque sensor.
+/// An opposing driver torque beyond this is a push: the largest offset of an ordinary torque sensor.
 pub const OPPOSES: Torque = Torque::from_nm(0.1);
 
-/// How many times as fast a handover goes beside a driver torque, `None` without one; `is_plausible` says whether it may be
-/// believed.
+/// How many times as fast a handover goes, by the driver torque, `None` if it is not known, and whether the column is plausible.
 #[must_use]
 pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 {
     if !is_plausible {
@@ -33,7 +33,7 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
     let Some(driver) = driver else {
         return WITHOUT_COLUMN;
     };
-    let against = if applied.bits().is_negative() {
+    let against = if applied < Torque::ZERO {
         driver
     } else {
         driver.opposite()
@@ -45,12 +45,12 @@ pub fn pace(applied: Torque, driver: Option<Torque>, is_plausible: bool) -> u32 
     }
 }
 
-/// How long a handover lasts beside a lane of which so much was trusted. Without a picture trust falls on the line of a
-/// handover, which goes on where that was; but nobody takes over in less than [`GONE_ON`].
+/// The length of a handover after the trust in the lane has fallen so far. Trust without a picture falls as a handover does, so that
+/// this continues the same line; but a driver needs [`GONE_ON`] to take over.
 #[must_use]
 pub fn handover_length(trust: Ratio) -> Micros {
-    let left = share_of(trust.bits(), HANDOVER.us().cast_signed());
-    Micros::from_us(left.cast_unsigned()).max(GONE_ON)
+    let left = share_of(trust.fixed(), I8F24::from_bits(HANDOVER.us().cast_signed()));
+    Micros::from_us(left.to_bits().cast_unsigned()).max(GONE_ON)
 }
 
 words! {
@@ -119,7 +119,7 @@ pub struct TorqueHistory {
     coarse: Outputs,
 }
 
-/// From one output that is remembered to the next, of the newest.
+/// Spacing of the remembered outputs, of the newest 250 ms and of the rest.
 pub const FINE: Micros = Micros::from_ms(5);
 const COARSE: Micros = Micros::from_ms(40);
 /// What the fine history reaches back to, with a place to spare.

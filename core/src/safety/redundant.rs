@@ -6,14 +6,16 @@
 use core::hint::black_box;
 use core::ops::Not;
 
+use fixed::FixedI32;
+
 /// A value made of 32-bit words, each of which may hold any bits.
 pub trait Words: Copy + PartialEq {
     /// The value with every word changed, in the order of the fields.
     #[must_use]
     fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self;
 
-    /// The bits of all words in which `other` is the inverse of this value: all of them if it is. Looks at all words
-    /// without a branch: a copy or a comparison call for each is what a step would mostly do.
+    /// The bits that differ from `other` in every word: all bits where `other` is the inverse of this value. Compares without a
+    /// branch, as a step compares most of its memory.
     fn agreement(&self, other: &Self) -> u32;
 
     /// The value with every bit inverted.
@@ -40,6 +42,19 @@ impl Words for i32 {
 
     fn agreement(&self, other: &Self) -> u32 {
         self.cast_unsigned() ^ other.cast_unsigned()
+    }
+}
+
+impl<Frac> Words for FixedI32<Frac>
+where
+    Self: Copy + PartialEq,
+{
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self::from_bits(self.to_bits().map_words(change))
+    }
+
+    fn agreement(&self, other: &Self) -> u32 {
+        self.to_bits().agreement(&other.to_bits())
     }
 }
 
@@ -164,9 +179,8 @@ macro_rules! words {
 }
 pub(crate) use words;
 
-/// Whether two values are whole. A function of its own: else the words loaded here stay in use behind it, and most of
-/// them on the stack. The black box is for a compiler that sees a whole image and knows where the values lie: far from
-/// the start of what holds them, it would load no two words at once.
+/// Whether both copies of two values agree. Not inlined, because its loaded words would stay in use behind it, most of them on
+/// the stack. The black box hides where the values lie: addressed from a distant start, they are loaded one word at a time.
 #[inline(never)]
 pub(crate) fn are_intact<A: Words, B: Words>(a: &Redundant<A>, b: &Redundant<B>) -> bool {
     a.agrees_apart() && b.agrees_apart()
@@ -199,13 +213,13 @@ impl<T: Words> Redundant<T> {
         guarded.agrees().then_some(&guarded.value)
     }
 
-    /// Whether the copies agree; where the compiler cannot know that they do.
+    /// Whether the copies agree, for callers where the compiler cannot know that they do.
     #[inline(always)]
     pub(crate) fn agrees(&self) -> bool {
         self.value.agreement(&self.inverted) == u32::MAX
     }
 
-    /// The same in a function that is never inlined, as [`are_whole`].
+    /// The same in a function that is never inlined, as [`are_intact`].
     #[inline(always)]
     pub(crate) fn agrees_apart(&self) -> bool {
         let guarded = self;
@@ -214,7 +228,7 @@ impl<T: Words> Redundant<T> {
         guarded.agrees()
     }
 
-    /// The copy anew, likewise.
+    /// A new second copy, not inlined either.
     #[inline(always)]
     fn seal(&mut self) {
         self.inverted = self.value.complement();
@@ -228,37 +242,37 @@ impl<T: Words> Redundant<T> {
         Some(result)
     }
 
-    /// Changes the value in place, which [`Redundant::get`] has found whole in this step.
+    /// Changes the value in place, after [`Redundant::get`] has found it intact in this step.
     pub(crate) fn amend<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> R {
         let result = change(&mut self.value);
         self.seal();
         result
     }
 
-    /// The value, which was found whole in this step.
+    /// The value, after it was found intact in this step.
     pub(crate) fn value(&self) -> &T {
         &self.value
     }
 
-    /// The value, which was found whole in this step; what is changed has to be sealed.
+    /// The value, after it was found intact in this step. Each changed part has to be sealed.
     pub(crate) fn value_mut(&mut self) -> &mut T {
         &mut self.value
     }
 
-    /// Copies a part that was changed.
+    /// Brings the second copy of a changed part up to date.
     #[inline(always)]
     pub(crate) fn seal_part<P: Words>(&mut self, part: impl Fn(&mut T) -> &mut P) {
         *part(&mut self.inverted) = part(&mut self.value).complement();
         keep_together();
     }
 
-    /// Changes a part in both copies and leaves the rest as it is, what a flip made of it too.
+    /// Changes a part in both copies. The rest stays as it is, and so does a flipped bit there.
     pub(crate) fn put<P: Copy + Not<Output = P>>(&mut self, part: impl Fn(&mut T) -> &mut P, new: P) {
         *part(&mut self.value) = new;
         *part(&mut self.inverted) = !new;
     }
 
-    /// Changes the words of both copies apart, as faults do.
+    /// Changes the words of each copy by themselves, as an injected fault does.
     #[cfg(feature = "fault-injection")]
     pub(crate) fn change_copies(&mut self, change: &mut impl FnMut(u32) -> u32) {
         self.value = self.value.map_words(change);

@@ -5,7 +5,9 @@
 //! from that model, but for a constant that is learnt slowly, is summed with a memory of 1 s. What fails is not believed until it
 //! has agreed for a while, and guidance goes on without.
 
-use crate::quantity::{FRAC_BITS, Micros, Radians, Speed, TurningRate, leak, per_second, product};
+use fixed::types::I40F24;
+
+use crate::quantity::{Micros, Radians, Speed, TurningRate, leak, per_second, product};
 use crate::safety::redundant::words;
 
 /// Largest honest change of the yaw rate between two messages: a swerve has 4 rad/s2, which is 0.1 rad/s in 25 ms.
@@ -58,7 +60,7 @@ impl YawState {
 
     /// Whether wheel angle and speed say something else, by a quarter of the margin.
     pub(crate) fn is_suspect(&self) -> bool {
-        self.sum.bits().saturating_abs() > MARGIN.bits() >> 2
+        self.sum.abs().fixed() > MARGIN.fixed().wrapping_shr(2)
     }
 
     /// The yaw rate to believe of one that comes so long after the last.
@@ -71,10 +73,9 @@ impl YawState {
         passed: Micros,
     ) -> Option<TurningRate> {
         let sideways = |rate: TurningRate, most: u32| {
-            product(speed.bits(), rate.bits()).unsigned_abs() <= u64::from(most) << FRAC_BITS
+            product(speed.fixed(), rate.fixed()).wrapping_abs() <= I40F24::wrapping_from_num(most)
         };
-        let stepped =
-            last.is_some_and(|last| last.bits().abs_diff(measured.bits()) > STEP.bits().unsigned_abs());
+        let stepped = last.is_some_and(|last| !last.is_near(measured, STEP));
         if stepped || !sideways(measured, MOST_SIDEWAYS) {
             self.held = Micros::from_us(self.held.us().saturating_add(passed.us()));
             if last.is_some() && self.held <= PATIENCE {
@@ -92,27 +93,19 @@ impl YawState {
 
     /// Whether it agrees with wheel angle and speed, within half of the margin. Beyond the margin none is believed.
     fn agrees(&mut self, measured: TurningRate, by_wheel: TurningRate, passed: Micros) -> bool {
-        let more = measured.bits().saturating_sub(by_wheel.bits());
-        let differs = more.saturating_sub(self.bias.bits());
-        self.sum = Radians::from_bits(leak(self.sum.bits(), per_second(differs, passed), passed));
-        let learnt = self
-            .bias
-            .bits()
-            .saturating_add(per_second(differs >> BIAS_SHIFT, passed));
-        self.bias = TurningRate::from_bits(learnt)
-            .min(BIAS)
-            .max(TurningRate::from_bits(BIAS.bits().saturating_neg()));
-        let larger = measured
-            .bits()
-            .saturating_abs()
-            .max(by_wheel.bits().saturating_abs());
+        let differs = measured.minus(by_wheel).minus(self.bias).fixed();
+        let sum = leak(self.sum.fixed(), per_second(differs, passed), passed);
+        self.sum = Radians::from_fixed(sum);
+        let learnt = per_second(differs.wrapping_shr(BIAS_SHIFT), passed);
+        self.bias = self.bias.plus(TurningRate::from_fixed(learnt)).within(BIAS);
+        let larger = measured.abs().max(by_wheel.abs());
         let (used, margin) = (
-            self.sum.bits().saturating_abs(),
-            MARGIN.bits().saturating_add(larger >> 2),
+            self.sum.abs().fixed(),
+            MARGIN.fixed().saturating_add(larger.fixed().wrapping_shr(2)),
         );
         if used > margin {
             self.distrust();
         }
-        used <= margin >> 1
+        used <= margin.wrapping_shr(1)
     }
 }

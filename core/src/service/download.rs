@@ -1,4 +1,4 @@
-//! New parameters over the bus: a set arrives field by field, is checked as a whole, and is then somebody's to store.
+//! New parameters over the bus: a set arrives field by field, is checked as a whole, and is handed to the caller to store.
 //!
 //! A set is one [`ParameterWrite`] for each field, in the order of [`PARAMETERS`], from the first to the last
 //! without another field between. That order tells a lost, repeated or swapped frame; so the counter, which is the
@@ -29,7 +29,7 @@ const REFUSED: usize = usize::MAX;
 /// An unlock lasts for so long, ms.
 pub const UNLOCK_MS: u32 = 2000;
 
-/// What a set has to find when it comes.
+/// The ECU's situation when a frame arrives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conditions {
     /// The ECU's mode; see [`mode_for_parameters`].
@@ -96,7 +96,7 @@ pub fn frames(params: &Params) -> [Frame; VALUES] {
     })
 }
 
-/// A set on its way in.
+/// A set that is being received.
 #[derive(Debug, Clone)]
 pub struct Download {
     values: [f64; VALUES],
@@ -109,7 +109,7 @@ pub struct Download {
 }
 
 impl Download {
-    /// Nothing has come.
+    /// Before the first frame.
     pub const NEW: Self = Self {
         values: [0.0; VALUES],
         next: 0,
@@ -132,13 +132,13 @@ impl Download {
             ParameterWrite::ID => {}
             _ => return None,
         }
-        // No history: the order of the fields says more than the counter.
+        // Each frame is judged without a history of counters, as the order of the fields says more.
         let write = ParameterWrite::decode(&mut { ReceiverState::TRUSTED }, frame).ok()?;
         let index = usize::from(write.index);
         if index == 0 {
             self.next = 0;
         } else if self.next == REFUSED {
-            // The rest of a set that was refused: the reason stays.
+            // The rest of a refused set keeps the reason.
             return None;
         }
         let slot = self.values.get_mut(index).filter(|_| index == self.next);
@@ -170,7 +170,7 @@ impl Download {
         }
         let params = Params::from_values(&self.values);
         self.unlocked_ms = None;
-        // What the next start would refuse is not taken.
+        // A set that the next start would refuse is not taken.
         let is_good = Setup::new(&params).is_ok();
         self.outcome = if is_good {
             WriteOutcome::Taken

@@ -1,5 +1,5 @@
-//! Frames that were not used, counted by message and reason: what an installer with a wrong data ID, or somebody who
-//! forges frames, leaves behind. [`Rejection`] tells them on the bus, one pair after the other.
+//! Counts of rejected frames by message and reason: they show a sender with a wrong data ID, or forged frames. [`Rejection`]
+//! reports them on the bus, one pair after the other.
 //!
 //! Outside the torque path, and not kept twice: it moves nothing. Fixed arrays, so that a flipped bit spoils a count.
 
@@ -30,7 +30,7 @@ impl Rejections {
         next: 0,
     };
 
-    /// Counts one. An identifier that is none of the bus's is not counted: nobody rejects it.
+    /// Counts a rejected frame. One whose identifier is not in the list of messages is not counted.
     #[expect(clippy::as_conversions, reason = "the code of a variant")]
     pub fn count(&mut self, id: u16, reason: Reject) {
         let message = MESSAGES.iter().position(|message| message.id == id);
@@ -47,7 +47,7 @@ impl Rejections {
         counts.fold(0, u32::saturating_add)
     }
 
-    /// The next pair that there is, round and round.
+    /// The next pair with a count, in turn.
     pub fn line(&mut self) -> Option<Rejection> {
         for _ in 0..PAIRS {
             let place = self.next % PAIRS;

@@ -210,7 +210,7 @@ impl Rig {
             let data: [u8; 8] = frame.data().try_into().unwrap();
             assert!(frame.id() == Telemetry::ID && Telemetry::PROTECTION.is_intact(&data));
             self.telemetry_counter = data[1] & 0x0F;
-            self.telemetry = Telemetry::unpack(u64::from_le_bytes(data));
+            self.telemetry = Telemetry::unpack(&data);
         }
         step
     }

@@ -194,7 +194,7 @@ impl Watch {
         }
         assert!(step.permitted || mode == Mode::Fault, "permission: {}", context());
         let bytes: [u8; 8] = step.guidance.data().try_into().unwrap();
-        let sent = Guidance::unpack(u64::from_le_bytes(bytes)).unwrap();
+        let sent = Guidance::unpack(&bytes).unwrap();
         assert!(
             Guidance::PROTECTION.is_intact(&bytes)
                 && (sent.torque, sent.mode) == (step.command.torque, mode)

@@ -9,10 +9,11 @@
 
 use haptic_analysis::identify::{DriveLog, INFORMED, Information, Options, identify_together, information};
 use haptic_sim::models::road::Course;
-use haptic_sim::participants::{PublishedDriver, participants};
+use haptic_sim::participants::{PublishedDriver, participant};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::error::{StudyError, refuse};
 use crate::experiment::{Probe, guided_drive, log_each, recorded, truth_of};
 
 /// What is asked.
@@ -106,7 +107,7 @@ fn cells(
     drivers: &[(u32, PublishedDriver)],
     probes: &[Option<Probe>],
     done: impl Fn() + Sync,
-) -> Result<Vec<Cell>, String> {
+) -> Result<Vec<Cell>, StudyError> {
     let mut jobs = Vec::new();
     for course in 0..question.courses.len() {
         for &probe in probes {
@@ -138,9 +139,9 @@ fn cells(
 ///
 /// # Errors
 /// An unknown participant or parameter; a course that cannot be driven.
-pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, String> {
+pub fn design(question: &Question, done: impl Fn() + Sync) -> Result<Answer, StudyError> {
     let Some(place) = INFORMED[..5].iter().position(|&n| n == question.parameter) else {
-        return Err(format!(
+        return refuse(format!(
             "parameter {:?} is unknown, one of {} is wanted",
             question.parameter,
             INFORMED[..5].join(", ")
@@ -219,17 +220,9 @@ pub fn drives(question: &Question) -> u64 {
     each as u64
 }
 
-fn drivers(numbers: &[u32]) -> Result<Vec<(u32, PublishedDriver)>, String> {
-    let all = participants();
-    numbers
-        .iter()
-        .map(|&number| {
-            let found = all.iter().find(|p| p.number == number);
-            found
-                .map(|p| (number, p.guided))
-                .ok_or_else(|| format!("participant {number} is outside 1 to {}", all.len()))
-        })
-        .collect()
+fn drivers(numbers: &[u32]) -> Result<Vec<(u32, PublishedDriver)>, StudyError> {
+    let guided = |&number| Ok((number, participant("participant", number)?.guided));
+    numbers.iter().map(guided).collect()
 }
 
 /// No probe, and all that the controller accepts.
@@ -322,7 +315,7 @@ fn confirm(
     design: &Design,
     drivers: &[(u32, PublishedDriver)],
     done: &(impl Fn() + Sync),
-) -> Result<Confirmation, String> {
+) -> Result<Confirmation, StudyError> {
     let course = question.courses.iter().find(|c| c.name() == design.course);
     let length_s = design.needed_s.unwrap_or(design.span_s).max(SHORTEST_S);
     let probes = design.probes();
@@ -364,7 +357,7 @@ fn confirm(
                     }
                 }
             }
-            let fit = identify_together(&logs, &options).map_err(|e| e.to_string())?;
+            let fit = identify_together(&logs, &options)?;
             done();
             let (_, _, p) = fit.parameters.list()[place_in_list(place)];
             let truth = truth_of(&driver);
@@ -382,7 +375,7 @@ fn confirm(
                 .is_none_or(|[low, high]| low <= truth && truth <= high);
             Ok((off, held, promised))
         })
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let count = found.len() as f64;
     let rms = |f: &dyn Fn(&(f64, bool, f64)) -> f64| {
         (found.iter().map(|x| f(x).powi(2)).sum::<f64>() / count).sqrt()

@@ -9,6 +9,7 @@ use super::RunRecord;
 use super::claims::{self, Claim};
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::vectorised::run_batched;
+use crate::error::StudyError;
 use haptic_analysis::metrics::Window;
 use haptic_sim::fork::simulate_forked;
 use haptic_sim::models::driver::DriverParameters;
@@ -78,7 +79,7 @@ pub fn evaluate(
     base: &Scenario,
     window: Option<Window>,
     progress: impl Fn() + Sync,
-) -> Result<Evaluation, String> {
+) -> Result<Evaluation, StudyError> {
     let window = window.unwrap_or_else(|| default_window(base.course()));
     super::check_window(window, base)?;
     let mut runs = drive(families(base)?, base.seed(), &progress)?;
@@ -169,7 +170,7 @@ fn drive(
     families: Vec<Family>,
     seed: u64,
     progress: &(impl Fn() + Sync),
-) -> Result<Vec<(Scenario, Run)>, String> {
+) -> Result<Vec<(Scenario, Run)>, StudyError> {
     let all = families
         .iter()
         .flat_map(|family| std::iter::once(&family.nominal).chain(&family.failing));

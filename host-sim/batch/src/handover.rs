@@ -15,6 +15,7 @@ use serde::Serialize;
 use super::Away;
 use super::evaluate::DRIVERS_T_P;
 use super::vectorised::run_all;
+use crate::error::StudyError;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::models::road::{Course, DEFAULT_LANE_WIDTH_M, Segment};
 use haptic_sim::scenario::{Condition, DEFAULT_SPEED_KMH, Failure, FailureKind, Scenario};
@@ -89,7 +90,7 @@ pub struct HandoverResults {
 /// # Errors
 /// As [`haptic_sim::scenario::ScenarioBuilder::build`], none of these scenarios meets one; a run that differs
 /// from the shipping ECU's.
-pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, String> {
+pub fn study(progress: impl Fn() + Sync) -> Result<HandoverResults, StudyError> {
     let cases: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
         .flat_map(|kmh| DRIVERS_T_P.map(|t_p| (*kmh, t_p)))
@@ -129,7 +130,7 @@ const KINDS: [FailureKind; 3] = [FailureKind::None, FailureKind::Input, FailureK
 const RUNS_OF_A_CASE: usize = 1 + RELIANCES.len() * KINDS.len();
 
 /// The runs at a speed with a delay: manual, then each reliance with each failure.
-fn scenarios_of(speed_kmh: f64, t_p: f64) -> Result<Vec<Scenario>, String> {
+fn scenarios_of(speed_kmh: f64, t_p: f64) -> Result<Vec<Scenario>, StudyError> {
     let course = stretched_curve(speed_kmh / DEFAULT_SPEED_KMH)?;
     let run = |condition: Condition, kind| {
         let scenario = Scenario::builder()
@@ -145,7 +146,7 @@ fn scenarios_of(speed_kmh: f64, t_p: f64) -> Result<Vec<Scenario>, String> {
                 time_s: FAILURE_S,
                 duration_s: None,
             });
-        scenario.build().map_err(String::from)
+        Ok(scenario.build()?)
     };
     let guided = RELIANCES
         .iter()
@@ -194,7 +195,7 @@ pub(crate) fn peak_m(run: &Run, from_m: f64) -> Option<f64> {
 }
 
 /// The first curve of the paper's course, every length `k` and every radius `k^2` times as long.
-pub(crate) fn stretched_curve(k: f64) -> Result<Course, String> {
+pub(crate) fn stretched_curve(k: f64) -> Result<Course, StudyError> {
     let curvature = 1.0 / (300.0 * k * k);
     let (clothoid, arc) = (80.0 * k, 300.0 * k);
     let segments = vec![
@@ -204,12 +205,8 @@ pub(crate) fn stretched_curve(k: f64) -> Result<Course, String> {
         Segment::clothoid(clothoid, curvature, 0.0),
         Segment::straight(LAST_STRAIGHT_M * k),
     ];
-    let course = Course::new(
-        "first curve of paper-course, stretched",
-        DEFAULT_LANE_WIDTH_M,
-        segments,
-    );
-    course.map_err(|e| e.to_string())
+    let name = "first curve of paper-course, stretched";
+    Ok(Course::new(name, DEFAULT_LANE_WIDTH_M, segments)?)
 }
 
 #[cfg(test)]

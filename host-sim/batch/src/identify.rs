@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::RunRecord;
 use super::experiment::identified_driver;
 use super::record::default_window;
+use crate::error::StudyError;
 use haptic_analysis::identify::{
     Difference, DriveLog, FixError, Identification, Options, Piece, Pieces, Population, SingleTrack,
     Tracking, differences, identify_and_track, identify_as_published, identify_in_pieces,
@@ -111,9 +112,13 @@ pub fn identify_pieces(name: &str, log: &DriveLog, options: &Options) -> Result<
 ///
 /// # Errors
 /// As [`identify`]; drives of different rates.
-pub fn identify_several(name: &str, logs: &[DriveLog], options: &Options) -> Result<IdentifiedDrive, String> {
-    options.check().map_err(|e| e.to_string())?;
-    let (identification, tracking) = identify_together_and_track(logs, options).map_err(|e| e.to_string())?;
+pub fn identify_several(
+    name: &str,
+    logs: &[DriveLog],
+    options: &Options,
+) -> Result<IdentifiedDrive, StudyError> {
+    options.check()?;
+    let (identification, tracking) = identify_together_and_track(logs, options)?;
     Ok(drive_of(name, identification, tracking))
 }
 
@@ -184,7 +189,12 @@ impl IdentifiedDrive {
     ///
     /// # Errors
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`]: the course is too short, say.
-    pub fn drive_again(&mut self, course: Course, speed_kmh: f64, options: &Options) -> Result<(), String> {
+    pub fn drive_again(
+        &mut self,
+        course: Course,
+        speed_kmh: f64,
+        options: &Options,
+    ) -> Result<(), StudyError> {
         let condition = if options.manual {
             Condition::Manual
         } else {

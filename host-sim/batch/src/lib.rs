@@ -14,6 +14,7 @@
 //! - [`sweep`]: many drives with varied fields.
 //! - [`compare`]: every law against every driver.
 //! - [`design_guidance`]: the law's gains designed for a population of drivers.
+//! - [`adaptation`]: a law that adapts to a driver who adapts to it.
 //! - [`course`]: a road looked at.
 //! - [`bus_load`]: how full the CAN bus is at worst.
 //! - [`availability`]: how often the ECU hands over on real roads although nothing is wrong.
@@ -35,6 +36,7 @@
 //!
 //! Not here: options and exit codes (the command line), how a metric is computed, which files are left and how they look.
 
+pub mod adaptation;
 pub mod availability;
 mod away;
 pub mod bus_load;
@@ -43,11 +45,14 @@ pub mod compare;
 pub mod course;
 pub mod design;
 pub mod design_guidance;
+mod error;
 pub mod evaluate;
 pub mod experiment;
 pub mod files;
 pub mod handover;
 pub mod identify;
+#[cfg(feature = "parquet")]
+mod parquet;
 pub mod real_drives;
 mod record;
 pub mod reliance;
@@ -60,6 +65,7 @@ mod vectorised;
 pub mod stability;
 
 pub use away::{Away, left_by_themselves};
+pub use error::StudyError;
 pub use record::{RunRecord, check_window};
 pub use shares::shares;
 

@@ -19,6 +19,7 @@ use haptic_log::formats::{self, Format};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::error::{StudyError, refuse};
 use fed::fed;
 pub use fed::{End, Ending, Fed, Feed};
 pub use hands::Hands;
@@ -109,13 +110,13 @@ pub struct Half {
 ///
 /// # Errors
 /// The directory cannot be read, or holds no recording.
-pub fn real_drives(directory: &Path) -> Result<RealDrives, String> {
-    let layouts = Layout::built_in().map_err(|e| e.to_string())?;
+pub fn real_drives(directory: &Path) -> Result<RealDrives, StudyError> {
+    let layouts = Layout::built_in()?;
     let mut files = Vec::new();
     collect(directory, &mut files).map_err(|e| format!("{}: {e}", directory.display()))?;
     files.sort();
     if files.is_empty() {
-        return Err(format!(
+        return refuse(format!(
             "{}: there is no .csv, .mat, .mf4 or .parquet file below it",
             directory.display()
         ));
@@ -170,8 +171,9 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
         hands: None,
     };
     let file = path.strip_prefix(directory).unwrap_or(path).display().to_string();
-    let drive = |layout: &str, by_hand, found: Result<Found, String>| {
-        let (refused, found) = found.map_or_else(|why| (Some(why), None), |found| (None, Some(found)));
+    let drive = |layout: &str, by_hand, found: Result<Found, StudyError>| {
+        let (refused, found) =
+            found.map_or_else(|why| (Some(why.to_string()), None), |found| (None, Some(found)));
         RealDrive {
             file: file.clone(),
             layout: layout.into(),
@@ -182,7 +184,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
     };
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) => return refused(drive("", true, Err(error.to_string()))),
+        Err(error) => return refused(drive("", true, Err(error.to_string().into()))),
     };
     let format = Format::of(path).ok();
     let Some(layout) = layouts.iter().find(|layout| layout.fits(&bytes, format)) else {
@@ -191,7 +193,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
             Err(error) if !error.to_string().contains("there is no channel time_s") => error.to_string(),
             _ => "it has the channels of no layout that needs no --map".to_owned(),
         };
-        return refused(drive("", true, Err(why)));
+        return refused(drive("", true, Err(why.into())));
     };
     let rows = Rows::of(layout, &bytes, format);
     let hands = rows.map(|rows| {
@@ -225,7 +227,7 @@ fn of_file<'a>(directory: &Path, path: &Path, layouts: &'a [Layout]) -> Judged<'
     }
 }
 
-fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, String> {
+fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, StudyError> {
     let options = Options {
         manual: by_hand,
         ..Options::default()
@@ -234,7 +236,7 @@ fn judge(log: &DriveLog, by_hand: bool) -> Result<Found, String> {
     let used_s = fit.preflight.as_ref().map_or(0.0, |p| p.used_s);
     let time_s = &fit.traces.time_s;
     let Some(&middle_s) = time_s.get(time_s.len() / 2) else {
-        return Err("no row is left after hands off, pauses and lane changes".into());
+        return refuse("no row is left after hands off, pauses and lane changes");
     };
     let halves = half_against_half(log, &options, middle_s);
     let list = fit.parameters.list();

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::Away;
+use crate::error::{StudyError, refuse};
 use haptic_analysis::metrics::{self, Circumstances, Metrics, Window};
 use haptic_log::trace::Sample;
 use haptic_sim::input::in_range;
@@ -128,7 +129,7 @@ const LEAST_WINDOW_M: f64 = 1.0;
 ///
 /// # Errors
 /// Which end is wrong, with its value and range.
-pub fn check_window(window: Window, scenario: &Scenario) -> Result<(), String> {
+pub fn check_window(window: Window, scenario: &Scenario) -> Result<(), StudyError> {
     let Window { from_m, to_m } = window;
     let (length_m, reach_m) = (scenario.course().length_m(), scenario.reach_m());
     // Whole tenths, for people to read.
@@ -143,7 +144,7 @@ pub fn check_window(window: Window, scenario: &Scenario) -> Result<(), String> {
     if from_m + LEAST_WINDOW_M <= to_m {
         return Ok(());
     }
-    Err(format!(
+    refuse(format!(
         "window from {from_m} m to {to_m} m: the end must lie at least {LEAST_WINDOW_M} m behind the start"
     ))
 }
@@ -227,11 +228,11 @@ mod tests {
             )
         );
         assert_eq!(
-            check(0.0, 9000.0),
+            check(0.0, 9000.0).map_err(|e| e.to_string()),
             Err("window to = 9000 m is outside 0 to 3350 m".into())
         );
         for (from_m, to_m) in [(500.0, 100.0), (500.0, 500.0), (500.0, 500.5)] {
-            let error = check(from_m, to_m).unwrap_err();
+            let error = check(from_m, to_m).unwrap_err().to_string();
             assert!(error.contains("at least 1 m behind the start"), "{error}");
         }
         assert!(

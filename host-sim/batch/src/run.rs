@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::RunRecord;
 use super::record::{default_window, failure_notes, nominal_peak_m};
 use super::reliance::Readings;
+use crate::error::StudyError;
 use haptic_log::Event;
 use haptic_sim::ecu_events::{EcuEvents, Said};
 use haptic_sim::scenario::{Condition, Failure, FailureKind, Scenario, Sensors};
@@ -81,7 +82,7 @@ pub struct SingleResults {
 ///
 /// # Errors
 /// As [`Scenario::check_times`]; a bus to record where there is none.
-pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, String> {
+pub fn run(scenario: Scenario, record_bus: bool) -> Result<SingleRun, StudyError> {
     scenario.check_times()?;
     if record_bus && (scenario.sensors() == Sensors::Exact || scenario.condition() == Condition::Manual) {
         return Err(

@@ -17,6 +17,7 @@ use haptic_sim::simulation::Run;
 use haptic_sim::stability::{Guided, growth_per_s};
 
 use crate::Away;
+use crate::error::StudyError;
 use crate::handover::{peak_m, stretched_curve};
 use crate::vectorised::run_all;
 
@@ -102,7 +103,7 @@ const SAME_PER_S: f64 = 0.01;
 ///
 /// # Errors
 /// As [`haptic_sim::scenario::ScenarioBuilder::build`]: a scenario that does not go with some place of the map.
-pub fn map(base: &Scenario, progress: impl Fn() + Sync) -> Result<Vec<Place>, String> {
+pub fn map(base: &Scenario, progress: impl Fn() + Sync) -> Result<Vec<Place>, StudyError> {
     let places: Vec<(f64, f64)> = SPEEDS_KMH
         .iter()
         .flat_map(|kmh| DELAYS_S.map(|t_p| (*kmh, t_p)))
@@ -131,7 +132,7 @@ pub fn map(base: &Scenario, progress: impl Fn() + Sync) -> Result<Vec<Place>, St
 ///
 /// # Errors
 /// As [`map`].
-pub fn shares(base: &Scenario) -> Result<Vec<Shares>, String> {
+pub fn shares(base: &Scenario) -> Result<Vec<Shares>, StudyError> {
     let row = |speed_kmh: f64| {
         let mut growth_per_s = [None; SHARES.len()];
         for t_p in DELAYS_S {
@@ -162,7 +163,7 @@ pub fn shares(base: &Scenario) -> Result<Vec<Shares>, String> {
 }
 
 /// The scenario at a place of the map.
-fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result<Scenario, String> {
+fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result<Scenario, StudyError> {
     if base.changes_speed() {
         return Err(
             "speed: a map over speeds has one at each place, and none that changes; leave [speed] out".into(),
@@ -170,7 +171,7 @@ fn at(base: &Scenario, speed_kmh: f64, t_p: f64, condition: Condition) -> Result
     }
     let law = base.guidance().controller.law;
     if law != 0.0 {
-        return Err(format!("guidance.law = {law}: a map is of the paper's law, 0"));
+        return Err(format!("guidance.law = {law}: a map is of the paper's law, 0").into());
     }
     let scenario = base
         .to_builder()
@@ -271,12 +272,11 @@ mod tests {
 
     #[test]
     fn a_speed_that_changes_has_no_place_on_the_map() {
-        let speed = Speed::ByTime {
-            time: vec![0.0, 10.0],
-            kmh: vec![60.0, 50.0],
-        };
+        let speed = Speed::by_time_kmh(vec![0.0, 10.0], &[60.0, 50.0]);
         let scenario = Scenario::builder().speed(speed).build().unwrap();
-        for error in [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()] {
+        for error in
+            [map(&scenario, || ()).unwrap_err(), shares(&scenario).unwrap_err()].map(|e| e.to_string())
+        {
             assert!(error.starts_with("speed: a map over speeds"), "{error}");
         }
     }

@@ -14,6 +14,7 @@ use haptic_sim::simulation::{Run, simulate};
 use haptic_vectorised::{BATCH, Event, Options, Reason, run_batch};
 use rayon::prelude::*;
 
+use crate::error::{StudyError, refuse};
 use crate::shares::count;
 
 /// One in so many runs of a batch is driven by the shipping ECU too.
@@ -65,8 +66,8 @@ impl Group<'_> {
         &self,
         options: Options,
         alone: impl Fn(usize) -> Run,
-        on: impl FnMut(usize, Event) -> Result<(), String>,
-    ) -> Result<Vec<usize>, String> {
+        on: impl FnMut(usize, Event) -> Result<(), StudyError>,
+    ) -> Result<Vec<usize>, StudyError> {
         let too_few = self.scenarios.len() < FEWEST;
         self.with(
             |on| {
@@ -86,8 +87,8 @@ impl Group<'_> {
         &self,
         drive: impl FnOnce(&mut dyn FnMut(usize, Event)),
         alone: impl Fn(usize) -> Run,
-        mut on: impl FnMut(usize, Event) -> Result<(), String>,
-    ) -> Result<Vec<usize>, String> {
+        mut on: impl FnMut(usize, Event) -> Result<(), StudyError>,
+    ) -> Result<Vec<usize>, StudyError> {
         let (mut rejected, mut result) = (Vec::new(), Ok(()));
         drive(&mut |place, event| {
             let (number, is_ended) = (self.first + place as u64, matches!(event, Event::Ended(_)));
@@ -112,9 +113,9 @@ impl Group<'_> {
 }
 
 /// Whether two runs are the same to the last bit, signs of zeros included.
-fn agree(number: u64, batched: &Run, alone: &Run) -> Result<(), String> {
+fn agree(number: u64, batched: &Run, alone: &Run) -> Result<(), StudyError> {
     let differ = |what: String| {
-        Err(format!(
+        refuse(format!(
             "run {number}: {what} side by side and with the shipping ECU. This is a fault of this program, not of what it was \
              given: please report it, with all that is needed to start it again"
         ))
@@ -151,8 +152,8 @@ fn agree(number: u64, batched: &Run, alone: &Run) -> Result<(), String> {
 pub(crate) fn run_all<T: Send>(
     scenarios: &[Scenario],
     seed: u64,
-    measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
-) -> Result<Vec<T>, String> {
+    measure: impl Fn(usize, &Run) -> Result<T, StudyError> + Sync,
+) -> Result<Vec<T>, StudyError> {
     let found = run_batched(scenarios, seed, &measure)?
         .into_par_iter()
         .zip(scenarios);
@@ -169,8 +170,8 @@ pub(crate) fn run_all<T: Send>(
 pub(crate) fn run_batched<T: Send>(
     scenarios: &[Scenario],
     seed: u64,
-    measure: impl Fn(usize, &Run) -> Result<T, String> + Sync,
-) -> Result<Vec<Option<T>>, String> {
+    measure: impl Fn(usize, &Run) -> Result<T, StudyError> + Sync,
+) -> Result<Vec<Option<T>>, StudyError> {
     let checked = Checked::new(seed, scenarios.len() as u64);
     in_groups(scenarios, |first, scenarios| {
         let mut found: Vec<Option<T>> = scenarios.iter().map(|_| None).collect();
@@ -196,8 +197,8 @@ pub(crate) fn run_batched<T: Send>(
 /// What `of_group` says.
 pub(crate) fn in_groups<J: Sync, T: Send>(
     jobs: &[J],
-    of_group: impl Fn(usize, &[J]) -> Result<Vec<T>, String> + Sync,
-) -> Result<Vec<T>, String> {
+    of_group: impl Fn(usize, &[J]) -> Result<Vec<T>, StudyError> + Sync,
+) -> Result<Vec<T>, StudyError> {
     let share = jobs.len().div_ceil(rayon::current_num_threads()).max(1);
     let size = if share < 2 * BATCH {
         share
@@ -211,11 +212,11 @@ pub(crate) fn in_groups<J: Sync, T: Send>(
         if found.len() == group.len() {
             Ok(found)
         } else {
-            Err(format!("{} of {} runs came back", found.len(), group.len()))
+            refuse(format!("{} of {} runs came back", found.len(), group.len()))
         }
     };
     let groups = jobs.par_chunks(size).enumerate().map(one);
-    let groups: Vec<Vec<T>> = groups.collect::<Result<_, String>>()?;
+    let groups: Vec<Vec<T>> = groups.collect::<Result<_, StudyError>>()?;
     Ok(groups.into_iter().flatten().collect())
 }
 
@@ -262,7 +263,7 @@ mod tests {
             change(&mut run);
             let (result, taken) = told(&run);
             assert_eq!(taken, 0, "what is wrong is not taken");
-            result.unwrap_err()
+            result.unwrap_err().to_string()
         };
         let error = lie(&|run| run.trace.samples[700].yaw_rate_rad_per_s += 1e-18);
         assert!(error.starts_with("run 0: yaw_rate"), "{error}");
@@ -311,8 +312,8 @@ mod tests {
         let refused = run_all(
             &scenarios,
             1,
-            |number, _| if number == 5 { Err("5".into()) } else { Ok(()) },
+            |number, _| if number == 5 { refuse("5") } else { Ok(()) },
         );
-        assert_eq!(refused, Err("5".into()));
+        assert_eq!(refused, refuse("5"));
     }
 }

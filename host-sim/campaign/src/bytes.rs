@@ -13,6 +13,8 @@ pub(super) const LANE: u16 = 0x100;
 pub(super) const COLUMN: u16 = 0x110;
 pub(super) const VEHICLE: u16 = 0x120;
 pub(super) const REQUEST: u16 = 0x130;
+/// What the ECU hears, in the order of the senders' counters.
+pub(super) const MESSAGES: [u16; 4] = [LANE, COLUMN, VEHICLE, REQUEST];
 
 /// Codes of the modes.
 pub(super) const STANDBY: u64 = 1;

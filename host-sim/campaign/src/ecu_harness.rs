@@ -96,7 +96,7 @@ impl<'a> EcuHarness<'a> {
             setup: Setup::new(&params).expect("a checked scenario"),
             checker: InvariantChecker::new(
                 is_engaged(row.start),
-                scenario.sensor_errors().camera_latency > 0.0,
+                scenario.sensor_errors().camera_latency_s > 0.0,
                 clock_base_us,
             ),
             residual: Residual::new(scenario.vehicle(), scenario.speed_m_per_s()),

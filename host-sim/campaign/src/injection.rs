@@ -45,6 +45,8 @@ pub(super) enum Change {
     Approaching { value: f64, per_s: f64 },
     /// Plus so much, reached in a straight line within so many ms.
     Sliding { by: f64, ms: u32 },
+    /// Times a factor that is reached in a straight line within so many ms.
+    Growing { to: f64, ms: u32 },
     /// A new value far away in every sample: this much up, this much down.
     Jumping(f64),
 }

@@ -20,6 +20,7 @@
 //! | fade | never grows, falls by 4 N.m/s |
 //! | warning | the bit and, when it appears, the warning frame, in Handover, Fault and Locked, and beside LaneStep in Active |
 
+mod broken;
 mod frame;
 
 use std::collections::VecDeque;
@@ -27,6 +28,7 @@ use std::collections::VecDeque;
 use haptic_core::bus::Frame;
 
 use super::bytes::{self, ACTIVE, FADE, FAULT, HANDOVER, LOCKED, STANDBY, Status};
+use broken::Broken;
 use frame::{override_bounds, warned, well_formed};
 
 const LIMIT_NM: f64 = 5.0;
@@ -185,7 +187,8 @@ impl InvariantChecker {
         self.cycles += 1;
         let status = Status::of(frame);
         let verdict = self.judge(world_us, now_us, frame, &status, others);
-        if let (Err(what), None) = (verdict, &self.violation) {
+        if let (Err(broken), None) = (verdict, &self.violation) {
+            let what = broken.to_string();
             self.violation = Some(Violation { step, what });
         }
         self.last = Some(Last {
@@ -233,12 +236,12 @@ impl InvariantChecker {
         frame: &Frame,
         status: &Status,
         others: &[Frame],
-    ) -> Result<(), String> {
+    ) -> Result<(), Broken> {
         let before = self.last.map(|last| last.status);
         well_formed(frame, status, before.as_ref())?;
         for other in others {
             if other.id() == bytes::WARNING && !bytes::is_intact(other) {
-                return Err("warning frame: CRC does not fit".into());
+                return Err(Broken::WarningFrame);
             }
         }
         let elapsed_us = self.last.map_or(0, |last| now_us.wrapping_sub(last.at_us));
@@ -251,10 +254,10 @@ impl InvariantChecker {
         warned(status, before.is_some_and(|b| b.warning), others)
     }
 
-    fn magnitude(&mut self, world_us: u64, torque_nm: f64) -> Result<(), String> {
+    fn magnitude(&mut self, world_us: u64, torque_nm: f64) -> Result<(), Broken> {
         let magnitude = torque_nm.abs();
         if magnitude > LIMIT_NM {
-            return Err(format!("limit: T = {torque_nm} N.m"));
+            return Err(Broken::Limit(torque_nm));
         }
         while self
             .window
@@ -269,12 +272,12 @@ impl InvariantChecker {
         self.window.push_back((world_us, magnitude));
         let grown = magnitude - self.window.front().map_or(0.0, |(_, least)| *least);
         if grown > WINDOW_NM {
-            return Err(format!("window: abs(T) grew by {grown:.4} N.m within 250 ms"));
+            return Err(Broken::Window(grown));
         }
         Ok(())
     }
 
-    fn rates(&self, status: &Status, old_nm: f64, elapsed_s: f64, now_us: u32) -> Result<(), String> {
+    fn rates(&self, status: &Status, old_nm: f64, elapsed_s: f64, now_us: u32) -> Result<(), Broken> {
         let elapsed_s = elapsed_s.min(MOST_S);
         let (growth, fall) = (
             WIND_UP_NM_PER_S * elapsed_s,
@@ -284,11 +287,11 @@ impl InvariantChecker {
         let sign = if old_nm < 0.0 { -1.0 } else { 1.0 };
         let (old, new) = (old_nm.abs(), sign * status.torque_nm);
         if new > old + growth + TINY_NM || new < -growth - TINY_NM {
-            return Err(format!(
-                "wind-up: T from {old_nm} to {} N.m in {:.3} ms",
-                status.torque_nm,
-                elapsed_s * 1e3
-            ));
+            return Err(Broken::WindUp {
+                old: old_nm,
+                new: status.torque_nm,
+                ms: elapsed_s * 1e3,
+            });
         }
         let column_is_known = self.true_at_us[1].is_some_and(|at| now_us.wrapping_sub(at) <= TIMEOUT_US);
         let (low, high) = if column_is_known {
@@ -297,10 +300,12 @@ impl InvariantChecker {
             (-LIMIT_NM, LIMIT_NM)
         };
         if !(low - TINY_NM..=high + TINY_NM).contains(&status.torque_nm) {
-            return Err(format!(
-                "override: T = {} N.m outside {low} to {high} N.m at T_d = {} N.m",
-                status.torque_nm, self.driver_nm
-            ));
+            return Err(Broken::Override {
+                torque: status.torque_nm,
+                low,
+                high,
+                driver: self.driver_nm,
+            });
         }
         let bound = if sign < 0.0 { -low } else { high };
         let by_driver = new >= bound - LSB_NM - TINY_NM;
@@ -308,31 +313,33 @@ impl InvariantChecker {
         // Across zero the old torque may fall all the way, and the new one grow from there.
         let low = if old > fall { old - fall } else { -growth };
         if new < low - TINY_NM && !by_driver && !by_fault {
-            return Err(format!(
-                "reduction: T from {old_nm} to {} N.m in {:.3} ms, mode {}",
-                status.torque_nm,
-                elapsed_s * 1e3,
-                status.mode
-            ));
+            return Err(Broken::Reduction {
+                old: old_nm,
+                new: status.torque_nm,
+                ms: elapsed_s * 1e3,
+                mode: status.mode,
+            });
         }
         Ok(())
     }
 
-    fn modes(&mut self, status: &Status, old_mode: u64, now_us: u32) -> Result<(), String> {
+    fn modes(&mut self, status: &Status, old_mode: u64, now_us: u32) -> Result<(), Broken> {
         let mode = status.mode;
         if !matches!(mode, ACTIVE | FADE | HANDOVER) && status.torque_nm != 0.0 {
-            return Err(format!("mode {mode}: T = {} N.m", status.torque_nm));
+            let torque = status.torque_nm;
+            return Err(Broken::Torque { mode, torque });
         }
         if matches!(old_mode, FAULT | LOCKED) && mode != old_mode {
-            return Err(format!("mode {old_mode} was left for {mode}"));
+            return Err(Broken::Left { left: old_mode, mode });
         }
         if mode == ACTIVE && old_mode != ACTIVE {
             let waited_us = now_us.wrapping_sub(self.standby_since_us);
             if old_mode != STANDBY || !self.rose || waited_us < READY_US {
-                return Err(format!(
-                    "engaged from mode {old_mode} after {waited_us} us, risen request: {}",
-                    self.rose
-                ));
+                return Err(Broken::Engaged {
+                    from: old_mode,
+                    waited_us,
+                    rose: self.rose,
+                });
             }
             self.rose = false;
         }
@@ -348,14 +355,14 @@ impl InvariantChecker {
                     _ => TIMEOUT_US + LATE_US,
                 };
                 if age_us > most_us {
-                    return Err(format!("Active with a {name} of {age_us} us"));
+                    return Err(Broken::Old { name, age_us });
                 }
             }
         }
         Ok(())
     }
 
-    fn ramps(&mut self, status: &Status, old_mode: u64, old_nm: f64, now_us: u32) -> Result<(), String> {
+    fn ramps(&mut self, status: &Status, old_mode: u64, old_nm: f64, now_us: u32) -> Result<(), Broken> {
         if !matches!(status.mode, FADE | HANDOVER) {
             return Ok(());
         }
@@ -376,7 +383,11 @@ impl InvariantChecker {
             };
         let (torque, old) = (status.torque_nm, old_nm);
         if torque.abs() > old.abs() || torque * old < 0.0 {
-            return Err(format!("mode {}: T from {old} to {torque} N.m", status.mode));
+            return Err(Broken::Grew {
+                mode: status.mode,
+                old,
+                new: torque,
+            });
         }
         let Ramp {
             from_nm: start,
@@ -390,10 +401,12 @@ impl InvariantChecker {
         // A reduction that is rounded away from zero, and the way to the line.
         let falling = old.abs() - reduction_nm_per_s(status) * elapsed_s.min(MOST_S);
         if torque.abs() > line.max(0.0).max(falling) + LSB_NM + TINY_NM {
-            return Err(format!(
-                "mode {}: T = {torque} N.m above its line of {line:.4} N.m after {passed_s:.3} s",
-                status.mode
-            ));
+            return Err(Broken::AboveLine {
+                mode: status.mode,
+                torque,
+                line,
+                passed_s,
+            });
         }
         Ok(())
     }

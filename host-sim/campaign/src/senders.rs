@@ -9,8 +9,8 @@ use haptic_core::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, Turni
 use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::bytes::MESSAGES;
 use super::injection::{Change, Injection, RequestFault, Signal};
-use super::wire::MESSAGES;
 use haptic_sim::guidance::Observation;
 use haptic_sim::models::sensors;
 
@@ -34,7 +34,7 @@ pub(super) struct SensorReadings {
 /// The senders with their counters, and the values that a fault remembers.
 #[derive(Debug, Clone)]
 pub(super) struct Senders {
-    counters: [u8; 4],
+    counters: [u8; MESSAGES.len()],
     /// By signal: the value at the onset.
     held: [Option<f64>; Signal::COUNT],
     toggled: bool,
@@ -49,7 +49,7 @@ impl Senders {
     pub(super) fn new(probe: bool, aligning_gain_nm_s2_per_m: f64) -> Self {
         Self {
             aligning_gain_nm_s2_per_m,
-            counters: [0; 4],
+            counters: [0; MESSAGES.len()],
             held: [None; Signal::COUNT],
             toggled: false,
             requests: 0,
@@ -245,6 +245,7 @@ fn changed(change: &Change, value: f64, held: f64, since_s: f64, noise: &mut Xos
             let way = end - value;
             value + way.signum() * (per_s * since_s).min(way.abs())
         }
+        Change::Growing { to, ms } => value * (1.0 + (to - 1.0) * (since_s * 1e3 / f64::from(ms)).min(1.0)),
         Change::Sliding { by, ms } => value + by * (since_s * 1e3 / f64::from(ms)).min(1.0),
         // A period of the host's messages up, one down.
         Change::Jumping(by) => {

@@ -90,10 +90,10 @@ impl SpeedChange {
     /// The speed of a scenario with this onset.
     pub(super) fn speed(&self, onset_ms: u32) -> Speed {
         let starts_s = f64::from(onset_ms) * 1e-3 + self.starts_after_s;
-        Speed::ByTime {
-            time: vec![starts_s, starts_s + self.lasts_s()],
-            kmh: vec![self.from_kmh, self.to_kmh],
-        }
+        Speed::by_time_kmh(
+            vec![starts_s, starts_s + self.lasts_s()],
+            &[self.from_kmh, self.to_kmh],
+        )
     }
 }
 

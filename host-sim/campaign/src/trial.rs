@@ -300,7 +300,7 @@ impl World {
             let roads = &self.roads[speed][place];
             (roads, SPEEDS_KMH[speed], onset_ms(row, drawn_ms))
         };
-        (roads[side].clone(), Speed::Constant(kmh), onset_ms)
+        (roads[side].clone(), Speed::constant_kmh(kmh), onset_ms)
     }
 
     /// The same of a run whose speed changes.

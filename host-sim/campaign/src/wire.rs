@@ -9,11 +9,8 @@ use haptic_core::bus::Frame;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use super::bytes::{self, COLUMN, LANE, REQUEST, VEHICLE};
+use super::bytes::{self, LANE, MESSAGES};
 use super::injection::{Injection, Wire};
-
-/// The senders' messages, in the order of their counters.
-pub(super) const MESSAGES: [u16; 4] = [LANE, COLUMN, VEHICLE, REQUEST];
 
 /// A frame at the ECU's door.
 #[derive(Debug, Clone, Copy)]
@@ -30,15 +27,15 @@ pub(super) struct Bus {
     log: VecDeque<Vec<Frame>>,
     log_length: usize,
     /// By message: frames since the onset.
-    since_onset: [u32; 4],
+    since_onset: [u32; MESSAGES.len()],
     /// By message: counter at the onset.
-    counters: [Option<u8>; 4],
+    counters: [Option<u8>; MESSAGES.len()],
     /// By message: a frame that waits for its successor.
-    waiting: [Option<Frame>; 4],
+    waiting: [Option<Frame>; MESSAGES.len()],
     /// Frames on their way, with the step in which they arrive.
     late: VecDeque<(u32, Frame)>,
     /// By message: when the last one arrives.
-    last_due: [u32; 4],
+    last_due: [u32; MESSAGES.len()],
 }
 
 impl Bus {
@@ -50,11 +47,11 @@ impl Bus {
         Self {
             log: VecDeque::new(),
             log_length: log_length.unwrap_or(0),
-            since_onset: [0; 4],
-            counters: [None; 4],
-            waiting: [None; 4],
+            since_onset: [0; MESSAGES.len()],
+            counters: [None; MESSAGES.len()],
+            waiting: [None; MESSAGES.len()],
             late: VecDeque::new(),
-            last_due: [0; 4],
+            last_due: [0; MESSAGES.len()],
         }
     }
 

@@ -5,6 +5,8 @@
 
 use std::io::{self, Write};
 
+use crate::recording::RecordingError;
+
 /// A frame with its time and the line that it stands on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CandumpFrame {
@@ -34,14 +36,14 @@ pub fn looks_like_one(text: &str) -> bool {
 ///
 /// # Errors
 /// A line that is not in one of the two forms, with its number.
-pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
+pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, RecordingError> {
     let mut frames: Vec<CandumpFrame> = Vec::new();
     for (line, content) in (1..).zip(text.lines()) {
         let content = content.trim();
         if content.is_empty() {
             continue;
         }
-        let refuse = |what: &str| format!("line {line}: {what}: {content:?}");
+        let refuse = |what: &str| RecordingError(format!("line {line}: {what}: {content:?}"));
         let Some((time, rest)) = content.strip_prefix('(').and_then(|c| c.split_once(')')) else {
             return Err(refuse("no time stamp; record with candump -L"));
         };
@@ -170,7 +172,7 @@ mod tests {
             ("(1.0) can0", "line 1: no frame"),
         ] {
             assert!(looks_like_one(text));
-            let error = parse(text).unwrap_err();
+            let error = parse(text).unwrap_err().to_string();
             assert!(error.starts_with(says), "{error}");
         }
         for table in [

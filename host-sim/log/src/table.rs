@@ -4,16 +4,17 @@
 //! has no comma, with CR LF, a byte order mark, blanks around fields, empty lines and lines that begin with `#` passed over. Every row knows the line that it
 //! stands on. Not here: what the columns mean.
 
-use std::fmt;
 use std::io::{self, Cursor, Read, Write};
 
 /// Why a table was refused.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
     /// It cannot be read at all.
+    #[error("{0}")]
     Unreadable(String),
     /// A row cannot be read.
+    #[error("line {line}: {what}")]
     Row {
         /// Its line, the first of the file being 1.
         line: u64,
@@ -21,6 +22,7 @@ pub enum TableError {
         what: String,
     },
     /// A row has another number of fields than the heading.
+    #[error("line {line}: {found} fields where the header has {expected}")]
     Fields {
         /// Its line.
         line: u64,
@@ -30,8 +32,10 @@ pub enum TableError {
         expected: usize,
     },
     /// A column that is needed is not there.
+    #[error("there is no column {0}")]
     MissingColumn(String),
     /// A field that has to be a number is none.
+    #[error("line {line}: {column} is {text:?}, which is not a number{}", hint(text))]
     NotANumber {
         /// Its line.
         line: u64,
@@ -42,33 +46,14 @@ pub enum TableError {
     },
 }
 
-impl fmt::Display for TableError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unreadable(what) => f.write_str(what),
-            Self::Row { line, what } => write!(f, "line {line}: {what}"),
-            Self::Fields {
-                line,
-                found,
-                expected,
-            } => write!(f, "line {line}: {found} fields where the header has {expected}"),
-            Self::MissingColumn(name) => write!(f, "there is no column {name}"),
-            Self::NotANumber { line, column, text } => {
-                let hint = if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
-                    ": the decimal sign is a point"
-                } else {
-                    ""
-                };
-                write!(
-                    f,
-                    "line {line}: {column} is {text:?}, which is not a number{hint}"
-                )
-            }
-        }
+/// What a text needs to be a number, where it is a decimal comma.
+fn hint(text: &str) -> &'static str {
+    if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
+        ": the decimal sign is a point"
+    } else {
+        ""
     }
 }
-
-impl std::error::Error for TableError {}
 
 /// A row of a table.
 #[derive(Debug, Clone)]

@@ -75,7 +75,7 @@ impl fmt::Display for Decoded {
         } else {
             "bad"
         };
-        match Guidance::unpack(u64::from_le_bytes(data)) {
+        match Guidance::unpack(&data) {
             Some(guidance) => write!(
                 f,
                 ": torque {:.6} N.m, limit {:?}, mode {:?}, faults {:?}, counter {counter}, CRC {crc}",

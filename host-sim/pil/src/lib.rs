@@ -81,13 +81,17 @@ impl fmt::Display for Channel {
 }
 
 impl FromStr for Channel {
-    type Err = String;
+    type Err = PilError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, PilError> {
         match text {
             "fifo" => Ok(Self::Fifo),
             "slcan" => Ok(Self::Slcan),
-            _ => Err(format!("channel '{text}' is neither fifo nor slcan")),
+            _ => Err(PilError::Unknown {
+                what: "channel",
+                name: text.into(),
+                known: "fifo nor slcan",
+            }),
         }
     }
 }
@@ -113,22 +117,25 @@ pub enum Target {
 const WINDOW: usize = 4096;
 
 /// What went wrong, in one line, with what to do about it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PilError {
     /// Something that has to be installed or plugged in first.
+    #[error("{0}")]
     Missing(String),
     /// The image does not build, or the target does not start, answer or end as it should.
+    #[error("{0}")]
     Failed(String),
+    /// A name that is none of those known.
+    #[error("{what} '{name}' is neither {known}")]
+    Unknown {
+        /// What is named.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// The names there are.
+        known: &'static str,
+    },
 }
-
-impl fmt::Display for PilError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (Self::Missing(text) | Self::Failed(text)) = self;
-        f.write_str(text)
-    }
-}
-
-impl std::error::Error for PilError {}
 
 /// What a run showed.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,7 +4,7 @@ use haptic_core::bus::Frame;
 use haptic_core::bus::slcan::{self, Line, Parser};
 use haptic_lockstep::{RECORD_LEN, from_record, to_record};
 
-use super::Channel;
+use super::{Channel, PilError};
 
 /// What an SLCAN client sends first: close what is open, 500 kbit/s, open.
 pub(super) const OPEN: &[u8] = b"C\rS6\rO\r";
@@ -35,7 +35,7 @@ impl Decoder {
     }
 
     /// Takes one byte; a frame if it completes one. An error names bytes that are no frame.
-    pub(super) fn push(&mut self, byte: u8) -> Result<Option<Frame>, String> {
+    pub(super) fn push(&mut self, byte: u8) -> Result<Option<Frame>, PilError> {
         match self {
             Self::Fifo(bytes) => {
                 bytes.push(byte);
@@ -45,7 +45,7 @@ impl Decoder {
                 bytes.clear();
                 from_record(&record)
                     .map(Some)
-                    .ok_or_else(|| format!("no frame's record: {record:02X?}"))
+                    .ok_or_else(|| PilError::Failed(format!("no frame's record: {record:02X?}")))
             }
             Self::Slcan(parser) => match parser.push(byte) {
                 Some(Line::Frame(frame)) => Ok(Some(frame)),

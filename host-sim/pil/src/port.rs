@@ -58,7 +58,7 @@ impl Port {
     pub(super) fn frame(&mut self) -> Result<Option<Frame>, PilError> {
         loop {
             for byte in self.pending.by_ref() {
-                if let Some(frame) = self.decoder.push(byte).map_err(PilError::Failed)? {
+                if let Some(frame) = self.decoder.push(byte)? {
                     return Ok(Some(frame));
                 }
             }

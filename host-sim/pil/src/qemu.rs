@@ -52,13 +52,17 @@ impl fmt::Display for Machine {
 }
 
 impl FromStr for Machine {
-    type Err = String;
+    type Err = PilError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, PilError> {
         [Self::An386, Self::An500]
             .into_iter()
             .find(|machine| machine.name() == text)
-            .ok_or_else(|| format!("machine '{text}' is neither mps2-an386 nor mps2-an500"))
+            .ok_or_else(|| PilError::Unknown {
+                what: "machine",
+                name: text.into(),
+                known: "mps2-an386 nor mps2-an500",
+            })
     }
 }
 

@@ -1,40 +1,36 @@
 //! Input that a person wrote (course, scenario, options), and what is wrong with it.
 
-use std::fmt::{self, Display};
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use serde::de::DeserializeOwned;
 
+use crate::fields::old_name;
+use crate::scenario::fields_of;
+
 /// Bad input: which file or option, and what is wrong with it. Never a fault of the program.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: {message}")]
 pub struct InputError {
-    source: String,
+    place: String,
     message: String,
 }
 
 impl InputError {
-    /// `source` names the file or option, `message` the field, its value and its range.
-    pub fn new(source: impl Display, message: impl Display) -> Self {
+    /// `place` names the file or option, `message` the field, its value and its range.
+    pub fn new(place: impl Display, message: impl Display) -> Self {
         Self {
-            source: source.to_string(),
+            place: place.to_string(),
             message: message.to_string().trim_end().to_string(),
         }
     }
 }
 
-impl Display for InputError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.source, self.message)
-    }
-}
-
-impl std::error::Error for InputError {}
-
 /// What a TOML text says.
 ///
 /// # Errors
 /// Line, column and what is wrong there: syntax, an unknown field, a value of the wrong kind; that the file is one of another
-/// kind, where it is.
+/// kind, where it is; what a field of an old name is called.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         // The parser speaks of Rust's types; whoever wrote the file need not know them.
@@ -43,7 +39,7 @@ pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Inpu
             .replace("expected f64", "expected a number")
             .replace("expected u64", "expected a whole number, 0 or more")
             .replace("expected path string", "expected a string");
-        match other_kind::<T>(text) {
+        match other_kind::<T>(text).or_else(|| old_name(text, fields_of)) {
             Some(hint) => InputError::new(name, hint),
             None => InputError::new(name, message),
         }
@@ -74,7 +70,8 @@ fn other_kind<T: DeserializeOwned>(text: &str) -> Option<String> {
 }
 
 /// A value outside its range, or NaN.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{field} = {value}{space}{unit} is outside {min} to {max}{space}{unit}", space = if unit.is_empty() { "" } else { " " })]
 pub struct RangeError {
     /// The field, with the table that it is in.
     pub field: String,
@@ -94,31 +91,6 @@ impl RangeError {
     pub fn within(mut self, table: &str) -> Self {
         self.field = format!("{table}.{}", self.field);
         self
-    }
-}
-
-impl Display for RangeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let space = if self.unit.is_empty() { "" } else { " " };
-        let Self {
-            field,
-            value,
-            min,
-            max,
-            unit,
-        } = self;
-        write!(
-            f,
-            "{field} = {value}{space}{unit} is outside {min} to {max}{space}{unit}"
-        )
-    }
-}
-
-impl std::error::Error for RangeError {}
-
-impl From<RangeError> for String {
-    fn from(error: RangeError) -> Self {
-        error.to_string()
     }
 }
 

@@ -68,10 +68,15 @@ impl Parameter {
     }
 }
 
+/// A function that makes a part, as [`Make::Part`] has one.
+pub type MakeGiven<P> = dyn Fn(&Scenario, &[f64]) -> Result<Box<P>, ScenarioError> + Send + Sync;
+
 /// How a part is made of a scenario and of the values of its kind's parameters, in their order.
-pub enum Make<P: ?Sized> {
+pub enum Make<P: ?Sized + 'static> {
     /// By itself.
     Part(fn(&Scenario, &[f64]) -> Result<Box<P>, ScenarioError>),
+    /// By itself, by a function with a memory of its own: what another language brings.
+    Given(&'static MakeGiven<P>),
     /// Around another one.
     Around(fn(&Scenario, &[f64], Box<P>) -> Box<P>),
 }

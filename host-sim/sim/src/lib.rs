@@ -41,6 +41,7 @@
 pub mod action;
 pub mod drivers;
 pub mod ecu_events;
+pub mod fields;
 pub mod fork;
 pub mod guidance;
 pub mod input;

@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::input::{RangeError, in_range};
 use crate::models::driver::{ArmGains, DriverParameters};
 
 /// A driver as the paper identified it.
@@ -71,6 +72,16 @@ pub fn participants() -> Vec<Participant> {
     let file: File = toml::from_str(include_str!("../data/participants.toml"))
         .expect("the built-in table is valid: a test reads it");
     file.participant
+}
+
+/// The participant of a number that `field` holds.
+///
+/// # Errors
+/// There is no such number.
+pub fn participant(field: &str, number: u32) -> Result<Participant, RangeError> {
+    let all = participants();
+    in_range(field, f64::from(number), 1.0..=all.len() as f64, "")?;
+    Ok(all[number as usize - 1])
 }
 
 #[cfg(test)]

@@ -95,6 +95,6 @@ mod tests {
             .collect();
         assert_eq!(seeds.len(), 9000);
         assert_eq!(Stream::Remnant.seed(7), 7);
-        assert_ne!(named(1, "driver.t_p"), named(1, "driver.t_n"));
+        assert_ne!(named(1, "driver.t_p_s"), named(1, "driver.t_n_s"));
     }
 }

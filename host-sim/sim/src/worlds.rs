@@ -267,16 +267,20 @@ impl WorldKind {
             },
             mu: if self.has(Slippery) { 0.3 } else { off.mu },
             // Three standard deviations are 600 N, and with the lever 300 N.m.
-            gust_sd: match self {
+            gust_sd_n: match self {
                 _ if self.has(Gusts) => 330.0,
                 _ if self.has(Wind) => 200.0,
-                _ => off.gust_sd,
+                _ => off.gust_sd_n,
             },
-            gust_corner: if self.has(Gusts) { 1.0 } else { off.gust_corner },
-            wind_lever: 0.5,
-            motor_ripple: if self.has(Motor) { 0.02 } else { off.motor_ripple },
-            motor_lag: if self.has(Motor) { 0.002 } else { off.motor_lag },
-            assist: if self.has(Assist) { 8.0 } else { off.assist },
+            gust_corner_hz: if self.has(Gusts) { 1.0 } else { off.gust_corner_hz },
+            wind_lever_m: 0.5,
+            motor_ripple_nm: if self.has(Motor) {
+                0.02
+            } else {
+                off.motor_ripple_nm
+            },
+            motor_lag_s: if self.has(Motor) { 0.002 } else { off.motor_lag_s },
+            assist_nm: if self.has(Assist) { 8.0 } else { off.assist_nm },
             ..off
         }
     }
@@ -288,10 +292,10 @@ impl WorldKind {
             ..Tolerances::default()
         };
         if self.has(Friction) {
-            (tolerances.friction_least, tolerances.friction_most) = (0.2, 0.4);
+            (tolerances.friction_least_nm, tolerances.friction_most_nm) = (0.2, 0.4);
         }
         if self.has(Motor) {
-            (tolerances.motor_lag, tolerances.motor_error) = (0.018, 0.1);
+            (tolerances.motor_lag_s, tolerances.motor_error) = (0.018, 0.1);
         }
         if !self.has(Part::Tolerances) {
             return tolerances;
@@ -299,10 +303,10 @@ impl WorldKind {
         Tolerances {
             tyres: 0.15,
             trail: 0.15,
-            load: 300.0,
-            torque_bias: 0.08,
-            angle_bias: 1.0,
-            camera_yaw: 1.5,
+            load_kg: 300.0,
+            torque_bias_nm: 0.08,
+            angle_bias_rad: 1.0_f64.to_radians(),
+            camera_yaw_rad: 0.0015,
             ..tolerances
         }
     }
@@ -311,8 +315,8 @@ impl WorldKind {
     pub fn sensor_errors(&self) -> SensorErrors {
         if self.has(Blind) {
             return SensorErrors {
-                dropouts: 30.0,
-                dropout: 0.5,
+                dropout_rate_per_s: 30.0 / 3600.0,
+                dropout_duration_s: 0.5,
                 ..SensorErrors::default()
             };
         }
@@ -320,10 +324,10 @@ impl WorldKind {
             return SensorErrors::default();
         }
         SensorErrors {
-            camera_latency: 0.04,
-            camera_jitter: 0.01,
-            lane_noise: 0.03,
-            heading_noise: 2.0,
+            camera_latency_s: 0.04,
+            camera_jitter_s: 0.01,
+            lane_noise_m: 0.03,
+            heading_noise_rad: 0.002,
             ..SensorErrors::default()
         }
     }

@@ -14,16 +14,14 @@ use haptic_sim::simulation::{Ending, Run, observe, simulate};
 use haptic_sim::{Action, Scenario, Simulation};
 
 fn by_time(points: &[(f64, f64)]) -> Speed {
-    Speed::ByTime {
-        time: points.iter().map(|p| p.0).collect(),
-        kmh: points.iter().map(|p| p.1).collect(),
-    }
+    let kmh: Vec<f64> = points.iter().map(|p| p.1).collect();
+    Speed::by_time_kmh(points.iter().map(|p| p.0).collect(), &kmh)
 }
 
 fn by_place(points: &[(f64, f64)]) -> Speed {
     Speed::ByPlace {
-        place: points.iter().map(|p| p.0).collect(),
-        kmh: points.iter().map(|p| p.1).collect(),
+        place_m: points.iter().map(|p| p.0).collect(),
+        speed_m_per_s: points.iter().map(|p| p.1 / 3.6).collect(),
     }
 }
 

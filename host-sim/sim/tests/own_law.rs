@@ -14,6 +14,7 @@ use haptic_sim::{Action, Scenario, Simulation};
 fn law_of(kind: &Kind<dyn Law>, scenario: &Scenario) -> Box<dyn Law> {
     match kind.make {
         Make::Part(make) => make(scenario, &kind.defaults()).unwrap(),
+        Make::Given(make) => make(scenario, &kind.defaults()).unwrap(),
         Make::Around(make) => make(scenario, &kind.defaults(), Box::new(Gains::PAPER)),
     }
 }

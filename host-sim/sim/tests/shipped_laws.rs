@@ -106,8 +106,8 @@ fn laws_on_the_ecu_are_those_in_f64() {
 #[test]
 fn the_monitor_refuses_no_honest_law() {
     let camera = SensorErrors {
-        lane_noise: 0.01,
-        heading_noise: 1.0,
+        lane_noise_m: 0.01,
+        heading_noise_rad: 1e-3,
         ..SensorErrors::default()
     };
     let cases = [
@@ -116,24 +116,24 @@ fn the_monitor_refuses_no_honest_law() {
         (
             "a late camera",
             SensorErrors {
-                camera_latency: 0.1,
-                camera_jitter: 0.01,
+                camera_latency_s: 0.1,
+                camera_jitter_s: 0.01,
                 ..camera
             },
         ),
         (
             "blinks",
             SensorErrors {
-                dropouts: 360.0,
-                dropout: 0.3,
+                dropout_rate_per_s: 0.1,
+                dropout_duration_s: 0.3,
                 ..camera
             },
         ),
         (
             "lines beside",
             SensorErrors {
-                line_jumps: 120.0,
-                line_jump: 0.6,
+                line_jump_rate_per_s: 120.0 / 3600.0,
+                line_jump_m: 0.6,
                 ..camera
             },
         ),
@@ -141,14 +141,14 @@ fn the_monitor_refuses_no_honest_law() {
             "a false yaw rate",
             SensorErrors {
                 yaw_rate_gain: 1.3,
-                yaw_rate_noise: 10.0,
+                yaw_rate_noise_rad_per_s: 0.01,
                 ..camera
             },
         ),
         (
             "a biased yaw rate",
             SensorErrors {
-                yaw_rate_bias: 30.0,
+                yaw_rate_bias_rad_per_s: 0.03,
                 ..camera
             },
         ),

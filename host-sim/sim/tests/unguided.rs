@@ -58,8 +58,8 @@ fn at(found_s: f64, wanted_s: f64) -> bool {
 #[test]
 fn a_run_says_what_the_bus_says() {
     let blind = SensorErrors {
-        dropouts: 720.0,
-        dropout: 1.5,
+        dropout_rate_per_s: 0.2,
+        dropout_duration_s: 1.5,
         ..SensorErrors::default()
     };
     for condition in [Condition::High, Condition::Mid, Condition::Low] {
@@ -181,10 +181,7 @@ fn what_the_scenario_lets_fail_is_asked_for() {
 /// later the driver asks again.
 #[test]
 fn a_slow_stretch_is_away_until_guidance_is_back() {
-    let speed = Speed::ByTime {
-        time: vec![8.0, 14.5, 25.5, 32.0],
-        kmh: vec![36.0, 12.6, 12.6, 36.0],
-    };
+    let speed = Speed::by_time_kmh(vec![8.0, 14.5, 25.5, 32.0], &[36.0, 12.6, 12.6, 36.0]);
     let course = Course::from_toml("s", "[[segment]]\nlength = 400").unwrap();
     let scenario = Scenario::builder().course(course).speed(speed).build().unwrap();
     let (found, on_the_bus) = driven(&scenario);

@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         bar.inc(1);
         checkpoint
             .as_ref()
-            .map_or(Ok(()), |checkpoint| checkpoint.add(leg))
+            .map_or(Ok(()), |checkpoint| Ok(checkpoint.add(leg)?))
     })?;
     bar.finish_and_clear();
     let results = Balance {

@@ -32,6 +32,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     if let Some(place) = output.place() {
         let table = results.to_csv();
         write_file(&place.join("drives.csv"), |file| file.write_all(table.as_bytes()))?;
+        results.write_parquet(std::fs::File::create(place.join("drives.parquet"))?)?;
     }
     let report = report(&results);
     output.show(&report, &report.stamp(&results), true)

@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let results = on_threads(arguments.threads, || {
         design.run(&known, |set| {
             bar.inc(1);
-            checkpoint.add(set)
+            Ok(checkpoint.add(set)?)
         })
     })??;
     bar.finish_and_clear();

@@ -6,6 +6,7 @@
 //!
 //! One file per command; their groups in `--help` and their older names are in `names`. Not here: anything that a study or a model decides.
 
+mod adaptation;
 mod availability;
 mod checkpoint;
 mod compare;
@@ -80,6 +81,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Gains of the guidance for a population of drivers, judged on held-out drives
     DesignGuidance(design_guidance::Arguments),
+    /// A law that adapts to a driver who adapts to it: small gain, equilibria, swings
+    Adaptation(adaptation::Arguments),
     /// A road from a file: its lane, length and picture, its centre every metre
     Course(course::Arguments),
     /// A map over speed and delay: where a driver keeps the lane, alone and guided
@@ -182,6 +185,7 @@ fn run(command: &Command) -> Result<Outcome, BadInput> {
         Command::Run(arguments) => run::run(arguments),
         Command::Sweep(arguments) => sweep::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
+        Command::Adaptation(arguments) => adaptation::run(arguments),
         Command::DesignGuidance(arguments) => design_guidance::run(arguments),
         Command::Course(arguments) => course::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),

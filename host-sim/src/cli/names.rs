@@ -15,6 +15,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "sweep",
             "compare",
             "design-guidance",
+            "adaptation",
             "course",
             "stability",
             "lab",

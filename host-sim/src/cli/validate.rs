@@ -1,6 +1,7 @@
 //! `host-sim validate`: the estimates of `identify` against drivers whose truth is known.
 
 use clap::{ArgGroup, Args};
+use haptic_batch::StudyError;
 use haptic_batch::experiment::{
     CHANNELS, POPULATION, Plan, changes, corruptions, methods, recordings, repeat,
 };
@@ -81,7 +82,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         1
     };
     let drives = fits * plan.participants.len() as u64 * u64::from(seeds);
-    let result = progress::over(drives, "drives", |done| -> Result<_, String> {
+    let result = progress::over(drives, "drives", |done| -> Result<_, StudyError> {
         Ok(if arguments.coverage.is_some() {
             Validation::Coverage(repeat(&plan, seeds, done)?)
         } else if arguments.corruptions.is_some() {

@@ -12,7 +12,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
     write("unknown.toml", "[driver]\nt_q = 1\n");
     write("manual.toml", "condition = 'manual'\n");
     write("exact.toml", "sensors = 'exact'\n");
-    write("late.toml", "[failure]\nkind = 'torque'\ntime = 5000\n");
+    write("late.toml", "[failure]\nkind = 'torque'\ntime_s = 5000\n");
     write("empty.toml", "");
     write("course.toml", "[[segment]]\nlength = 500\n");
     write("on-a-tight-road.toml", "course = 'tight.toml'\n");
@@ -85,7 +85,7 @@ fn bad_input_and_bad_usage_exit_with_2_and_say_why() {
         ),
         (
             &["run", "late.toml"],
-            "late.toml: failure.time = 5000 s is outside 0 to 200 s",
+            "late.toml: failure.time_s = 5000 s is outside 0 to 200 s",
         ),
         (
             &["evaluate", "--course", "empty.toml"],

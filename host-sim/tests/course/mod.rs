@@ -384,7 +384,7 @@ fn a_scenario_drives_on_a_lane_as_on_the_same_course_in_toml() {
     // A banked lane of somebody else's, far from the origin of its file, with kinks and widths that change.
     let foreign = root().join("tests/data/xodr/every_kind.xodr");
     let drive = run(
-        "speed = 50",
+        "speed_m_per_s = 14",
         &["--course", foreign.to_str().unwrap(), "--lane", "-1"],
     );
     assert_eq!(drive[1], false, "{drive:?}");

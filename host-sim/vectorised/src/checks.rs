@@ -8,10 +8,11 @@
 //! which in one of six core knows a message later: at 8 m/s2 that is 0.08 m/s, and less than 0.002 m in the sum.
 
 use haptic_core::controller::params::Params;
+use haptic_core::safety::frozen_torque;
 use haptic_core::safety::plausibility::{self, ALIGNING_ERROR, PUSHED, UNREAL};
 use haptic_core::safety::yaw::{self, BIAS_SHIFT};
 
-use super::counts::{ONE, flag, speed_heard};
+use super::counts::{ONE, flag, ms, speed_heard};
 use super::rejected::Reason;
 use haptic_sim::scenario::Scenario;
 
@@ -21,14 +22,14 @@ const COLUMN_MARGIN: f64 = plausibility::COLUMN_MARGIN.nm_s() - NARROWER;
 const LANE_MARGIN: f64 = plausibility::LANE_MARGIN.m() - NARROWER;
 /// Core asks for half of the margin.
 const LANE_MOVED: f64 = 0.5 * plausibility::LANE_MARGIN.m() - NARROWER;
-const LANE_UNREAL: f64 = UNREAL as f64 / ONE - NARROWER;
+const LANE_UNREAL: f64 = UNREAL.m() - NARROWER;
 const COLUMN_BIAS: f64 = plausibility::COLUMN_BIAS.nm();
 const LANE_BIAS: f64 = plausibility::LANE_BIAS.m_per_s();
 const LEARNS: f64 = 1.0 / (1 << BIAS_SHIFT) as f64;
 const FRICTION: f64 = plausibility::FRICTION.nm();
-const TOLERANCE: f64 = ALIGNING_ERROR as f64 / (1_u64 << 32) as f64;
+const TOLERANCE: f64 = ALIGNING_ERROR.si();
 const ASSIST: f64 = plausibility::ASSIST as f64;
-const PUSHED_NM: f64 = PUSHED as f64 / ONE;
+const PUSHED_NM: f64 = PUSHED.nm();
 const MOST_ALIGNING_NM: f64 = 16.0;
 /// Far inside what the frames carry, rad and rad/s.
 const LARGEST_WHEEL: f64 = 12.0;
@@ -44,8 +45,15 @@ const MOST_BY_WHEEL: f64 = yaw::ORDINARY_SIDEWAYS as f64;
 const DOUBTFUL: f64 = 0.25 * yaw::MARGIN.rad();
 /// Counts of a yaw rate on the bus, per rad/s.
 const YAW_RATE_COUNTS: f64 = 4096.0;
+/// A driver torque is still for so long, ms, a little shorter than core's; so far the wheel turns meanwhile, less a step of its
+/// sensor.
+const STILL_MS: i32 = ms(frozen_torque::LASTS) as i32 - 10;
+const STILL_WITHIN_MS: i32 = ms(frozen_torque::WITHIN) as i32;
+const TURNED: f64 = frozen_torque::MOST_TURN.rad() - 0.002;
+const TURNED_WHEN_ASKED: f64 = frozen_torque::MOST_TURN_WHEN_TESTED.rad() - 0.002;
 /// Times in s: between frames of the column, and of the vehicle.
 const COLUMN_S: f64 = 0.002;
+const COLUMN_MS: i32 = 2;
 const VEHICLE_S: f64 = 0.010;
 /// Directions of the line are kept, one every 25 ms.
 const LINES: usize = 32;
@@ -72,6 +80,12 @@ pub(super) struct Checks<const N: usize> {
     wheel: [f64; N],
     column_bias: [f64; N],
     column_sum: [f64; N],
+    /// The driver torque, for how long it has been the same, ms, between which wheel angles, and what these may differ by.
+    torque: [f64; N],
+    still_ms: [i32; N],
+    least: [f64; N],
+    most: [f64; N],
+    may_turn: [f64; N],
     /// The last picture, and whether it differed from the one before.
     e_y: [f64; N],
     e_theta: [f64; N],
@@ -110,6 +124,11 @@ impl<const N: usize> Checks<N> {
             wheel: [0.0; N],
             column_bias: [0.0; N],
             column_sum: [0.0; N],
+            torque: [0.0; N],
+            still_ms: [0; N],
+            least: [0.0; N],
+            most: [0.0; N],
+            may_turn: [0.0; N],
             e_y: [0.0; N],
             e_theta: [0.0; N],
             is_alive: [0.0; N],
@@ -129,6 +148,12 @@ impl<const N: usize> Checks<N> {
         let vehicle = params.vehicle;
         self.aligning_gain[lane] = vehicle.aligning_gain_nm_s2_per_m;
         self.damping[lane] = vehicle.column_damping_nm_s;
+        self.still_ms[lane] = 0;
+        self.may_turn[lane] = if scenario.guidance().probe {
+            TURNED_WHEN_ASKED
+        } else {
+            TURNED
+        };
         let between_s = (vehicle.far_time_s - vehicle.near_time_s).max(0.0);
         self.between_us[lane] = (between_s * 1e6 + 0.5) as i32;
         for state in [
@@ -141,6 +166,9 @@ impl<const N: usize> Checks<N> {
             &mut self.wheel,
             &mut self.column_bias,
             &mut self.column_sum,
+            &mut self.torque,
+            &mut self.least,
+            &mut self.most,
             &mut self.e_y,
             &mut self.e_theta,
             &mut self.is_alive,
@@ -209,9 +237,17 @@ impl<const N: usize> Checks<N> {
         const RESOLUTION: f64 = haptic_sim::models::sensors::ANGLE_RESOLUTION_DEG;
         for l in 0..N {
             let dt = COLUMN_S * self.began[l];
+            let begins = (driver[l] != self.torque[l]) | (self.still_ms[l] >= STILL_WITHIN_MS);
+            self.torque[l] = driver[l];
+            self.still_ms[l] = if begins { 0 } else { self.still_ms[l] + COLUMN_MS };
             let sensed = (wheel[l].to_degrees() / RESOLUTION).round() * RESOLUTION.to_radians();
             let damped = (sensed - self.wheel[l]) * self.damping[l];
             self.wheel[l] = sensed;
+            self.least[l] = if begins { sensed } else { self.least[l].min(sensed) };
+            self.most[l] = if begins { sensed } else { self.most[l].max(sensed) };
+            let turned = self.most[l] - self.least[l];
+            let is_still = (self.still_ms[l] >= STILL_MS) & (turned >= self.may_turn[l]);
+            suspect[l] |= flag(is_still) & matters[l] & Reason::ColumnCheck.bit();
             let aligning = self.aligning[l];
             let is_doubtful = (self.yaw_sum[l].abs() > DOUBTFUL) & (self.is_alive[l] != 0.0);
             let pushed = if is_doubtful { MOST_ALIGNING_NM } else { PUSHED_NM };

@@ -119,7 +119,7 @@ impl Coast {
 
     /// What is left of what the law asks for, and of the share that acts.
     pub(super) fn left(&self, lost_ms: u32, asked: i32, share: i32) -> (i32, i32) {
-        let away = lost_ms as i32 * 1000 * coast::AWAY_PER_US;
+        let away = lost_ms as i32 * 1000 * bits(coast::AWAY_PER_US.nm());
         let asked = asked
             .max(self.asked.saturating_sub(away))
             .min(self.asked.saturating_add(away));

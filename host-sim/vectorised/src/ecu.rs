@@ -29,7 +29,7 @@ const WINDOW_GROWTH: i32 = bits(envelope::WINDOW_GROWTH.nm());
 const WINDOW_STEPS: i32 = ms(envelope::WINDOW) as i32;
 const OVERRIDE_FROM: i32 = bits(envelope::OVERRIDE_FROM.nm());
 const OVERRIDE_SLOPE: i32 = envelope::OVERRIDE_SLOPE.si() as i32;
-const MAX_RATE: i32 = law::MAX_RATE as i32;
+const MAX_RATE: i32 = (law::MAX_RATE << 20) as i32;
 const LANE_STEP: i32 = bits(plausibility::LANE_STEP.m());
 const YAW_STEP: i32 = bits(plausibility::YAW_STEP.rad());
 /// Ends of a lane sample on the bus, 4 m and 0.5 rad, and a bit less.
@@ -302,8 +302,9 @@ impl<const N: usize> Ecus<N> {
             let is_small = sensed.abs() <= LARGEST_DRIVER_NM;
             self.suspect[l] |= !flag(is_small) & self.matters[l] & Reason::SensorRange.bit();
             self.driver[l] = driver;
-            let is_felt =
-                (driver.wrapping_abs() > HELD) | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT);
+            let is_felt = self.probes.is_passing_zero(l)
+                & ((driver.wrapping_abs() > HELD)
+                    | (driver.wrapping_sub(self.felt[l]).wrapping_abs() > FELT));
             self.felt[l] = if is_felt { driver } else { self.felt[l] };
             self.without_ms[l] = if is_felt { 0 } else { self.without_ms[l] };
         }

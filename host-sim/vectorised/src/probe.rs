@@ -3,6 +3,7 @@
 //! What its answer tells, the estimator's, moves nothing: a run's samples hold none of it, and the lanes leave it out.
 
 use haptic_core::controller::params::Params;
+use haptic_core::law::probe::SIXTEENTH;
 
 use super::counts::bits;
 
@@ -52,6 +53,14 @@ impl<const N: usize> Probes<N> {
     /// Whether a run has one.
     pub(super) fn is_on(&self, lane: usize) -> bool {
         self.amplitude[lane] != 0
+    }
+
+    /// Where it stands at the place of its wave at which core compares driver torques, or there is none.
+    #[inline(always)]
+    pub(super) fn is_passing_zero(&self, lane: usize) -> bool {
+        (self.gain[lane] == 0)
+            | (self.amplitude[lane] == 0)
+            | (self.phase[lane].wrapping_add(SIXTEENTH >> 1) < SIXTEENTH)
     }
 
     /// From its second step on a run's steps take a millisecond each.

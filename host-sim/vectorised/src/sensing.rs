@@ -32,8 +32,8 @@ impl<const N: usize> Senses<N> {
             .as_ref()
             .map_or_else(SensorErrors::default, |sensing| sensing.errors);
         self.torque_gain[lane] = errors.torque_gain;
-        self.torque_bias[lane] = errors.torque_bias;
-        self.angle_bias[lane] = errors.angle_bias.to_radians();
+        self.torque_bias[lane] = errors.torque_bias_nm;
+        self.angle_bias[lane] = errors.angle_bias_rad;
         self.own[lane] = sensing;
         self.is_any = self.own.iter().any(Option::is_some);
     }

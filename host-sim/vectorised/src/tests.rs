@@ -69,16 +69,16 @@ type Beside = fn(ScenarioBuilder, &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBu
 /// Sensors with errors, but a camera that is in time.
 fn erring(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> ScenarioBuilder {
     builder.sensor_errors(SensorErrors {
-        torque_bias: between(-0.1, 0.1),
+        torque_bias_nm: between(-0.1, 0.1),
         torque_gain: between(0.95, 1.05),
-        angle_bias: between(-1.5, 1.5),
+        angle_bias_rad: between(-0.026, 0.026),
         speed_gain: between(0.97, 1.03),
-        yaw_rate_bias: between(-5.0, 5.0),
+        yaw_rate_bias_rad_per_s: between(-0.005, 0.005),
         yaw_rate_gain: between(0.97, 1.03),
-        yaw_rate_noise: between(-2.0, 3.0).max(0.0),
-        lane_noise: between(-0.02, 0.03).max(0.0),
-        heading_noise: between(-2.0, 2.0).max(0.0),
-        camera_yaw: between(-2.0, 2.0),
+        yaw_rate_noise_rad_per_s: between(-0.002, 0.003).max(0.0),
+        lane_noise_m: between(-0.02, 0.03).max(0.0),
+        heading_noise_rad: between(-0.002, 0.002).max(0.0),
+        camera_yaw_rad: between(-0.002, 0.002),
         ..SensorErrors::default()
     })
 }
@@ -97,21 +97,21 @@ fn real(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> S
         },
         mu: some(0.5, 0.6, 1.0, 1.0),
         castor_share: some(0.5, 0.2, 0.6, 0.4),
-        bank: some(0.3, -0.04, 0.04, 0.0),
-        friction: some(0.5, 0.1, 0.4, 0.0),
-        friction_give: some(0.5, 0.1, 0.5, 0.2),
-        assist: some(0.3, 1.0, 8.0, 0.0),
-        motor_lag: some(0.3, 0.001, 0.02, 0.0),
+        bank_rad: some(0.3, -0.04, 0.04, 0.0),
+        friction_nm: some(0.5, 0.1, 0.4, 0.0),
+        friction_give_rad: some(0.5, 0.0017, 0.0087, 0.0035),
+        assist_nm: some(0.3, 1.0, 8.0, 0.0),
+        motor_lag_s: some(0.3, 0.001, 0.02, 0.0),
         motor_error: some(0.3, -0.1, 0.1, 0.0),
-        motor_ripple: some(0.3, 0.01, 0.03, 0.0),
-        wind: some(0.3, -200.0, 200.0, 0.0),
-        gust_sd: some(0.5, 20.0, 200.0, 0.0),
+        motor_ripple_nm: some(0.3, 0.01, 0.03, 0.0),
+        wind_n: some(0.3, -200.0, 200.0, 0.0),
+        gust_sd_n: some(0.5, 20.0, 200.0, 0.0),
         ..WorldParameters::default()
     };
     let tolerances = Tolerances {
         tyres: some(0.3, 0.0, 0.15, 0.0),
         trail: some(0.3, 0.0, 0.15, 0.0),
-        load: some(0.3, 0.0, 300.0, 0.0),
+        load_kg: some(0.3, 0.0, 300.0, 0.0),
         ..Tolerances::default()
     };
     let is_banked = some(0.5, 1.0, 1.0, 0.0) != 0.0;
@@ -129,10 +129,14 @@ fn changing(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) 
     let kmh = vec![first, first * between(0.25, 1.1), first * between(0.3, 1.0)];
     if between(0.0, 1.0) < 0.5 {
         let time = vec![between(1.0, 5.0), between(12.0, 15.0), between(22.0, 26.0)];
-        builder.speed(Speed::ByTime { time, kmh })
+        builder.speed(Speed::by_time_kmh(time, &kmh))
     } else {
-        let place = vec![between(10.0, 80.0), between(250.0, 300.0), between(480.0, 600.0)];
-        builder.speed(Speed::ByPlace { place, kmh })
+        let place_m = vec![between(10.0, 80.0), between(250.0, 300.0), between(480.0, 600.0)];
+        let speed_m_per_s = kmh.iter().map(|kmh| kmh / 3.6).collect();
+        builder.speed(Speed::ByPlace {
+            place_m,
+            speed_m_per_s,
+        })
     }
 }
 
@@ -344,8 +348,7 @@ fn what_cannot_be_vectorised_is_named_and_rejected() {
         let another = Scenario::builder().guidance(guidance).build().unwrap();
         assert_eq!(unsupported_reason(&another), Some(Reason::AnotherLaw));
     }
-    let (time, kmh) = (vec![0.0, 50.0], vec![60.0; 2]);
-    let equal = Speed::ByTime { time, kmh };
+    let equal = Speed::by_time_kmh(vec![0.0, 50.0], &[60.0; 2]);
     let equal = Scenario::builder().speed(equal).build().unwrap();
     assert_eq!(unsupported_reason(&equal), None);
     let mut failure = Scenario::default().failure();

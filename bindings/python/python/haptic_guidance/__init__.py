@@ -14,11 +14,13 @@ Examples
 from ._errors import InputError, RangeError, UnknownNameError
 from ._identify import Change, Fit, Parameter, Piece, identify
 from ._native import (
+    INPUT_IDS,
     Action,
     Bus,
     DriverView,
     Ecu,
     Frame,
+    LawView,
     Outcome,
     Scenario,
     Simulation,
@@ -26,10 +28,11 @@ from ._native import (
     metric_definitions,
     parameters,
 )
-from ._results import Evaluation, Experiment, Run, evaluate, experiment, simulate
+from ._results import Comparison, Evaluation, Experiment, Run, compare, evaluate, experiment, simulate
 from ._sweep import SweepResult, sweep
 
 __all__ = [
+    "INPUT_IDS",
     "Action",
     "Bus",
     "DriverView",
@@ -37,9 +40,11 @@ __all__ = [
     "Evaluation",
     "Experiment",
     "Change",
+    "Comparison",
     "Fit",
     "Frame",
     "InputError",
+    "LawView",
     "Outcome",
     "Parameter",
     "Piece",
@@ -50,6 +55,7 @@ __all__ = [
     "Step",
     "SweepResult",
     "UnknownNameError",
+    "compare",
     "evaluate",
     "experiment",
     "identify",

@@ -5,12 +5,12 @@ from typing import Any, Literal, Optional, Union, final
 import numpy as np
 from typing_extensions import Required, TypedDict, Unpack
 
-# A test holds the fields of a scenario to those that the simulator knows.
+# The tables of a scenario are made of the lists of fields: FIELDS=write cargo test -p host-sim file_fields::
 
 class SpeedTable(TypedDict, total=False):
-    time: Sequence[float]
-    place: Sequence[float]
-    kmh: Required[Sequence[float]]
+    time_s: Sequence[float]
+    place_m: Sequence[float]
+    speed_m_per_s: Required[Sequence[float]]
 
 class SegmentTable(TypedDict, total=False):
     length: Required[float]
@@ -31,128 +31,122 @@ class CourseTable(TypedDict, total=False):
     opendrive: str
 
 class DriverTable(TypedDict, total=False):
-    a_1: float
-    a_2: float
+    a_1_rad_per_m: float
+    a_2_rad_per_m_s: float
     a_3: float
-    t_p: float
-    t_n: float
-    t_f: float
-    t_nms: float
-    K_nms: float
-    K_d: float
-    K_hg: float
-    manual_K_d: float
-    remnant_sd: float
-    remnant_corner: float
-    answers_hands_off_after: float
-    line: float
+    t_p_s: float
+    t_n_s: float
+    t_f_s: float
+    t_nms_s: float
+    k_nms_nm_per_rad: float
+    remnant_sd_nm: float
+    remnant_corner_hz: float
+    answers_hands_off_after_s: float
+    line_m: float
+    k_d_nm_per_rad: float
+    k_hg: float
+    manual_k_d_nm_per_rad: float
 
 class VehicleTable(TypedDict, total=False):
-    m: float
-    I: float
-    l_f: float
-    l_r: float
-    K_f: float
-    K_r: float
-    K_s: float
-    E_t: float
-    B_s: float
-    J_s: float
-    K_t: float
+    m_kg: float
+    i_kg_m2: float
+    l_f_m: float
+    l_r_m: float
+    k_f_n_per_rad: float
+    k_r_n_per_rad: float
+    k_s_nm_per_rad: float
+    e_t_m: float
+    b_s_nms_per_rad: float
+    j_s_kg_m2: float
+    k_t: float
 
 class GuidanceTable(TypedDict, total=False):
-    K_1: float
-    a_1: float
-    a_2: float
-    a_3: float
-    a_4: float
-    t_n: float
-    t_f: float
+    k_1_nm: float
+    a_1_per_m: float
+    a_2_s_per_m: float
+    a_3_per_rad: float
+    a_4_s_per_rad: float
     rate_corner_hz: float
     torque_limit_nm: float
     wind_up_nm_per_s: float
     reduction_nm_per_s: float
-    low_speed_share: float
-    high_speed_share: float
     least_speed_m_per_s: float
-    law: float
-    fdca_k_y_rad_per_m: float
-    fdca_k_psi: float
-    fdca_lohs: float
-    fdca_sohf: float
-    fdca_loha_nm_per_rad: float
-    activity_lambda_min: float
-    probe: bool
     probe_amplitude_nm: float
     probe_frequency_hz: float
+    low_speed_share: float
+    high_speed_share: float
+    t_n_s: float
+    t_f_s: float
+    probe: bool
 
 class FailureTable(TypedDict, total=False):
     kind: Literal["none", "torque", "input"]
-    time: float
-    duration: float
+    time_s: float
+    duration_s: float
 
 class DriverChangeTable(TypedDict):
-    time: float
-    K_d: float
-    K_hg: float
+    time_s: float
+    k_d_nm_per_rad: float
+    k_hg: float
 
 class WorldTable(TypedDict, total=False):
     tyres: Literal["linear", "saturating"]
     mu: float
     castor_share: float
-    bank: float
-    friction: float
-    friction_give: float
-    assist: float
-    assist_speed: float
-    motor_lag: float
+    bank_rad: float
+    friction_nm: float
+    friction_give_rad: float
+    assist_nm: float
+    assist_speed_m_per_s: float
+    motor_lag_s: float
     motor_error: float
-    motor_ripple: float
-    wind: float
-    gust_sd: float
-    gust_corner: float
-    wind_lever: float
+    motor_ripple_nm: float
+    wind_n: float
+    gust_sd_n: float
+    gust_corner_hz: float
+    wind_lever_m: float
 
 class SensorErrorsTable(TypedDict, total=False):
-    torque_bias: float
+    torque_bias_nm: float
     torque_gain: float
-    angle_bias: float
+    angle_bias_rad: float
     speed_gain: float
-    yaw_rate_bias: float
+    yaw_rate_bias_rad_per_s: float
     yaw_rate_gain: float
-    yaw_rate_noise: float
-    lane_noise: float
-    heading_noise: float
-    camera_yaw: float
-    camera_latency: float
-    camera_jitter: float
-    dropouts: float
-    dropout: float
-    line_jumps: float
-    line_jump: float
+    yaw_rate_noise_rad_per_s: float
+    lane_noise_m: float
+    heading_noise_rad: float
+    camera_yaw_rad: float
+    camera_latency_s: float
+    camera_jitter_s: float
+    dropout_rate_per_s: float
+    dropout_duration_s: float
+    line_jump_rate_per_s: float
+    line_jump_m: float
 
 class TolerancesTable(TypedDict, total=False):
     car: int
     tyres: float
     trail: float
-    load: float
-    friction_least: float
-    friction_most: float
+    load_kg: float
+    friction_least_nm: float
+    friction_most_nm: float
     motor_error: float
-    motor_lag: float
-    torque_bias: float
+    motor_lag_s: float
+    torque_bias_nm: float
     torque_gain: float
-    angle_bias: float
+    angle_bias_rad: float
     speed_gain: float
-    camera_yaw: float
-    yaw_rate_bias: float
+    camera_yaw_rad: float
+    yaw_rate_bias_rad_per_s: float
 
 class ScenarioFields(TypedDict, total=False):
     course: Union[str, PathLike[str], CourseTable]
     road: str
     lane: int
     turn: list[str]
-    speed: Union[float, SpeedTable]
+    speed_m_per_s: float
+    speed: SpeedTable
     condition: Literal["manual", "high", "mid", "low"]
     sensors: Literal["exact", "paper"]
     seed: int
@@ -289,6 +283,33 @@ class DriverView:
     def asks_for_hands(self) -> bool: ...
 
 @final
+class LawView:
+    @property
+    def step(self) -> int: ...
+    @property
+    def e_y_m(self) -> float: ...
+    @property
+    def e_y_rate_m_per_s(self) -> float: ...
+    @property
+    def e_theta_rad(self) -> float: ...
+    @property
+    def e_theta_rate_rad_per_s(self) -> float: ...
+    @property
+    def driver_torque_nm(self) -> float: ...
+    @property
+    def wheel_angle_rad(self) -> float: ...
+    @property
+    def wheel_rate_rad_per_s(self) -> float: ...
+    @property
+    def guidance_torque_nm(self) -> float: ...
+    @property
+    def speed_m_per_s(self) -> float: ...
+    @property
+    def yaw_rate_rad_per_s(self) -> float: ...
+    @property
+    def k_hg(self) -> Optional[float]: ...
+
+@final
 class Simulation:
     def __init__(self, scenario: Scenario, own_driver: bool = False) -> None: ...
     def view(self) -> Optional[DriverView]: ...
@@ -332,6 +353,9 @@ class Ecu:
     def clone(self) -> Ecu: ...
 
 @final
+INPUT_IDS: frozenset[int]
+"""Identifiers of what the ECU hears."""
+
 class Bus:
     def __init__(self) -> None: ...
     def lane_preview(
@@ -368,6 +392,13 @@ def evaluate(
     scenario: Scenario, window_m: Optional[list[float]], progress: Optional[Callable[[int], object]]
 ) -> dict[str, Any]: ...
 def identify(drives: list[Union[str, dict[str, np.ndarray]]], how: dict[str, Any]) -> dict[str, Any]: ...
+def compare(
+    path: Union[str, PathLike[str]],
+    laws: dict[str, Callable[..., Any]],
+    drivers: dict[str, Callable[..., Any]],
+    threads: Optional[int],
+    progress: Optional[Callable[[int], object]],
+) -> dict[str, Any]: ...
 def experiment(
     participants: list[int], probe_nm: float, seed: int, progress: Optional[Callable[[int], object]]
 ) -> dict[str, Any]: ...

@@ -12,7 +12,7 @@ Progress = Union[bool, Callable[[int], object], None]
 
 
 @contextmanager
-def telling(progress: Progress, total: int, unit: str) -> Iterator[Optional[Callable[[int], object]]]:
+def telling(progress: Progress, total: Optional[int], unit: str) -> Iterator[Optional[Callable[[int], object]]]:
     """What to call with the number of parts done since the last call: a bar of tqdm for True, or the caller's own."""
     if progress is None or progress is False:
         yield None

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
@@ -284,3 +285,73 @@ def experiment(
     with telling(progress, 2 * len(numbers), "drives") as tell:
         made = _native.experiment(numbers, probe_nm, int(seed), tell)
     return Experiment(made["results"], made["drives"])
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Every law against every driver.
+
+    Attributes
+    ----------
+    results : dict
+        What ``host-sim compare --json`` prints: means with intervals, law by law and driver by driver.
+    drives : list of dict
+        A row for each judged drive: law, driver, world, road, speed, seed, and every metric; None where it has none.
+    """
+
+    results: dict[str, Any] = field(repr=False)
+    drives: list[dict[str, Any]] = field(repr=False)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row for each drive (needs pandas)."""
+        import pandas
+
+        return pandas.DataFrame(self.drives)
+
+
+def compare(
+    file: Union[str, os.PathLike[str]],
+    *,
+    laws: Optional[Mapping[str, Callable[..., Any]]] = None,
+    drivers: Optional[Mapping[str, Callable[..., Any]]] = None,
+    threads: Optional[int] = None,
+    progress: Progress = None,
+) -> Comparison:
+    """Compare laws and drivers, with those of your own, as a file has them.
+
+    Parameters
+    ----------
+    file : path
+        A comparison file (TOML); ``kind`` may name a law or a driver of yours.
+    laws : dict, optional
+        Name and class of each law. An object has ``ask(view) -> float``: a `LawView` every millisecond, the torque in N.m.
+    drivers : dict, optional
+        Name and class of each driver. An object has ``step(view) -> float``, with a `DriverView`, and may have ``look_ahead_s``, a pair.
+    threads : int, optional
+        One a core if not given. Objects in Python take turns.
+    progress : bool or callable, optional
+        True shows a bar (needs tqdm); a callable hears the number of drives done since it was last called.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        A file that is wrong, by field, value and range.
+
+    Notes
+    -----
+    A class may have ``parameters``, a dict of name to (default, least, largest), or with the two ends between which tuning varies it behind
+    them. It is called with a keyword for each. Failures copy objects with `copy.deepcopy`.
+    """
+    for what, own in (("laws", laws), ("drivers", drivers)):
+        for name, made_by in (own or {}).items():
+            if not callable(made_by):
+                raise InputError(f"{what}[{name!r}]: a {type(made_by).__name__} is no class")
+    if threads is not None:
+        check_range("threads", threads, 1, 4096, "")
+    with telling(progress, None, "drives") as tell:
+        made = _native.compare(file, dict(laws or {}), dict(drivers or {}), threads, tell)
+    return Comparison(made["results"], made["drives"])

@@ -141,7 +141,7 @@ class _Loops:
 class _Driver(_Loops):
     @staticmethod
     def default(rng: np.random.Generator) -> Scenario:
-        return Scenario(condition="mid", speed=rng.uniform(50.0, 80.0))
+        return Scenario(condition="mid", speed_m_per_s=rng.uniform(50.0, 80.0) / 3.6)
 
     field, unit = "hand_torque_nm", "N.m"
 
@@ -159,7 +159,7 @@ def _slack(scenario: Scenario) -> Any:
 
 
 class _Authority(_Loops):
-    default = Scenario(condition="mid", driver={"remnant_sd": 0.072})
+    default = Scenario(condition="mid", driver={"remnant_sd_nm": 0.072})
     period_ms = 100
     field, unit = "authority", ""
 

@@ -1,8 +1,10 @@
 //! What the ECU hears.
 
 use super::{Info, Message, from_lsb, info, is_within, narrow, put, to_bits, to_lsb, unsigned};
+use fixed::types::{I16F16, I24F40, I64F0};
+
 use crate::controller::inputs::Request;
-use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, shift_round};
+use crate::quantity::{Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, rounded};
 
 /// Lane errors at the guidance's own points, from the camera's computer, about every 8.3 ms.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -32,9 +34,9 @@ impl LanePreview {
 impl Message for LanePreview {
     const INFO: Info = info::LanePreview;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let age = (self.age.us().saturating_add(Self::AGE_LSB_US / 2) / Self::AGE_LSB_US).min(Self::AGE_MAX);
-        put(to_lsb(self.e_y.bits(), Self::E_Y_LSB, Self::E_Y_MAX), 12, 17)
+        let word = put(to_lsb(self.e_y.bits(), Self::E_Y_LSB, Self::E_Y_MAX), 12, 17)
             | put(
                 to_lsb(self.e_theta.bits(), Self::E_THETA_LSB, Self::E_THETA_MAX),
                 29,
@@ -42,11 +44,13 @@ impl Message for LanePreview {
             )
             | put(i64::from(age), 46, 9)
             | put(i64::from(age >> 9), 56, 2)
-            | put(i64::from(self.valid), 55, 1)
+            | put(i64::from(self.valid), 55, 1);
+        *data = word.to_le_bytes();
     }
 
     #[expect(clippy::as_conversions, reason = "masked to eleven bits")]
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let e_y = narrow(word, 12, 17);
         let e_theta = narrow(word, 29, 17);
         let in_range = is_within(e_y, Self::E_Y_MAX) && is_within(e_theta, Self::E_THETA_MAX);
@@ -80,22 +84,19 @@ impl Column {
     const MOTOR_MAX: i64 = (1 << 15) - 1;
     /// +-720 deg: two turns, lock to lock.
     const ANGLE_MAX: i64 = 72_000;
-    /// 0.01 deg in 2^-40 rad.
-    const ANGLE_UNIT: i64 = 191_900_981;
-    /// 1 rad in 0.01 deg, with 16 fractional bits.
-    const PER_RADIAN: i64 = 375_493_621;
+    /// 0.01 deg, rad.
+    const ANGLE_UNIT: I24F40 = I24F40::from_bits(191_900_981);
+    /// 1 rad in 0.01 deg.
+    const PER_RADIAN: I16F16 = I16F16::from_bits(375_493_621);
 }
 
 impl Message for Column {
     const INFO: Info = info::Column;
 
-    fn pack(&self) -> u64 {
-        let angle = shift_round(
-            i64::from(self.wheel_angle.bits()).saturating_mul(Self::PER_RADIAN),
-            40,
-        )
-        .clamp(-Self::ANGLE_MAX, Self::ANGLE_MAX);
-        put(
+    fn pack(&self, data: &mut [u8; 8]) {
+        let angle: I64F0 = rounded(self.wheel_angle.fixed().wide_mul(Self::PER_RADIAN));
+        let angle = angle.to_bits().clamp(-Self::ANGLE_MAX, Self::ANGLE_MAX);
+        let word = put(
             to_lsb(self.driver_torque.bits(), Self::TORQUE_LSB, Self::DRIVER_MAX),
             12,
             18,
@@ -104,10 +105,12 @@ impl Message for Column {
                 to_lsb(self.motor_torque.bits(), Self::TORQUE_LSB, Self::MOTOR_MAX),
                 48,
                 16,
-            )
+            );
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let driver = narrow(word, 12, 18);
         let angle = narrow(word, 30, 18);
         let motor = narrow(word, 48, 16);
@@ -116,10 +119,7 @@ impl Message for Column {
             && is_within(motor, Self::MOTOR_MAX);
         in_range.then(|| Self {
             driver_torque: Torque::from_bits(to_bits(driver, Self::TORQUE_LSB)),
-            wheel_angle: Radians::from_wide(shift_round(
-                i64::from(angle).saturating_mul(Self::ANGLE_UNIT),
-                16,
-            )),
+            wheel_angle: Radians::from_wide(rounded(Self::ANGLE_UNIT.wrapping_mul_int(angle.into()))),
             motor_torque: Torque::from_bits(to_bits(motor, Self::TORQUE_LSB)),
         })
     }
@@ -147,16 +147,18 @@ impl Vehicle {
 impl Message for Vehicle {
     const INFO: Info = info::Vehicle;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let [a, b] = self.speeds.map(|v| to_lsb(v.bits(), Self::LSB, Self::MAX));
         let yaw_rate = self.yaw_rate.unwrap_or(TurningRate::ZERO).bits();
-        put(a, 12, 16)
+        let word = put(a, 12, 16)
             | put(b, 28, 16)
             | put(to_lsb(yaw_rate, Self::YAW_RATE_LSB, Self::YAW_RATE_MAX), 44, 14)
-            | put(i64::from(self.yaw_rate.is_some()), 58, 1)
+            | put(i64::from(self.yaw_rate.is_some()), 58, 1);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let raw = [narrow(word, 12, 16), narrow(word, 28, 16)];
         // Guidance backwards makes no sense: a negative speed is a sender's fault.
         let in_range = raw.iter().all(|v| (0..=Self::MAX).contains(&i64::from(*v)));
@@ -176,12 +178,15 @@ const AUTHORITY_MAX: i64 = 1 << AUTHORITY_LSB;
 impl Message for Request {
     const INFO: Info = info::Request;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let authority = to_lsb(self.authority.bits(), AUTHORITY_LSB, AUTHORITY_MAX).max(0);
-        put(i64::from(self.engage), 12, 1) | put(authority, 13, 8) | put(i64::from(self.probe), 21, 1)
+        let word =
+            put(i64::from(self.engage), 12, 1) | put(authority, 13, 8) | put(i64::from(self.probe), 21, 1);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let authority = unsigned(word, 13, 8);
         (authority <= AUTHORITY_MAX).then(|| Self {
             engage: unsigned(word, 12, 1) != 0,

@@ -1,8 +1,8 @@
 //! What each frame means. Positions, LSBs and ranges stand here and in `core/haptic.dbc`; `tests/dbc.rs` holds
 //! the two together.
 //!
-//! Layout: eight bytes, little-endian (Intel) bit order; bits 0..7 CRC, bits 8..11 counter, signals from
-//! bit 12. LSBs are powers of two in SI units, so that a raw value crosses into fixed point without a
+//! Layout: little-endian (Intel) bit order; bits 0..7 CRC, bits 8..11 counter, signals from bit 12. A message of eight bytes
+//! packs its signals into one 64-bit word, a longer one writes them with [`put_field`] and reads them with [`field`]. LSBs are powers of two in SI units, so that a raw value crosses into fixed point without a
 //! rounding; only the wheel angle, which sensors give in degrees, is multiplied.
 
 mod inputs;
@@ -16,8 +16,10 @@ pub use service::{
     Identity, ParameterStatus, ParameterUnlock, ParameterValue, ParameterWrite, Rejection, WriteOutcome,
 };
 
+use fixed::types::I40F24;
+
 use super::e2e::{Protection, ReceiverState, Reject};
-use super::frame::Frame;
+use super::frame::CanFrame;
 use crate::quantity::Micros;
 
 /// Version of the bus: of identifiers, layouts and data IDs. `core/haptic.dbc` carries the same.
@@ -58,7 +60,16 @@ pub struct Info {
 macro_rules! messages {
     ($($id:literal $name:ident, $constant:literal, $max_delta:literal, $sender:ident, $period_ms:expr;)*) => {
         /// Every message, most urgent first.
-        pub const MESSAGES: [Info; [$($id),*].len()] = [$(<$name as Message>::INFO),*];
+        pub const MESSAGES: [Info; [$($id),*].len()] = [$(info::$name),*];
+
+        /// Who sends under an identifier of the list.
+        #[must_use]
+        pub const fn sender_of(id: u16) -> Option<Sender> {
+            match id {
+                $($id => Some(Sender::$sender),)*
+                _ => None,
+            }
+        }
 
         /// What [`Message::INFO`] is, by name.
         mod info {
@@ -98,8 +109,17 @@ messages! {
     0x350 Identity, 0xDD, 2, Ecu, 1000.0;
 }
 
-/// A safety message: what the list says of it, and how its signals lie in a 64-bit little-endian word.
-pub trait Message: Copy {
+/// Whether the ECU hears what comes under an identifier: a message of the list, of another sender.
+#[must_use]
+pub const fn is_input(id: u16) -> bool {
+    matches!(
+        sender_of(id),
+        Some(Sender::Camera | Sender::ColumnModule | Sender::Host)
+    )
+}
+
+/// A safety message of `N` bytes, eight on classic CAN: what the list says of it, and how its signals lie in the payload.
+pub trait Message<const N: usize = 8>: Copy {
     /// Its line of the list.
     const INFO: Info;
     /// CAN identifier.
@@ -109,25 +129,26 @@ pub trait Message: Copy {
     /// Largest step of the counter that lost frames explain within [`TIMEOUT`].
     const MAX_DELTA: u8 = Self::INFO.max_delta;
 
-    /// The signals in their bits; values outside a signal's range saturate.
-    fn pack(&self) -> u64;
+    /// Puts the signals into their bits of a payload that is zero; values outside a signal's range saturate.
+    fn pack(&self, data: &mut [u8; N]);
 
     /// The signals, or `None` where one is outside its range.
-    fn unpack(word: u64) -> Option<Self>;
+    fn unpack(data: &[u8; N]) -> Option<Self>;
 
     /// The frame, protected under `counter` (modulo 16).
     #[must_use]
-    fn encode(&self, counter: u8) -> Frame {
-        let mut data = self.pack().to_le_bytes();
+    fn encode(&self, counter: u8) -> CanFrame<N> {
+        let mut data = [0; N];
+        self.pack(&mut data);
         Self::PROTECTION.protect(&mut data, counter);
-        Frame::full(Self::ID, data)
+        CanFrame::full(Self::ID, data)
     }
 
     /// Checks a frame and decodes it.
     ///
     /// # Errors
     /// The first check that it fails: length, CRC, counter, trust, range.
-    fn decode(state: &mut ReceiverState, frame: &Frame) -> Result<Self, Reject> {
+    fn decode<const C: usize>(state: &mut ReceiverState, frame: &CanFrame<C>) -> Result<Self, Reject> {
         Self::decode_within(state, frame, Self::MAX_DELTA)
     }
 
@@ -136,12 +157,13 @@ pub trait Message: Copy {
     /// # Errors
     /// As [`Message::decode`].
     #[inline(always)]
-    fn decode_within(state: &mut ReceiverState, frame: &Frame, max_delta: u8) -> Result<Self, Reject> {
-        if !frame.is_full() {
-            return Err(Reject::Length);
-        }
-        let data = frame.bytes();
-        let signals = Self::unpack(u64::from_le_bytes(*data));
+    fn decode_within<const C: usize>(
+        state: &mut ReceiverState,
+        frame: &CanFrame<C>,
+        max_delta: u8,
+    ) -> Result<Self, Reject> {
+        let data = frame.payload::<N>().ok_or(Reject::Length)?;
+        let signals = Self::unpack(data);
         // Nobody is trusted for a frame out of range; the gap that it leaves begins the count of clean ones anew.
         if signals.is_some() || state.is_trusted() {
             state.accept(&Self::PROTECTION, data, max_delta)?;
@@ -152,6 +174,37 @@ pub trait Message: Copy {
 
 /// Every safety message is stale at this age.
 pub const TIMEOUT: Micros = Micros::from_ms(30);
+
+/// Writes a signal of at most 57 bits into a payload of any length: `value` from bit `start` on, in place of what was there.
+/// Bits beyond the payload are dropped.
+pub fn put_field(data: &mut [u8], value: i64, start: u32, bits: u32) {
+    let (byte, shift) = place(start);
+    let (kept, new) = (!put(-1, shift, bits), put(value, shift, bits));
+    let word = (word_at(data, byte) & kept) | new;
+    let bytes = data.iter_mut().skip(byte).zip(word.to_le_bytes());
+    bytes.for_each(|(to, from)| *to = from);
+}
+
+/// A signal of at most 57 bits, without a sign; bits beyond the payload are zero.
+#[must_use]
+pub fn field(data: &[u8], start: u32, bits: u32) -> i64 {
+    let (byte, shift) = place(start);
+    unsigned(word_at(data, byte), shift, bits)
+}
+
+/// The byte that a bit lies in, and its place there.
+#[expect(clippy::as_conversions, reason = "an index of 32 bits")]
+const fn place(start: u32) -> (usize, u32) {
+    ((start / 8) as usize, start % 8)
+}
+
+/// Eight bytes of a payload from one on, those beyond its end zero.
+fn word_at(data: &[u8], byte: usize) -> u64 {
+    let mut word = [0; 8];
+    let bytes = word.iter_mut().zip(data.iter().skip(byte));
+    bytes.for_each(|(to, from)| *to = *from);
+    u64::from_le_bytes(word)
+}
 
 #[expect(clippy::as_conversions, reason = "two's complement, then masked to its bits")]
 const fn put(value: i64, start: u32, bits: u32) -> u64 {
@@ -198,6 +251,6 @@ fn to_lsb(bits: i32, lsb: u32, max: i64) -> i64 {
 }
 
 /// The other way, exact.
-fn from_lsb(raw: i64, lsb: u32) -> i64 {
-    raw.wrapping_shl(24_u32.wrapping_sub(lsb))
+fn from_lsb(raw: i64, lsb: u32) -> I40F24 {
+    I40F24::from_bits(raw.wrapping_shl(24_u32.wrapping_sub(lsb)))
 }

@@ -112,8 +112,8 @@ impl Guidance {
 impl Message for Guidance {
     const INFO: Info = info::Guidance;
 
-    fn pack(&self) -> u64 {
-        put(
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(
             to_lsb(self.torque.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX),
             12,
             16,
@@ -124,10 +124,12 @@ impl Message for Guidance {
             | put(i64::from(self.faults.intersects(FaultSet::INPUT)), 58, 1)
             | put(i64::from(self.faults.intersects(FaultSet::CRITICAL)), 59, 1)
             | put(i64::from(self.faults.intersects(FaultSet::LOCKING)), 60, 1)
-            | put(i64::from(self.reset as u8), 61, 3)
+            | put(i64::from(self.reset as u8), 61, 3);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let torque = signed(word, 12, 16);
         let guidance = Self {
             torque: Torque::from_wide(from_lsb(torque, Self::TORQUE_LSB)),
@@ -153,11 +155,13 @@ pub struct Warning {
 impl Message for Warning {
     const INFO: Info = info::Warning;
 
-    fn pack(&self) -> u64 {
-        put(i64::from(self.mode as u8), 12, 4) | put(i64::from(self.faults.bits()), 16, 32)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(i64::from(self.mode as u8), 12, 4) | put(i64::from(self.faults.bits()), 16, 32);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         Some(Self {
             mode: Mode::from_code(unsigned(word, 12, 4) as u32)?,
             faults: FaultSet::from_bits(unsigned(word, 16, 32) as u32),
@@ -179,16 +183,18 @@ pub struct FaultRecord {
 impl Message for FaultRecord {
     const INFO: Info = info::FaultRecord;
 
-    fn pack(&self) -> u64 {
-        put(i64::from(self.index), 12, 5)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(i64::from(self.index), 12, 5)
             | put(i64::from(self.total), 17, 6)
             | put(i64::from(self.record.fault as u8), 23, 5)
             | put(i64::from(self.record.present), 28, 1)
             | put(i64::from(self.record.count), 32, 8)
-            | put(i64::from(self.record.age_s), 40, 16)
+            | put(i64::from(self.record.age_s), 40, 16);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         Some(Self {
             index: unsigned(word, 12, 5) as u8,
             total: unsigned(word, 17, 6) as u8,
@@ -222,14 +228,14 @@ impl Telemetry {
 impl Message for Telemetry {
     const INFO: Info = info::Telemetry;
 
-    fn pack(&self) -> u64 {
+    fn pack(&self, data: &mut [u8; 8]) {
         let probe = self.probe.unwrap_or(Torque::ZERO);
         let reading = self.k_hg.unwrap_or(Reading {
             k_hg: Ratio::ZERO,
             deviation: Ratio::ZERO,
         });
         let deviation = to_lsb(reading.deviation.bits(), Self::K_HG_LSB, Self::DEVIATION_MAX);
-        put(to_lsb(probe.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX), 12, 12)
+        let word = put(to_lsb(probe.bits(), Self::TORQUE_LSB, Self::TORQUE_MAX), 12, 12)
             | put(i64::from(self.probe.is_some()), 24, 1)
             | put(i64::from(self.k_hg.is_some()), 25, 1)
             | put(
@@ -237,10 +243,12 @@ impl Message for Telemetry {
                 26,
                 14,
             )
-            | put(deviation, 40, 11)
+            | put(deviation, 40, 11);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let probe = Torque::from_wide(from_lsb(signed(word, 12, 12), Self::TORQUE_LSB));
         let k_hg = signed(word, 26, 14);
         let reading = Reading {

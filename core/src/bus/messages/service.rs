@@ -22,11 +22,13 @@ pub struct ParameterWrite {
 impl Message for ParameterWrite {
     const INFO: Info = info::ParameterWrite;
 
-    fn pack(&self) -> u64 {
-        pack_parameter(self.index, self.value)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = pack_parameter(self.index, self.value);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let (index, value) = unpack_parameter(word)?;
         Some(Self { index, value })
     }
@@ -56,11 +58,13 @@ pub struct ParameterUnlock {
 impl Message for ParameterUnlock {
     const INFO: Info = info::ParameterUnlock;
 
-    fn pack(&self) -> u64 {
-        put(i64::from(self.vehicle), 12, 20) | put(i64::from(self.sequence), 32, 32)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(i64::from(self.vehicle), 12, 20) | put(i64::from(self.sequence), 32, 32);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         Some(Self {
             vehicle: unsigned(word, 12, 20) as u32,
             sequence: unsigned(word, 32, 32) as u32,
@@ -80,11 +84,13 @@ pub struct ParameterValue {
 impl Message for ParameterValue {
     const INFO: Info = info::ParameterValue;
 
-    fn pack(&self) -> u64 {
-        pack_parameter(self.index, self.value)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = pack_parameter(self.index, self.value);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         let (index, value) = unpack_parameter(word)?;
         Some(Self { index, value })
     }
@@ -104,13 +110,15 @@ pub struct Rejection {
 impl Message for Rejection {
     const INFO: Info = info::Rejection;
 
-    fn pack(&self) -> u64 {
-        put(i64::from(self.id), 12, 11)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(i64::from(self.id), 12, 11)
             | put(i64::from(self.reason as u8), 24, 4)
-            | put(i64::from(self.count), 32, 16)
+            | put(i64::from(self.count), 32, 16);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         Some(Self {
             id: unsigned(word, 12, 11) as u16,
             reason: Reject::from_code(unsigned(word, 24, 4))?,
@@ -178,14 +186,16 @@ pub struct ParameterStatus {
 impl Message for ParameterStatus {
     const INFO: Info = info::ParameterStatus;
 
-    fn pack(&self) -> u64 {
-        put(i64::from(self.stored), 12, 1)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(i64::from(self.stored), 12, 1)
             | put(i64::from(self.damaged), 13, 1)
             | put(i64::from(self.outcome as u8), 16, 4)
-            | put(i64::from(self.sequence), 32, 32)
+            | put(i64::from(self.sequence), 32, 32);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         Some(Self {
             stored: unsigned(word, 12, 1) != 0,
             damaged: unsigned(word, 13, 1) != 0,
@@ -212,11 +222,13 @@ impl Identity {
 impl Message for Identity {
     const INFO: Info = info::Identity;
 
-    fn pack(&self) -> u64 {
-        put(i64::from(self.vehicle), 12, 20) | put(i64::from(self.hardware), 32, 32)
+    fn pack(&self, data: &mut [u8; 8]) {
+        let word = put(i64::from(self.vehicle), 12, 20) | put(i64::from(self.hardware), 32, 32);
+        *data = word.to_le_bytes();
     }
 
-    fn unpack(word: u64) -> Option<Self> {
+    fn unpack(data: &[u8; 8]) -> Option<Self> {
+        let word = u64::from_le_bytes(*data);
         Some(Self {
             vehicle: unsigned(word, 12, 20) as u32,
             hardware: unsigned(word, 32, 32) as u32,

@@ -1,20 +1,11 @@
 //! What the caller knows already: parameters given instead of estimated (`--fix NAME=VALUE`).
 
-use std::fmt;
-
 use super::signals::Muscle;
 
 /// Why a `NAME=VALUE` was refused.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
 pub struct FixError(pub(crate) String);
-
-impl fmt::Display for FixError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for FixError {}
 
 /// How a drive is to be identified.
 #[derive(Debug, Clone, PartialEq)]

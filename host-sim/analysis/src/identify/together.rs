@@ -2,7 +2,7 @@
 //! its own for each stretch. The driver, the muscle and the disturbance are the same in all.
 
 use super::lane::LaneDoubt;
-use super::log::{DriveLog, LogError};
+use super::log::{DriveLog, LogError, refuse};
 use super::noise_model;
 use super::options::Options;
 use super::prepare::{Prepared, prepare};
@@ -39,19 +39,17 @@ pub fn identify_together_and_track(
 
 fn fitted(logs: &[DriveLog], options: &Options) -> Result<(Prepared, Identification), LogError> {
     let Some(first) = logs.first() else {
-        return Err(LogError::new(
-            "no drive is given, one is wanted at least".to_owned(),
-        ));
+        return refuse("no drive is given, one is wanted at least");
     };
     if let Some(other) = logs
         .iter()
         .find(|l| (l.dt_s / first.dt_s - 1.0).abs() > SAME_PERIOD)
     {
-        return Err(LogError::new(format!(
+        return refuse(format!(
             "one drive has {:.3} rows a second, another {:.3}: one rate is wanted",
             1.0 / first.dt_s,
             1.0 / other.dt_s
-        )));
+        ));
     }
     let mut all: Option<Prepared> = None;
     for log in logs {

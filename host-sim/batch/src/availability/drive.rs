@@ -16,6 +16,7 @@ use haptic_vectorised::{Event, Options};
 
 use super::events::Eventful;
 use super::{ByHand, Declaration, LEG_S, Leg, LegNumber};
+use crate::error::StudyError;
 use crate::vectorised::{Checked, Group};
 
 const LEG_STEPS: u32 = (LEG_S * 1e3) as u32;
@@ -37,8 +38,8 @@ pub(super) fn side_by_side(
     legs: &[LegNumber],
     root: u64,
     [first, of]: [usize; 2],
-    mut done: impl FnMut(usize, Leg) -> Result<(), String>,
-) -> Result<(), String> {
+    mut done: impl FnMut(usize, Leg) -> Result<(), StudyError>,
+) -> Result<(), StudyError> {
     // Vectorised runs know of nothing that happens.
     if legs.iter().any(|leg| leg.world.happens() != Happens::default()) {
         let mut alone = legs.iter().enumerate();
@@ -99,7 +100,7 @@ pub(super) fn side_by_side(
 }
 
 /// The same driver without guidance: what this driver would make of its torque does not matter where there is none.
-fn manual(scenario: &Scenario) -> Result<Scenario, String> {
+fn manual(scenario: &Scenario) -> Result<Scenario, StudyError> {
     let gains = ArmGains {
         k_hg: 0.0,
         ..scenario.gains()

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::drive::{Reported, by_hand, with_ecu};
 use super::roads::falling_and_rising;
 use super::{CARS, Road, WorldKind};
+use crate::error::StudyError;
 
 /// Which leg.
 #[derive(Debug, Clone, Copy)]
@@ -111,7 +112,7 @@ impl LegNumber {
     ///
     /// # Errors
     /// As [`haptic_sim::scenario::ScenarioBuilder::build`]; no built-in world meets one.
-    pub fn scenario(&self, root: u64) -> Result<Scenario, String> {
+    pub fn scenario(&self, root: u64) -> Result<Scenario, StudyError> {
         let Self { world, road, number } = self;
         let named = road.name.bytes().fold(0_u64, |hash, byte| {
             hash.wrapping_mul(31).wrapping_add(byte.into())
@@ -131,7 +132,7 @@ impl LegNumber {
         let speed = if world.changes_speed() {
             falling_and_rising(speed_kmh, &mut rng)
         } else {
-            Speed::Constant(speed_kmh)
+            Speed::constant_kmh(speed_kmh)
         };
         let scenario = driver
             .drives(Scenario::builder().course(course).speed(speed), speed_kmh / 3.6)
@@ -147,7 +148,7 @@ impl LegNumber {
     ///
     /// # Errors
     /// As [`LegNumber::scenario`].
-    pub fn drive(&self, root: u64) -> Result<Leg, String> {
+    pub fn drive(&self, root: u64) -> Result<Leg, StudyError> {
         let scenario = self.scenario(root)?;
         let (run, reported) = with_ecu(&scenario, self.world.happens());
         Ok(self.leg(&scenario, &run, reported, ByHand::of(&by_hand(&scenario))))

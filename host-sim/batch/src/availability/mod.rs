@@ -28,6 +28,7 @@ pub(crate) use drive::{UNNAMED, Watch};
 pub use leg::{ByHand, Declaration, Ended, Leg, LegNumber};
 pub use roads::{ROADS, Road};
 
+use crate::error::StudyError;
 use crate::vectorised::in_groups;
 
 /// Length of a leg, s.
@@ -221,8 +222,8 @@ impl Availability {
 pub fn study(
     plan: &Plan,
     on_record: &[Leg],
-    done: impl Fn(&Leg) -> Result<(), String> + Sync,
-) -> Result<Availability, String> {
+    done: impl Fn(&Leg) -> Result<(), StudyError> + Sync,
+) -> Result<Availability, StudyError> {
     let missing: Vec<LegNumber> = plan
         .legs()
         .into_iter()

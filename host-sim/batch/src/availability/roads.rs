@@ -58,7 +58,7 @@ pub(super) fn falling_and_rising(first_kmh: f64, rng: &mut Xoshiro256PlusPlus) -
         time.push(now_s);
         kmh.push(now_kmh);
     }
-    Speed::ByTime { time, kmh }
+    Speed::by_time_kmh(time, &kmh)
 }
 
 impl Road {

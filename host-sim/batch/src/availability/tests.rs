@@ -237,11 +237,13 @@ fn braking_in_a_real_world_is_no_fault() {
         for number in 0..3 {
             let number = LegNumber { world, road, number };
             let scenario = number.scenario(1).unwrap();
-            let Speed::ByTime { kmh, .. } = scenario.speed() else {
+            let Speed::ByTime { speed_m_per_s, .. } = scenario.speed() else {
                 panic!("one speed");
             };
-            let least = kmh.iter().copied().fold(f64::INFINITY, f64::min);
-            assert!(kmh.len() > 40 && least < 0.7 * kmh[0] && kmh.iter().all(|v| *v <= kmh[0]));
+            let first = speed_m_per_s[0];
+            let least = speed_m_per_s.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(speed_m_per_s.len() > 40 && least < 0.7 * first);
+            assert!(speed_m_per_s.iter().all(|v| *v <= first));
             let leg = number.drive(1).unwrap();
             assert_eq!((leg.ended, &leg.declarations), (Ended::Whole, &vec![]), "{leg:?}");
             active_s += leg.active_s;

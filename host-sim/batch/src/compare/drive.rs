@@ -38,7 +38,7 @@ const fn metric(name: &'static str, label: &'static str, unit: &'static str) -> 
 }
 
 /// Every figure, in the order of [`Driven::values`]. What has an entry in the list of metrics is that metric.
-pub const METRICS: [Metric; 10] = [
+pub const METRICS: [Metric; 11] = [
     metric("peak_lateral_error_m", "Peak lateral error", "m"),
     metric("mean_abs_lateral_error_m", "Mean lateral error", "m"),
     metric("sdlp_m", "SDLP", "m"),
@@ -52,7 +52,15 @@ pub const METRICS: [Metric; 10] = [
     metric("worst_peak_after_loss_m", "Worst peak after a sudden loss", "m"),
     metric("mean_peak_after_loss_m", "Mean peak after a sudden loss", "m"),
     metric("worst_peak_silent_lane_m", "Worst peak after a silent lane", "m"),
+    metric(
+        "after_effect_m",
+        "Mean lateral error from 5 s after a loss on",
+        "m",
+    ),
 ];
+
+/// From when on behind a loss the after-effect counts, s: what comes before is the loss itself.
+const AFTER_S: u32 = 5;
 
 /// What came of a drive and its failures.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,14 +88,14 @@ pub(super) fn drive(
     let mut trunk: Loop = Simulation::of_parts(scenario, driver, vehicle, OwnLaw::new(scenario, law));
     let planned = failures(scenario, faults);
     let mut next = planned.iter().peekable();
-    let (mut peaks, mut failed_off_road) = ([Vec::new(), Vec::new()], 0);
+    let (mut failed, mut failed_off_road) = ([Vec::new(), Vec::new()], 0);
     let mut samples = Vec::new();
     loop {
         while let Some((_, failure)) = next.next_if(|(step, _)| *step == trunk.steps()) {
             if let Some(fork) = trunk.fork_at(*failure) {
-                let peak_m = peak_after(fork, faults.lasts_s);
-                failed_off_road += u32::from(peak_m >= DIVERGED_M);
-                peaks[usize::from(failure.kind == FailureKind::Input)].push(peak_m);
+                let found = driven_after(fork, faults.lasts_s);
+                failed_off_road += u32::from(found.peak_m >= DIVERGED_M);
+                failed[usize::from(failure.kind == FailureKind::Input)].push(found);
             }
         }
         let Some(outcome) = trunk.step(&Action::default()) else {
@@ -101,19 +109,19 @@ pub(super) fn drive(
     };
     let off_road = trunk.ending() != Some(Ending::CourseEnd);
     Driven {
-        values: measured(scenario, &trace, off_road, &peaks),
+        values: measured(scenario, &trace, off_road, &failed),
         off_road,
         left_by_itself: Away::new(scenario, &trace).is_by_itself(),
         failed_off_road,
     }
 }
 
-/// What is measured of a drive; `peaks` are those after its losses and its silences.
+/// What is measured of a drive; `failed` is what came after its losses and its silences.
 pub(crate) fn measured(
     scenario: &Scenario,
     trace: &Trace,
     off_road: bool,
-    peaks: &[Vec<f64>; 2],
+    failed: &[Vec<After>; 2],
 ) -> [Option<f64>; METRICS.len()] {
     let guidance = scenario.guidance();
     let circumstances = Circumstances {
@@ -123,7 +131,7 @@ pub(crate) fn measured(
         failure: None,
         probe_hz: guidance.probe.then_some(guidance.controller.probe_frequency_hz),
     };
-    values(&measure(trace, &circumstances), off_road, peaks)
+    values(&measure(trace, &circumstances), off_road, failed)
 }
 
 /// The failures with their steps, in time: evenly over what of the drive leaves time to go on.
@@ -148,31 +156,52 @@ pub(crate) fn failures(scenario: &Scenario, faults: Faults) -> Vec<(u32, Failure
     all
 }
 
-/// The largest lateral error from here on, m.
-fn peak_after(mut fork: Loop, lasts_s: f64) -> f64 {
-    let mut peak_m: f64 = 0.0;
-    for _ in 0..(lasts_s * f64::from(STEPS_PER_SECOND)) as u32 {
+/// Lateral errors behind a failure, m.
+pub(crate) struct After {
+    peak_m: f64,
+    /// The mean from [`AFTER_S`] on; none if the drive ends before.
+    mean_m: Option<f64>,
+}
+
+/// What comes from here on.
+fn driven_after(mut fork: Loop, lasts_s: f64) -> After {
+    let (mut peak_m, mut sum_m, mut count) = (0.0_f64, 0.0, 0_u32);
+    for step in 0..(lasts_s * f64::from(STEPS_PER_SECOND)) as u32 {
         let Some(outcome) = fork.step(&Action::default()) else {
             break;
         };
         if let Some(sample) = outcome.sample {
-            peak_m = peak_m.max(sample.lateral_error_m.abs());
+            let error_m = sample.lateral_error_m.abs();
+            peak_m = peak_m.max(error_m);
+            if step >= AFTER_S * STEPS_PER_SECOND {
+                (sum_m, count) = (sum_m + error_m, count + 1);
+            }
         }
     }
     match fork.ending() {
-        Some(Ending::Diverged { .. }) => DIVERGED_M,
-        _ => peak_m,
+        Some(Ending::Diverged { .. }) => After {
+            peak_m: DIVERGED_M,
+            mean_m: Some(DIVERGED_M),
+        },
+        _ => After {
+            peak_m,
+            mean_m: (count > 0).then(|| sum_m / f64::from(count)),
+        },
     }
 }
 
-fn values(metrics: &Metrics, off_road: bool, peaks: &[Vec<f64>; 2]) -> [Option<f64>; METRICS.len()] {
+fn values(metrics: &Metrics, off_road: bool, failed: &[Vec<After>; 2]) -> [Option<f64>; METRICS.len()] {
     if off_road {
         let mut values = [None; METRICS.len()];
         values[0] = Some(DIVERGED_M);
         return values;
     }
-    let worst = |peaks: &[f64]| peaks.iter().copied().reduce(f64::max);
-    let [losses, silences] = peaks;
+    let worst = |failed: &[After]| failed.iter().map(|after| after.peak_m).reduce(f64::max);
+    let mean =
+        |values: &[f64]| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+    let [losses, silences] = failed;
+    let peaks: Vec<f64> = losses.iter().map(|after| after.peak_m).collect();
+    let behind: Vec<f64> = losses.iter().filter_map(|after| after.mean_m).collect();
     // A drive without conflict has no torque in conflict.
     let against_nm = metrics
         .conflict_time_share
@@ -186,7 +215,8 @@ fn values(metrics: &Metrics, off_road: bool, peaks: &[Vec<f64>; 2]) -> [Option<f
         metrics.conflict_time_share,
         against_nm,
         worst(losses),
-        (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len() as f64),
+        mean(&peaks),
         worst(silences),
+        mean(&behind),
     ]
 }

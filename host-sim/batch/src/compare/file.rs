@@ -5,7 +5,7 @@ use std::path::Path;
 
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::models::road::Course;
-use haptic_sim::scenario::{Condition, FailureKind, Scenario};
+use haptic_sim::scenario::{Condition, FailureKind, Scenario, Speed};
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -22,12 +22,14 @@ struct File {
     seed: u64,
     seeds: u64,
     roads: Vec<String>,
-    speeds_kmh: Vec<f64>,
+    speeds_m_per_s: Vec<f64>,
     #[serde(default)]
     scenario: Table,
     #[serde(default)]
     faults: FaultsFile,
     tuning: Option<TuningFile>,
+    #[serde(default)]
+    world: Vec<WorldFile>,
     law: Vec<Table>,
     driver: Vec<Table>,
 }
@@ -42,11 +44,19 @@ struct FaultsFile {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct WorldFile {
+    name: String,
+    #[serde(default)]
+    scenario: Table,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct TuningFile {
     budget: u64,
     seeds: u64,
     roads: Vec<String>,
-    speeds_kmh: Vec<f64>,
+    speeds_m_per_s: Vec<f64>,
     weights: Option<BTreeMap<String, f64>>,
 }
 
@@ -83,16 +93,10 @@ pub(super) fn from_text<'k>(
     };
     let file: File = parse_toml(name, text)?;
     check_names("comparison", [&file.name]).map_err(|e| source.bad(e))?;
-    let laws = parts(&source, "law", &file.law, &kinds.laws)?;
+    let (tables, oracles) = oracles(&source, &file.law)?;
+    let laws = parts(&source, "law", &tables, &kinds.laws)?;
     let drivers = parts(&source, "driver", &file.driver, &kinds.drivers)?;
-    let judged = drives(
-        &source,
-        "",
-        &file.scenario,
-        &file.roads,
-        &file.speeds_kmh,
-        file.seeds,
-    )?;
+    let (worlds, judged) = worlds(&source, &file)?;
     let tuning = file
         .tuning
         .as_ref()
@@ -110,11 +114,58 @@ pub(super) fn from_text<'k>(
         laws,
         drivers,
         judged,
+        worlds,
+        oracles,
         tuning,
         faults,
     };
     check_parts(&source, &compare)?;
     Ok(compare)
+}
+
+/// The tables of the laws without `oracle`, and whether each is one.
+fn oracles(source: &Source, laws: &[Table]) -> Result<(Vec<Table>, Vec<bool>), InputError> {
+    let mut tables = laws.to_vec();
+    let is_oracle = |table: &mut Table| match table.remove("oracle") {
+        None => Ok(false),
+        Some(Value::Boolean(is)) => Ok(is),
+        Some(other) => Err(source.bad(format!("law.oracle = {other}: true or false is wanted"))),
+    };
+    let oracles = tables.iter_mut().map(is_oracle).collect::<Result<_, _>>()?;
+    Ok((tables, oracles))
+}
+
+/// Names of the worlds, and the drives in each, one world behind the other; one world without a name if the file has none.
+fn worlds(source: &Source, file: &File) -> Result<(Vec<String>, Drives), InputError> {
+    let drives = |source: &Source, fields: &Table| {
+        drives(source, "", fields, &file.roads, &file.speeds_m_per_s, file.seeds)
+    };
+    if file.world.is_empty() {
+        return Ok((vec![String::new()], drives(source, &file.scenario)?));
+    }
+    let names: Vec<String> = file.world.iter().map(|world| world.name.clone()).collect();
+    check_names("world", &names).map_err(|e| source.bad(e))?;
+    let mut all = Drives {
+        places: Vec::new(),
+        seeds: 0,
+    };
+    for world in &file.world {
+        let mut fields = file.scenario.clone();
+        for (name, value) in &world.scenario {
+            match (fields.get_mut(name), value) {
+                (Some(Value::Table(fields)), Value::Table(own)) => fields.extend(own.clone()),
+                _ => _ = fields.insert(name.clone(), value.clone()),
+            }
+        }
+        let source = Source {
+            name: format!("{}: world {}", source.name, world.name),
+            folder: source.folder,
+        };
+        let made = drives(&source, &fields)?;
+        all.places.extend(made.places);
+        all.seeds = made.seeds;
+    }
+    Ok((names, all))
 }
 
 /// Every law and driver can be made, and there are not too many drives.
@@ -169,7 +220,7 @@ fn tuning(source: &Source, scenario: &Table, file: &TuningFile) -> Result<Tuning
             "tuning.",
             scenario,
             &file.roads,
-            &file.speeds_kmh,
+            &file.speeds_m_per_s,
             file.seeds,
         )?,
         weights,
@@ -182,16 +233,26 @@ pub(crate) fn drives(
     table: &str,
     fields: &Table,
     roads: &[String],
-    speeds_kmh: &[f64],
+    speeds_m_per_s: &[f64],
     seeds: u64,
 ) -> Result<Drives, InputError> {
     let seeds = source.count(&format!("{table}seeds"), seeds, 1.0, 1000.0)?;
-    for (field, is_empty) in [("roads", roads.is_empty()), ("speeds_kmh", speeds_kmh.is_empty())] {
+    for (field, is_empty) in [
+        ("roads", roads.is_empty()),
+        ("speeds_m_per_s", speeds_m_per_s.is_empty()),
+    ] {
         if is_empty {
             return Err(source.bad(format!("{table}{field} = []: one at least is wanted")));
         }
     }
-    for field in ["seed", "course", "speed", "failure", "driver_change"] {
+    for field in [
+        "seed",
+        "course",
+        "speed",
+        "speed_m_per_s",
+        "failure",
+        "driver_change",
+    ] {
         if fields.contains_key(field) {
             return Err(source.bad(format!(
                 "scenario.{field}: this file has its own seeds, roads, speeds, faults and drivers"
@@ -217,13 +278,10 @@ pub(crate) fn drives(
                 "scenario.guidance.law = {law}: this file has its own laws, which take the place of the ECU's"
             )));
         }
-        for speed_kmh in speeds_kmh {
-            let built = scenario.to_builder().speed_kmh(*speed_kmh).build();
-            places.push((
-                road.clone(),
-                *speed_kmh,
-                built.map_err(|e| InputError::new(&here, e))?,
-            ));
+        for speed in speeds_m_per_s {
+            let built = scenario.to_builder().speed(Speed::Constant(*speed)).build();
+            let built = built.map_err(|e| InputError::new(&here, e))?;
+            places.push((road.clone(), built.speed_kmh(), built));
         }
     }
     Ok(Drives { places, seeds })

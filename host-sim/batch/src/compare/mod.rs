@@ -21,7 +21,7 @@ use std::path::Path;
 
 use haptic_sim::drivers::{AnyDriver, DRIVERS, HABITS};
 use haptic_sim::input::InputError;
-use haptic_sim::kind::{Kind, Make};
+use haptic_sim::kind::{Kind, Make, Parameter};
 use haptic_sim::laws::{LAWS, Law};
 use haptic_sim::scenario::{Scenario, ScenarioError};
 use haptic_sim::seeds::named;
@@ -30,8 +30,8 @@ use rayon::prelude::*;
 pub use drive::{Driven, METRICS, Metric};
 pub(crate) use drive::{failures, measured};
 pub(crate) use file::drives;
-pub(crate) use parts::{Source, unknown};
-pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean};
+pub(crate) use parts::{Source, parts, unknown};
+pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean, Ratio};
 
 /// The laws, drivers and habits that a file may name.
 pub struct Kinds {
@@ -62,19 +62,39 @@ pub struct Chosen<'k, P: ?Sized + 'static> {
     pub around: Vec<(&'k Kind<P>, Vec<f64>)>,
 }
 
-impl<P: ?Sized> Chosen<'_, P> {
+impl<'k, P: ?Sized> Chosen<'k, P> {
     /// The values of its parameters, untuned.
     pub fn untuned(&self) -> Vec<f64> {
         let pairs = self.values.iter().zip(self.kind.parameters);
         pairs.map(|(value, p)| value.unwrap_or(p.default)).collect()
     }
 
-    fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
-        let Make::Part(make) = self.kind.make else {
-            // The file was checked: what goes around another one is in `around`.
-            unreachable!("{} is made around another one", self.kind.name)
+    /// The same, with other values of some parameters of what is around it.
+    pub(crate) fn with_habit(&self, kind: &str, changed: &[(&str, f64)]) -> Self {
+        let value = |p: &Parameter, value: &f64| {
+            let found = changed.iter().find(|(name, _)| *name == p.name);
+            found.map_or(*value, |(_, value)| *value)
         };
-        let mut made = make(scenario, values)?;
+        let outer = |(outer, values): &(&'k Kind<P>, Vec<f64>)| {
+            let values = outer.parameters.iter().zip(values);
+            let all = values.map(|(p, old)| if outer.name == kind { value(p, old) } else { *old });
+            (*outer, all.collect())
+        };
+        Self {
+            name: self.name.clone(),
+            kind: self.kind,
+            values: self.values.clone(),
+            around: self.around.iter().map(outer).collect(),
+        }
+    }
+
+    pub(crate) fn make(&self, scenario: &Scenario, values: &[f64]) -> Result<Box<P>, ScenarioError> {
+        let mut made = match self.kind.make {
+            Make::Part(make) => make(scenario, values)?,
+            Make::Given(make) => make(scenario, values)?,
+            // The file was checked: what goes around another one is in `around`.
+            Make::Around(_) => unreachable!("{} is made around another one", self.kind.name),
+        };
         for (kind, values) in &self.around {
             if let Make::Around(make) = kind.make {
                 made = make(scenario, values, made);
@@ -133,8 +153,12 @@ pub struct Compare<'k> {
     pub laws: Vec<Chosen<'k, dyn Law>>,
     /// The drivers.
     pub drivers: Vec<Chosen<'k, dyn AnyDriver>>,
-    /// What is judged.
+    /// What is judged: the places of each world, one behind the other.
     pub judged: Drives,
+    /// Names of the worlds; one without a name if the file has none.
+    pub worlds: Vec<String>,
+    /// Which laws are tuned for each driver by itself: what who knows the driver could choose.
+    pub oracles: Vec<bool>,
     /// How laws are tuned first, if they are.
     pub tuning: Option<Tuning>,
     /// What fails.
@@ -177,7 +201,15 @@ impl<'k> Compare<'k> {
     pub fn run(&self, progress: impl Fn() + Sync) -> Result<CompareResults, ScenarioError> {
         let tuned = tune::tune(self, &progress)?;
         let jobs = self.jobs(&self.judged, |_| 1);
-        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| vec![law.values.clone()]).collect();
+        // A driver's own set has the driver's number.
+        let sets: Vec<Vec<Vec<f64>>> = tuned.iter().map(|law| law.values.clone()).collect();
+        let jobs: Vec<Job> = jobs
+            .into_iter()
+            .map(|job| Job {
+                set: job.driver,
+                ..job
+            })
+            .collect();
         let driven = self.drive(&jobs, &sets, &self.judged, "judged", self.faults, &progress)?;
         Ok(results::sum_up(self, tuned, &jobs, &driven))
     }

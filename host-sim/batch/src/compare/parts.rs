@@ -38,7 +38,7 @@ impl Source<'_> {
 }
 
 /// What a file's laws or drivers are.
-pub(super) fn parts<'k, P: ?Sized>(
+pub(crate) fn parts<'k, P: ?Sized>(
     source: &Source,
     what: &str,
     tables: &[Table],

@@ -25,8 +25,10 @@ pub struct LawResult {
     pub kind: String,
     /// Where it is published.
     pub source: &'static str,
-    /// Its parameters.
+    /// Its parameters; of an oracle those for the first driver.
     pub values: Vec<(&'static str, f64)>,
+    /// Whether it was tuned for each driver by itself.
+    pub oracle: bool,
     /// The objective before and after tuning.
     pub objective: Option<[f64; 2]>,
 }
@@ -50,11 +52,26 @@ pub struct Cell {
     pub failed_off_road: u32,
 }
 
+/// A metric of a law in a world over all drivers, as a share of what the first law has there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ratio {
+    /// Place of the law.
+    pub law: usize,
+    /// Place of the world.
+    pub world: usize,
+    /// Place of the metric.
+    pub metric: usize,
+    /// Of the means over drivers and places, with its interval over the seeds.
+    pub mean: Mean,
+    /// The largest of a driver, and the place of that driver.
+    pub largest: (f64, usize),
+}
+
 /// A row of the table of drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveRow {
-    /// Law, driver and road.
-    pub names: [String; 3],
+    /// Law, driver, world and road.
+    pub names: [String; 4],
     /// Speed, km/h.
     pub speed_kmh: f64,
     /// Number of the seed.
@@ -74,7 +91,9 @@ pub struct CompareResults {
     pub laws: Vec<LawResult>,
     /// Names and kinds, as listed.
     pub drivers: Vec<[String; 2]>,
-    /// Road and speed of each place.
+    /// Names of the worlds; one without a name if there are none.
+    pub worlds: Vec<String>,
+    /// Road and speed of each place in a world.
     pub places: Vec<(String, f64)>,
     /// Drives at each place.
     pub seeds: u32,
@@ -84,6 +103,8 @@ pub struct CompareResults {
     pub instants: [u32; 2],
     /// By law, then driver.
     pub cells: Vec<Cell>,
+    /// By law, then world, then metric, without the first law.
+    pub ratios: Vec<Ratio>,
     /// Every judged drive.
     #[serde(skip)]
     pub rows: Vec<DriveRow>,
@@ -94,7 +115,7 @@ impl CompareResults {
     pub fn to_csv(&self) -> String {
         let names = METRICS.map(|metric| metric.name).join(",");
         let mut text = format!(
-            "law,driver,road,speed_kmh,seed,{names},off_road,guidance_left_by_itself,failed_off_road\n"
+            "law,driver,world,road,speed_kmh,seed,{names},off_road,guidance_left_by_itself,failed_off_road\n"
         );
         for row in &self.rows {
             let Driven {
@@ -115,6 +136,42 @@ impl CompareResults {
             );
         }
         text
+    }
+
+    /// The same as Parquet.
+    ///
+    /// # Errors
+    /// What the file system says.
+    #[cfg(feature = "parquet")]
+    pub fn write_parquet(&self, file: std::fs::File) -> std::io::Result<()> {
+        use crate::parquet::{Cell, Column, Table};
+        let (number, whole) = (|| Column::Number(Vec::new()), || Column::Whole(Vec::new()));
+        let texts = ["law", "driver", "world", "road"].map(|name| (name, Column::Text(Vec::new())));
+        let metrics = METRICS.map(|metric| (metric.name, number()));
+        let flags = ["off_road", "guidance_left_by_itself"].map(|name| (name, Column::Flag(Vec::new())));
+        let columns = texts
+            .into_iter()
+            .chain([("speed_kmh", number()), ("seed", whole())])
+            .chain(metrics)
+            .chain(flags)
+            .chain([("failed_off_road", whole())]);
+        let columns = columns.map(|(name, column)| (name.to_owned(), column));
+        let metadata = [
+            ("haptic.version", crate::VERSION),
+            ("haptic.comparison", &self.name),
+        ];
+        let mut table = Table::create(columns, &metadata, file)?;
+        for row in &self.rows {
+            let texts = row.names.iter().map(|name| Cell::Text(name.clone()));
+            let driven = &row.driven;
+            let cells = texts
+                .chain([Cell::Number(Some(row.speed_kmh)), Cell::Whole(row.seed.into())])
+                .chain(driven.values.map(Cell::Number))
+                .chain([driven.off_road, driven.left_by_itself].map(Cell::Flag))
+                .chain([Cell::Whole(driven.failed_off_road.into())]);
+            table.row(cells)?;
+        }
+        table.finish()
     }
 }
 
@@ -149,12 +206,14 @@ pub(super) fn sum_up(
             failed_off_road: own.iter().map(|d| d.failed_off_road).sum(),
         }
     };
+    let places = compare.judged.places.len() / compare.worlds.len();
     let row = |(job, driven): (&Job, &Driven)| {
         let (road, speed_kmh, _) = &compare.judged.places[job.place];
         DriveRow {
             names: [
                 compare.laws[job.law].name.clone(),
                 compare.drivers[job.driver].name.clone(),
+                compare.worlds[job.place / places].clone(),
                 road.clone(),
             ],
             speed_kmh: *speed_kmh,
@@ -170,7 +229,9 @@ pub(super) fn sum_up(
     CompareResults {
         name: compare.name.clone(),
         metrics: METRICS.into(),
-        laws: compare.laws.iter().zip(tuned).map(law_result).collect(),
+        laws: (compare.laws.iter().zip(&compare.oracles).zip(tuned))
+            .map(law_result)
+            .collect(),
         drivers: compare
             .drivers
             .iter()
@@ -185,17 +246,76 @@ pub(super) fn sum_up(
             .judged
             .places
             .iter()
+            .take(places)
             .map(|(road, kmh, _)| (road.clone(), *kmh))
             .collect(),
+        worlds: compare.worlds.clone(),
         seeds,
         budget: compare.tuning.as_ref().map_or(0, |t| t.budget),
         instants: [sudden_loss, silent_lane],
         cells: (0..compare.laws.len() * drivers).map(cell).collect(),
+        ratios: ratios(compare, driven),
         rows: jobs.iter().zip(driven).map(row).collect(),
     }
 }
 
-fn law_result((law, tuned): (&super::Chosen<'_, dyn super::Law>, Tuned)) -> LawResult {
+/// Every law over the first one, where all drives of both have a value.
+fn ratios(compare: &Compare, driven: &[Driven]) -> Vec<Ratio> {
+    let (drivers, worlds, seeds) = (
+        compare.drivers.len(),
+        compare.worlds.len(),
+        compare.judged.seeds as usize,
+    );
+    let places = compare.judged.places.len() / worlds;
+    // Sums over the places of a world, by driver, then seed.
+    let sums = |law: usize, world: usize, metric: usize| -> Option<Vec<Vec<f64>>> {
+        let of_driver = |driver: usize| {
+            let mut sums = vec![0.0; seeds];
+            for place in 0..places {
+                let first = ((law * drivers + driver) * worlds + world) * places + place;
+                for (sum, drive) in sums.iter_mut().zip(&driven[first * seeds..]) {
+                    *sum += drive.values[metric]?;
+                }
+            }
+            Some(sums)
+        };
+        (0..drivers).map(of_driver).collect()
+    };
+    let ratio = |law: usize, world: usize, metric: usize| {
+        let (own, first) = (sums(law, world, metric)?, sums(0, world, metric)?);
+        let of_seed = |sums: &[Vec<f64>], seed: usize| sums.iter().map(|of| of[seed]).sum::<f64>();
+        let by_seed: Vec<f64> = (0..seeds)
+            .map(|seed| of_seed(&own, seed) / of_seed(&first, seed))
+            .collect();
+        let (_, interval) = interval_of_mean(&by_seed)?;
+        let total = |sums: &[f64]| sums.iter().sum::<f64>();
+        let all = |sums: &[Vec<f64>]| sums.iter().map(|of| total(of)).sum::<f64>();
+        let each = own
+            .iter()
+            .zip(&first)
+            .map(|(own, first)| total(own) / total(first));
+        let largest = (each.zip(0..)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Ratio {
+            law,
+            world,
+            metric,
+            mean: Mean {
+                mean: all(&own) / all(&first),
+                interval_95: interval,
+            },
+            largest,
+        })
+    };
+    let mut found = Vec::new();
+    for law in 1..compare.laws.len() {
+        for world in 0..worlds {
+            found.extend((0..METRICS.len()).filter_map(|metric| ratio(law, world, metric)));
+        }
+    }
+    found
+}
+
+fn law_result(((law, oracle), tuned): ((&super::Chosen<'_, dyn super::Law>, &bool), Tuned)) -> LawResult {
     LawResult {
         name: law.name.clone(),
         kind: kinds(law.kind.name, law.around.iter().map(|(k, _)| k.name)),
@@ -205,8 +325,9 @@ fn law_result((law, tuned): (&super::Chosen<'_, dyn super::Law>, Tuned)) -> LawR
             .parameters
             .iter()
             .map(|p| p.name)
-            .zip(tuned.values)
+            .zip(tuned.values.into_iter().next().unwrap_or_default())
             .collect(),
+        oracle: *oracle,
         objective: tuned.objective,
     }
 }

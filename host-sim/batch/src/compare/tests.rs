@@ -14,13 +14,13 @@ const FILE: &str = "
 name = 'short'
 seeds = 2
 roads = ['road.toml']
-speeds_kmh = [50, 60]
+speeds_m_per_s = [13.88888888888889, 16.666666666666668]
 [scenario]
-driver = { remnant_sd = 0.1 }
+driver = { remnant_sd_nm = 0.1 }
 [faults]
 sudden_loss = 2
 silent_lane = 1
-lasts_s = 5
+lasts_s = 6
 [[law]]
 name = 'published'
 kind = 'paper'
@@ -39,7 +39,7 @@ kind = 'paper'
 k_hg = 0
 around = [{ kind = 'own_line', offset_m = 0.3 }]
 ";
-const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { peak_lateral_error_m = 1 }\n";
+const TUNING: &str = "[tuning]\nbudget = 4\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\nweights = { peak_lateral_error_m = 1 }\n";
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -76,9 +76,10 @@ fn a_drive_and_its_failures_are_those_of_the_simulator() {
     let (road, speed_kmh, scenario) = &compare.judged.places[0];
     let seed = named(named(1, "judged"), &format!("{road} {speed_kmh} 0")) >> 11;
     let scenario = scenario.to_builder().seed(seed).build().unwrap();
-    let peak_m = |failure: Option<(FailureKind, f64)>| {
+    // The peak from the failure on, and the mean from 5 s behind it on.
+    let driven = |failure: Option<(FailureKind, f64)>| {
         let from_s = failure.map_or(0.0, |(_, time_s)| time_s);
-        let until_s = failure.map_or(f64::INFINITY, |(_, time_s)| time_s + 5.0);
+        let until_s = failure.map_or(f64::INFINITY, |(_, time_s)| time_s + 6.0);
         let (kind, time_s) = failure.unwrap_or((FailureKind::None, 0.0));
         let scenario: Scenario = scenario
             .to_builder()
@@ -97,17 +98,30 @@ fn a_drive_and_its_failures_are_those_of_the_simulator() {
             .samples
             .iter()
             .filter(|s| s.time_s >= from_s && s.time_s < until_s);
-        samples.map(|s| s.lateral_error_m.abs()).fold(0.0, f64::max)
+        let errors: Vec<(f64, f64)> = samples
+            .map(|s| (s.time_s - from_s, s.lateral_error_m.abs()))
+            .collect();
+        let behind = || {
+            errors
+                .iter()
+                .filter(|(time_s, _)| *time_s > 5.0 - 1e-9)
+                .map(|(_, m)| m)
+        };
+        let mean_m = behind().sum::<f64>() / behind().count() as f64;
+        [errors.iter().map(|(_, m)| *m).fold(0.0, f64::max), mean_m]
     };
+    let peak_m = |failure| driven(failure)[0];
     let values = found.rows[0].driven.values;
     assert_eq!(values[0], Some(peak_m(None)));
-    // A quarter and three quarters of what is left of the drive before the last 5 s; half of it.
-    let span_s = scenario.duration_s() - 5.0;
+    // A quarter and three quarters of what is left of the drive before the last 6 s; half of it.
+    let span_s = scenario.duration_s() - 6.0;
     let at = |share: f64| (share * span_s * 1000.0).floor() / 1000.0;
     let losses = [0.25, 0.75].map(|share| peak_m(Some((FailureKind::Torque, at(share)))));
     assert_eq!(values[7], Some(losses[0].max(losses[1])));
     assert_eq!(values[8], Some(0.5 * (losses[0] + losses[1])));
     assert_eq!(values[9], Some(peak_m(Some((FailureKind::Input, at(0.5))))));
+    let behind = [0.25, 0.75].map(|share| driven(Some((FailureKind::Torque, at(share))))[1]);
+    assert!((values[10].unwrap() - 0.5 * (behind[0] + behind[1])).abs() < 1e-12);
 }
 
 /// Means, and the interval of two values a and b by Student's t with one degree of freedom: 12.7062*abs(a - b)/2.
@@ -154,6 +168,56 @@ fn tuning_varies_what_a_file_leaves_open() {
     assert_eq!(found.laws[1].kind, "driver_limit(paper)");
 }
 
+/// Two worlds, the second with another muscle: half of the drives are those of a file without worlds, the ratio is that of the sums.
+#[test]
+fn worlds_are_places_with_the_same_seeds_and_ratios_are_those_of_the_rows() {
+    let worlds = "[[world]]\nname = 'as-it-is'\n[[world]]\nname = 'slow'\nscenario = { driver = { t_nms_s = 0.15 } }\n";
+    let found = results(&FILE.replacen("[faults]", &format!("{worlds}[faults]"), 1));
+    let plain = results(FILE);
+    let of_world =
+        |world: &str| -> Vec<&DriveRow> { found.rows.iter().filter(|row| row.names[2] == world).collect() };
+    let (own, slow) = (of_world("as-it-is"), of_world("slow"));
+    assert_eq!((own.len(), slow.len()), (16, 16));
+    for (own, plain) in own.iter().zip(&plain.rows) {
+        assert_eq!(own.driven, plain.driven);
+    }
+    assert_ne!(own[0].driven, slow[0].driven);
+    // By law, driver, place, seed: eight rows for each law.
+    let sum = |rows: &[&DriveRow]| rows.iter().map(|row| row.driven.values[0].unwrap()).sum::<f64>();
+    for (world, rows) in [own, slow].iter().enumerate() {
+        let ratio = found
+            .ratios
+            .iter()
+            .find(|ratio| (ratio.law, ratio.world, ratio.metric) == (1, world, 0));
+        let ratio = ratio.unwrap();
+        assert!((ratio.mean.mean - sum(&rows[8..]) / sum(&rows[..8])).abs() < 1e-12);
+        let each = [0, 1].map(|driver| sum(&rows[8 + 4 * driver..][..4]) / sum(&rows[4 * driver..][..4]));
+        let largest = if each[0] > each[1] {
+            (each[0], 0)
+        } else {
+            (each[1], 1)
+        };
+        assert!((ratio.largest.0 - largest.0).abs() < 1e-12 && ratio.largest.1 == largest.1);
+    }
+}
+
+/// An oracle's objective with each driver is that of a file with this driver alone.
+#[test]
+fn an_oracle_is_tuned_for_each_driver_by_itself() {
+    let text = FILE.replacen("[faults]", &format!("{TUNING}[faults]"), 1);
+    let both = text.replacen("k_1 = 0.4\n", "oracle = true\n", 1);
+    let drivers: Vec<&str> = both.split("[[driver]]").collect();
+    let alone = |driver: usize| {
+        let found = results(&format!("{}[[driver]]{}", drivers[0], drivers[1 + driver]));
+        (found.laws[1].objective.unwrap()[1], found.rows[4..].to_vec())
+    };
+    let (first, second) = (alone(0), alone(1));
+    let found = results(&both);
+    assert!((found.laws[1].objective.unwrap()[1] - 0.5 * (first.0 + second.0)).abs() < 1e-12);
+    assert_eq!(found.rows[8..], [first.1, second.1].concat());
+    assert!(found.laws[1].oracle && !found.laws[0].oracle);
+}
+
 /// A law that no list has, and one that asks for no number.
 #[test]
 fn a_law_of_one_s_own_joins() {
@@ -189,7 +253,17 @@ fn a_law_of_one_s_own_joins() {
 }
 
 /// What stands in the file, what stands there instead, and what is said of it.
-const WRONG: [(&str, &str, &str); 24] = [
+const WRONG: [(&str, &str, &str); 26] = [
+    (
+        "k_1 = 0.25",
+        "oracle = 1",
+        "law.oracle = 1: true or false is wanted",
+    ),
+    (
+        "[faults]",
+        "[[world]]\nname = 'w'\nscenario = { speed = 5 }\n[faults]",
+        "study.toml: world w: scenario.speed: this file has its own seeds",
+    ),
     (
         "k_1 = 0.25",
         "k_1 = 5",
@@ -245,18 +319,18 @@ const WRONG: [(&str, &str, &str); 24] = [
     ("seeds = 2", "seeds = -2", "expected a whole number, 0 or more"),
     ("seeds = 2", "seedz = 2", "unknown field `seedz`"),
     (
-        "speeds_kmh = [50, 60]",
-        "speeds_kmh = []",
-        "speeds_kmh = []: one at least is wanted",
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_m_per_s = []",
+        "speeds_m_per_s = []: one at least is wanted",
     ),
     (
-        "speeds_kmh = [50, 60]",
-        "speeds_kmh = [300]",
-        "speed = 300 km/h is outside 20 to 250 km/h",
+        "speeds_m_per_s = [13.88888888888889, 16.666666666666668]",
+        "speeds_m_per_s = [83.33333333333333]",
+        "speed_m_per_s = 83.33333333333333 m/s is outside 5.5 to 70 m/s",
     ),
     ("['road.toml']", "['lost.toml']", "lost.toml"),
     (
-        "lasts_s = 5",
+        "lasts_s = 6",
         "lasts_s = 0",
         "faults.lasts_s = 0 s is outside 1 to 600 s",
     ),
@@ -273,12 +347,12 @@ const WRONG: [(&str, &str, &str); 24] = [
     ("[scenario]\n", "[scenario]\nsped = 4\n", "sped"),
     (
         "[scenario]\n",
-        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\n[scenario]\n",
+        "[tuning]\nbudget = 0\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\n[scenario]\n",
         "tuning.budget = 0 is outside 1 to 10000",
     ),
     (
         "[scenario]\n",
-        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_kmh = [60]\nweights = { luck = 1 }\n[scenario]\n",
+        "[tuning]\nbudget = 1\nseeds = 1\nroads = ['road.toml']\nspeeds_m_per_s = [16.666666666666668]\nweights = { luck = 1 }\n[scenario]\n",
         "tuning.weights: there is no \"luck\", only peak_lateral_error_m",
     ),
     (

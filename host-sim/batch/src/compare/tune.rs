@@ -8,9 +8,9 @@ use crate::sweep::sobol::Dimension;
 /// A law after tuning.
 #[derive(Debug, Clone)]
 pub(super) struct Tuned {
-    /// The values of its parameters.
-    pub(super) values: Vec<f64>,
-    /// The objective before and after, if there was anything to tune.
+    /// The values of its parameters with each driver; the same with all but of an oracle.
+    pub(super) values: Vec<Vec<f64>>,
+    /// The objective before and after, over the drivers, if there was anything to tune.
     pub(super) objective: Option<[f64; 2]>,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn sets(compare: &Compare, law: usize) -> Vec<Vec<f64>> {
 pub(super) fn tune(compare: &Compare, progress: &(impl Fn() + Sync)) -> Result<Vec<Tuned>, ScenarioError> {
     let all: Vec<Vec<Vec<f64>>> = (0..compare.laws.len()).map(|law| sets(compare, law)).collect();
     let untuned = |law: usize| Tuned {
-        values: compare.laws[law].untuned(),
+        values: vec![compare.laws[law].untuned(); compare.drivers.len()],
         objective: None,
     };
     let Some(tuning) = &compare.tuning else {
@@ -55,28 +55,43 @@ pub(super) fn tune(compare: &Compare, progress: &(impl Fn() + Sync)) -> Result<V
     };
     let jobs = compare.jobs(&tuning.drives, |law| all[law].len());
     let driven = compare.drive(&jobs, &all, &tuning.drives, "tuning", Faults::NONE, progress)?;
-    let mut places = driven.iter();
-    let each = compare.drivers.len() * tuning.drives.places.len() * tuning.drives.seeds as usize;
-    let of_law = |(law, sets): (usize, &Vec<Vec<f64>>)| {
-        let objectives: Vec<f64> = sets
+    let drivers = compare.drivers.len();
+    let of_driver = tuning.drives.places.len() * tuning.drives.seeds as usize;
+    let mean = |group: &[Driven]| {
+        let sum: f64 = group
             .iter()
-            .map(|_| {
-                places
-                    .by_ref()
-                    .take(each)
-                    .map(|driven| objective(driven, &tuning.weights))
-                    .sum::<f64>()
-                    / each as f64
+            .map(|driven| objective(driven, &tuning.weights))
+            .sum();
+        sum / group.len() as f64
+    };
+    let mut groups = driven.chunks(of_driver);
+    let of_law = |(law, sets): (usize, &Vec<Vec<f64>>)| {
+        // By set, then driver.
+        let objectives: Vec<Vec<f64>> = sets
+            .iter()
+            .map(|_| groups.by_ref().take(drivers).map(mean).collect())
+            .collect();
+        let best = |objective: &dyn Fn(&[f64]) -> f64| {
+            (0..sets.len()).min_by(|a, b| objective(&objectives[*a]).total_cmp(&objective(&objectives[*b])))
+        };
+        let over_all = |of_drivers: &[f64]| of_drivers.iter().sum::<f64>() / drivers as f64;
+        let Some(best_of_all) = best(&over_all) else {
+            return untuned(law);
+        };
+        let chosen: Vec<usize> = (0..drivers)
+            .map(|driver| match compare.oracles[law] {
+                true => best(&|of_drivers| of_drivers[driver]).unwrap_or(best_of_all),
+                false => best_of_all,
             })
             .collect();
-        let best = (0..sets.len()).min_by(|a, b| objectives[*a].total_cmp(&objectives[*b]));
-        best.map_or_else(
-            || untuned(law),
-            |best| Tuned {
-                values: sets[best].clone(),
-                objective: Some([objectives[0], objectives[best]]),
-            },
-        )
+        let after = chosen
+            .iter()
+            .enumerate()
+            .map(|(driver, set)| objectives[*set][driver]);
+        Tuned {
+            values: chosen.iter().map(|set| sets[*set].clone()).collect(),
+            objective: Some([over_all(&objectives[0]), after.sum::<f64>() / drivers as f64]),
+        }
     };
     Ok(all.iter().enumerate().map(of_law).collect())
 }

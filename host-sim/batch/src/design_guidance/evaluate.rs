@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::file::published;
 use super::{DesignGuidance, Gains, Member, Stage};
 use crate::compare::{Faults, failures, measured, seed_of};
+use crate::error::StudyError;
 use crate::stability::growth;
 use crate::vectorised::run_all;
 
@@ -89,7 +90,7 @@ impl DesignGuidance {
     ///
     /// # Errors
     /// A value that a scenario refuses; a drive that differs from the shipping ECU's.
-    pub(super) fn evaluate(&self, gains: Gains, held_out: bool) -> Result<Evaluated, String> {
+    pub(super) fn evaluate(&self, gains: Gains, held_out: bool) -> Result<Evaluated, StudyError> {
         let stage = &self.stages[usize::from(held_out)];
         let faults = Faults {
             sudden_loss: stage.losses,
@@ -125,11 +126,11 @@ impl DesignGuidance {
         })
     }
 
-    fn unstable(&self, gains: Gains, stage: &Stage) -> Result<u32, String> {
+    fn unstable(&self, gains: Gains, stage: &Stage) -> Result<u32, StudyError> {
         let mut unstable = 0;
         for member in &stage.drivers {
             for kmh in STABLE_KMH {
-                let growth = |gains: Gains| -> Result<f64, String> {
+                let growth = |gains: Gains| -> Result<f64, StudyError> {
                     let scenario = self.scenario(&stage.scenarios[0], *member, gains, 1)?;
                     let scenario = scenario.to_builder().speed_kmh(kmh).build()?;
                     Ok(growth(&scenario, Some(&scenario.guidance().controller)))
@@ -145,7 +146,7 @@ impl DesignGuidance {
 fn figures(scenario: &Scenario, run: &Run) -> Figures {
     let samples = &run.trace.samples;
     if scenario.failure().kind == FailureKind::None {
-        let [peak, .., effort, _, conflict, _, _, _] =
+        let [peak, _, _, _, effort, _, conflict, ..] =
             measured(scenario, &run.trace, run.diverged(), &[vec![], vec![]]);
         let [peak, effort, conflict] = [peak, effort, conflict].map(|value| value.unwrap_or(0.0));
         return [peak, effort, conflict, 0.0, noise_nm(run)];

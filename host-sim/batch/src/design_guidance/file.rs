@@ -54,7 +54,7 @@ struct Search {
 struct StageFile {
     seeds: u64,
     roads: Vec<String>,
-    speeds_kmh: Vec<f64>,
+    speeds_m_per_s: Vec<f64>,
     losses: u64,
 }
 
@@ -83,8 +83,15 @@ pub(super) fn from_text(
     }
     let share = own_line_share.unwrap_or(file.population.own_line_share);
     let stage = |stream, table: &str, file_of: &StageFile, share, turn| {
-        let (roads, speeds_kmh) = (&file_of.roads, &file_of.speeds_kmh);
-        let drives = drives(&source, table, &file.scenario, roads, speeds_kmh, file_of.seeds)?;
+        let (roads, speeds_m_per_s) = (&file_of.roads, &file_of.speeds_m_per_s);
+        let drives = drives(
+            &source,
+            table,
+            &file.scenario,
+            roads,
+            speeds_m_per_s,
+            file_of.seeds,
+        )?;
         let places = drives.places.into_iter();
         let (places, scenarios) = places
             .map(|(road, kmh, scenario)| ((road, kmh), scenario))

@@ -19,6 +19,7 @@ mod tests;
 
 use std::path::Path;
 
+use crate::error::StudyError;
 use haptic_sim::input::InputError;
 use haptic_sim::scenario::Scenario;
 use serde::Serialize;
@@ -101,10 +102,9 @@ impl DesignGuidance {
     ///
     /// # Errors
     /// There is no such row.
-    pub fn row(&self, number: u32) -> Result<usize, String> {
+    pub fn row(&self, number: u32) -> Result<usize, StudyError> {
         let last = self.stretches.len() as u32;
-        haptic_sim::input::in_range("--choose", f64::from(number), 1.0..=f64::from(last), "")
-            .map(|()| number as usize - 1)
-            .map_err(|e| e.to_string())
+        haptic_sim::input::in_range("--choose", f64::from(number), 1.0..=f64::from(last), "")?;
+        Ok(number as usize - 1)
     }
 }

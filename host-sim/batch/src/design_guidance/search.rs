@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::evaluate::{CONFLICT, EFFORT, LOSS, NOISE, PEAK};
 use super::file::published;
 use super::{DesignGuidance, Evaluated, Figures, Gains, Member, Stage};
+use crate::error::StudyError;
 
 /// What a set is held to: a figure over that of the paper's gains.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -105,8 +106,8 @@ impl DesignGuidance {
     pub fn run(
         &self,
         known: &[Evaluated],
-        mut keep: impl FnMut(&Evaluated) -> Result<(), String>,
-    ) -> Result<DesignResults, String> {
+        mut keep: impl FnMut(&Evaluated) -> Result<(), StudyError>,
+    ) -> Result<DesignResults, StudyError> {
         let mut all = known.to_vec();
         let mut evaluated = |gains: Gains, held_out: bool| {
             let is_it = |set: &&Evaluated| set.held_out == held_out && set.gains == gains;
@@ -139,7 +140,11 @@ impl DesignGuidance {
                 drivers: judged.drivers,
             })
         };
-        let choices = self.stretches.iter().map(choice).collect::<Result<_, String>>()?;
+        let choices = self
+            .stretches
+            .iter()
+            .map(choice)
+            .collect::<Result<_, StudyError>>()?;
         let bars = BARS
             .iter()
             .zip(self.bars)
@@ -159,8 +164,8 @@ impl DesignGuidance {
         &self,
         number: usize,
         sets: &mut Vec<Evaluated>,
-        mut evaluated: impl FnMut(Gains) -> Result<Evaluated, String>,
-    ) -> Result<(), String> {
+        mut evaluated: impl FnMut(Gains) -> Result<Evaluated, StudyError>,
+    ) -> Result<(), StudyError> {
         let stretch = self.stretches[number];
         let begin = sets[self.best(stretch, sets)].gains.map(f64::ln).to_vec();
         let mut failed = None;

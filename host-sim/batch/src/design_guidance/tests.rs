@@ -15,7 +15,7 @@ const FILE: &str = "
 name = 'short'
 law = 'paper'
 [scenario]
-driver = { remnant_sd = 0.1 }
+driver = { remnant_sd_nm = 0.1 }
 [population]
 participants = [2, 13]
 own_line_share = 0.5
@@ -27,12 +27,12 @@ scales = [[0.5, 9], [0.5, 2], [0.5, 2], [0.5, 2]]
 [training]
 seeds = 1
 roads = ['road.toml']
-speeds_kmh = [60]
+speeds_m_per_s = [16.666666666666668]
 losses = 2
 [held_out]
 seeds = 2
 roads = ['road.toml']
-speeds_kmh = [50]
+speeds_m_per_s = [13.88888888888889]
 losses = 1
 ";
 
@@ -242,7 +242,7 @@ const WRONG: [(&str, &str, &str); 15] = [
     (
         "[0.5, 2], [0.5, 2]]",
         "[0.5, 4], [0.5, 2]]",
-        "guidance.a_3 = 160 1/rad is outside 0 to 100",
+        "guidance.a_3_per_rad = 160 1/rad is outside 0 to 100",
     ),
     (
         "losses = 2",
@@ -277,7 +277,7 @@ fn a_wrong_file_is_refused_by_field_value_and_range() {
         "{error}"
     );
     assert_eq!(
-        design(FILE).unwrap().row(3).unwrap_err(),
+        design(FILE).unwrap().row(3).unwrap_err().to_string(),
         "--choose = 3 is outside 1 to 2"
     );
 }

@@ -19,6 +19,7 @@ use super::corruptions::{Held, tolerance};
 use super::drives::guided;
 use super::kinds::{ASSUMED_NOT_TO, Drawn, KINDS};
 use super::repetitions::{COMPARED, compared};
+use crate::error::{StudyError, refuse};
 
 /// What was made of one kind of change.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -71,11 +72,11 @@ pub struct Changes {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> Result<Changes, String> {
+pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> Result<Changes, StudyError> {
     let kinds: Vec<_> = KINDS.iter().filter(|(name, _)| name.contains(only)).collect();
     if kinds.is_empty() {
         let names = KINDS.map(|k| k.0).join("; ");
-        return Err(format!("--only {only:?}: none of {names}"));
+        return refuse(format!("--only {only:?}: none of {names}"));
     }
     let jobs = guided(plan, drives)?;
     let found = jobs
@@ -99,7 +100,7 @@ pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> 
                 ChangesLine::new(name, &drawn, &log, &whole, pieces.as_ref()),
             ))
         })
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let lines: Vec<ChangesLine> = (0..kinds.len())
         .filter_map(|place| {
             let of_kind = found.iter().filter(|f| f.0 == place).map(|f| f.1.clone());

@@ -14,6 +14,7 @@ use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
 use super::drives::{driven_by, guided};
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
+use crate::error::StudyError;
 
 /// How many 95 % intervals of identified values hold the truth.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -118,7 +119,7 @@ pub fn corruptions(
     seeds: u32,
     only: &str,
     done: impl Fn() + Sync,
-) -> Result<Corruptions, String> {
+) -> Result<Corruptions, StudyError> {
     let ways: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()
         .filter(|(name, _)| name.contains(only))
@@ -183,7 +184,7 @@ pub fn corruptions(
             let bound = clean.first().map(|(_, log)| bound_of(log, &truth));
             Ok((fits, bound.unwrap_or_default()))
         })
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let count = found.len().max(1) as f64;
     let bound = std::array::from_fn(|i| (found.iter().map(|f| f.1[i].powi(2)).sum::<f64>() / count).sqrt());
     let mut fits: Vec<Vec<_>> = ways.iter().map(|_| Vec::new()).collect();

@@ -10,6 +10,7 @@ use haptic_vectorised::{Event, Options};
 
 use super::{Plan, Probe, REMNANT_GUIDED_NM, REMNANT_MANUAL_NM, Recorder, chosen, path_of};
 use crate::Away;
+use crate::error::StudyError;
 use crate::vectorised::{Checked, Group, in_groups};
 
 /// A drive with what is needed to judge it.
@@ -21,7 +22,7 @@ pub(crate) struct Driven {
 }
 
 /// The guided drives of a plan, each participant so often: number, driver, and what counts on from the plan's seed.
-pub(super) fn guided(plan: &Plan, drives: u32) -> Result<Vec<(u32, PublishedDriver, u64)>, String> {
+pub(super) fn guided(plan: &Plan, drives: u32) -> Result<Vec<(u32, PublishedDriver, u64)>, StudyError> {
     let chosen = chosen(&plan.participants)?;
     let of = |p: &Participant| {
         let (number, driver) = (p.number, p.guided);
@@ -31,7 +32,7 @@ pub(super) fn guided(plan: &Plan, drives: u32) -> Result<Vec<(u32, PublishedDriv
 }
 
 /// Lets a published driver drive alone, with a remnant and the paper's sensors.
-pub(super) fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, String> {
+pub(super) fn driven(plan: &Plan, number: u32, truth: &PublishedDriver) -> Result<Driven, StudyError> {
     driven_by(plan, number, truth, truth.parameters())
 }
 
@@ -41,7 +42,7 @@ pub(super) fn driven_by(
     number: u32,
     truth: &PublishedDriver,
     driver: DriverParameters,
-) -> Result<Driven, String> {
+) -> Result<Driven, StudyError> {
     Ok(driven_alone(&scenario_of_drive(plan, number, truth, driver)?))
 }
 
@@ -51,7 +52,7 @@ pub(super) fn scenario_of_drive(
     number: u32,
     truth: &PublishedDriver,
     driver: DriverParameters,
-) -> Result<Scenario, String> {
+) -> Result<Scenario, StudyError> {
     let guided = truth.k_hg.is_some();
     let seed = plan
         .seed
@@ -89,9 +90,9 @@ pub(super) fn driven_alone(scenario: &Scenario) -> Driven {
 pub(crate) fn log_each<J: Sync, T: Send>(
     jobs: &[J],
     seed: u64,
-    scenario: impl Fn(&J) -> Result<Scenario, String> + Sync,
+    scenario: impl Fn(&J) -> Result<Scenario, StudyError> + Sync,
     judge: impl Fn(Driven, &J) -> T + Sync,
-) -> Result<Vec<T>, String> {
+) -> Result<Vec<T>, StudyError> {
     let checked = Checked::new(seed, jobs.len() as u64);
     in_groups(jobs, |first, jobs| {
         let scenarios: Vec<Scenario> = jobs.iter().map(&scenario).collect::<Result<_, _>>()?;
@@ -109,7 +110,7 @@ pub(crate) fn log_each<J: Sync, T: Send>(
 }
 
 /// The drives of a group, logged.
-fn log_group(group: Group) -> Result<Vec<Driven>, String> {
+fn log_group(group: Group) -> Result<Vec<Driven>, StudyError> {
     let scenarios = group.scenarios;
     let options = Options {
         every_step: true,
@@ -149,7 +150,7 @@ pub fn recorded(
     course: Option<&Course>,
     probe: Option<Probe>,
     seed: u64,
-) -> Result<DriveLog, String> {
+) -> Result<DriveLog, StudyError> {
     Ok(driven_alone(&guided_drive(driver, course, probe, seed)?).log)
 }
 
@@ -162,7 +163,7 @@ pub(crate) fn guided_drive(
     course: Option<&Course>,
     probe: Option<Probe>,
     seed: u64,
-) -> Result<Scenario, String> {
+) -> Result<Scenario, StudyError> {
     let mut scenario = Scenario::builder()
         .driver(DriverParameters {
             remnant_sd_nm: REMNANT_GUIDED_NM,
@@ -179,7 +180,7 @@ pub(crate) fn guided_drive(
 }
 
 /// The drive of a published driver, without remnant.
-fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, String> {
+fn scenario_of(plan: &Plan, driver: &PublishedDriver, seed: u64) -> Result<Scenario, StudyError> {
     let condition = match driver.k_hg {
         Some(_) => Condition::Custom,
         None => Condition::Manual,

@@ -12,6 +12,7 @@ use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::drives::driven;
 use super::repetitions::{COMPARED, bound_of, compared};
 use super::{Plan, chosen};
+use crate::error::StudyError;
 
 /// The ways.
 pub const METHODS: [&str; 4] = ["none", "plain smoother", "default", "published"];
@@ -52,7 +53,7 @@ pub struct Methods {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, String> {
+pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
     let drivers = chosen(&plan.participants)?;
     let jobs: Vec<_> = drivers
         .iter()
@@ -97,7 +98,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Method
             done();
             Ok((bound, values))
         })
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let root_mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, n) = values.fold((0.0, 0), |(s, n), x| (s + x * x, n + 1));
         (sum / f64::from(n.max(1))).sqrt()

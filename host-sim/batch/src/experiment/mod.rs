@@ -44,10 +44,11 @@ use haptic_log::trace::Trace;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
 use haptic_sim::models::road::Course;
-use haptic_sim::participants::{Participant, PublishedDriver, participants};
+use haptic_sim::participants::{Participant, PublishedDriver, participant};
 use haptic_sim::scenario::{Condition, GuidanceParameters, Scenario, ScenarioError};
 
 use crate::Away;
+use crate::error::StudyError;
 use crate::vectorised::run_all;
 pub use drives::recorded;
 use drives::{Driven, scenario_of_drive};
@@ -133,7 +134,7 @@ pub struct Finding {
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, String> {
+pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])
@@ -195,13 +196,9 @@ pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, Str
 }
 
 /// The participants of these numbers.
-fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, String> {
-    let all = participants();
-    let find = |&number: &u32| {
-        let found = all.iter().find(|p| p.number == number).copied();
-        found.ok_or_else(|| format!("participant {number} is outside 1 to {}", all.len()))
-    };
-    numbers.iter().map(find).collect()
+fn chosen(numbers: &[u32]) -> Result<Vec<Participant>, StudyError> {
+    let found = |&number| Ok(participant("participant", number)?);
+    numbers.iter().map(found).collect()
 }
 
 /// What a method makes of a log, and the driver that it found.
@@ -211,12 +208,12 @@ struct Identified {
 }
 
 /// By the default method, and by the published one.
-fn identified(driven: &Driven, truth: &PublishedDriver) -> Result<[Identified; 2], String> {
+fn identified(driven: &Driven, truth: &PublishedDriver) -> Result<[Identified; 2], StudyError> {
     let options = Options {
         manual: truth.k_hg.is_none(),
         ..Options::default()
     };
-    let found = |identification: Identification| -> Result<Identified, String> {
+    let found = |identification: Identification| -> Result<Identified, StudyError> {
         let muscle = identification.muscle(options.muscle);
         Ok(Identified {
             driver: identified_driver(&driven.scenario, &identification, muscle)?,
@@ -225,7 +222,7 @@ fn identified(driven: &Driven, truth: &PublishedDriver) -> Result<[Identified; 2
     };
     Ok([
         found(identify_with_noise_model(&driven.log, &options))?,
-        found(identify_as_published(&driven.log, &options).map_err(|e| e.to_string())?)?,
+        found(identify_as_published(&driven.log, &options)?)?,
     ])
 }
 

@@ -20,6 +20,7 @@ use super::Plan;
 use super::corruptions::{CorruptionLine, Corruptions, Held};
 use super::drives::{guided, scenario_of_drive};
 use super::repetitions::{COMPARED, Compared, compared};
+use crate::error::StudyError;
 
 /// How a drive is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,8 +99,8 @@ pub const CHANNELS: [(&str, Channel); 9] = [
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn recordings(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Corruptions, String> {
-    let layout = Layout::named("openlka").map_err(|e| e.to_string())?;
+pub fn recordings(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Corruptions, StudyError> {
+    let layout = Layout::named("openlka")?;
     let jobs = guided(plan, seeds)?;
     let found = jobs
         .into_par_iter()
@@ -111,7 +112,7 @@ pub fn recordings(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Cor
                     ..plan.clone()
                 };
                 let scenario = scenario_of_drive(&plan, number, &truth, truth.parameters())?;
-                Ok::<_, String>(simulation::simulate(&scenario).trace)
+                Ok::<_, StudyError>(simulation::simulate(&scenario).trace)
             };
             let drives = [drive(0.0)?, drive(plan.probe_nm)?];
             let mut random = Xoshiro256PlusPlus::seed_from_u64(
@@ -128,7 +129,7 @@ pub fn recordings(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Cor
             };
             Ok(CHANNELS.iter().map(fit).collect::<Vec<_>>())
         })
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let lines = CHANNELS.iter().enumerate().map(|(k, (name, _))| {
         let fits: Vec<([Compared; COMPARED], Identification)> =
             found.iter().filter_map(|each| each[k].clone()).collect();

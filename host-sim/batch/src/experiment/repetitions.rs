@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::drives::{guided, log_each, scenario_of_drive};
 use super::{Plan, PublishedDriver, truth_of};
+use crate::error::StudyError;
 use haptic_analysis::identify::{
     DriveLog, Identification, Muscle, Options, Parameter, Parameters, identify_with_noise_model, information,
 };
@@ -61,7 +62,7 @@ pub struct Repeated {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<Repetitions, String> {
+pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<Repetitions, StudyError> {
     let jobs = guided(plan, repetitions)?;
     let found: Vec<Judged> = log_each(
         &jobs,

@@ -19,10 +19,11 @@ use serde::Serialize;
 
 pub use readings::{Reading, Readings};
 
+use crate::error::{StudyError, refuse};
 use haptic_sim::guidance::OverBus;
 use haptic_sim::models::STEP_S;
 use haptic_sim::models::driver::DriverParameters;
-use haptic_sim::participants::{Participant, participants};
+use haptic_sim::participants::{Participant, participant, participants};
 use haptic_sim::scenario::{DriverChange, GuidanceParameters, Scenario};
 use haptic_sim::simulation::Ending;
 use haptic_sim::{Action, Simulation};
@@ -158,18 +159,15 @@ struct Drive {
 ///
 /// # Errors
 /// A participant or a parameter of the probe that is out of range.
-pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults, String> {
+pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults, StudyError> {
     let all = participants();
     let chosen: Vec<usize> = plan
         .participants
         .iter()
-        .map(|&number| {
-            let place = all.iter().position(|p| p.number == number);
-            place.ok_or_else(|| format!("participant = {number} is outside 1 to {}", all.len()))
-        })
+        .map(|&number| participant("participant", number).map(|found| found.number as usize - 1))
         .collect::<Result<_, _>>()?;
     if chosen.is_empty() || plan.seeds == 0 {
-        return Err("participants and seeds: at least one of each is needed".into());
+        return refuse("participants and seeds: at least one of each is needed");
     }
     scenario(plan, &all[chosen[0]], 0)?;
     let jobs: Vec<(usize, u32)> = chosen
@@ -224,7 +222,7 @@ pub fn study(plan: &Plan, progress: impl Fn() + Sync) -> Result<RelianceResults,
 }
 
 /// One steady and one changing drive of a participant.
-fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Result<Drive, String> {
+fn both_drives(plan: &Plan, all: &[Participant], place: usize, seed: u32) -> Result<Drive, StudyError> {
     let mut result = Drive {
         steady: Default::default(),
         changed: None,
@@ -298,7 +296,7 @@ fn run(scenario: &Scenario, session_s: f64, result: &mut Drive) -> Readings {
     readings
 }
 
-fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenario, String> {
+fn scenario(plan: &Plan, participant: &Participant, seed: u32) -> Result<Scenario, StudyError> {
     let driver = participant.guided;
     let mut guidance = GuidanceParameters::default();
     guidance.controller.probe_amplitude_nm = plan.amplitude_nm;

@@ -35,7 +35,7 @@ impl Readings {
             .find(|frame| frame.id() == Telemetry::ID);
         let data = frame.and_then(|frame| frame.data().try_into().ok());
         // The simulated bus damages nothing, so that the signals may be read without a receiver.
-        if let Some(telemetry) = data.and_then(|data| Telemetry::unpack(u64::from_le_bytes(data))) {
+        if let Some(telemetry) = data.and_then(|data| Telemetry::unpack(&data)) {
             self.readings.push(Reading {
                 time_s: f64::from(outcome.observation.step) * STEP_S,
                 probing: telemetry.probe.is_some(),

@@ -3,15 +3,16 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use haptic_sim::input::{InputError, in_range, parse_toml};
+use haptic_sim::input::{InputError, RangeError, in_range, parse_toml};
 use haptic_sim::models::road::Course;
-use haptic_sim::participants::participants as published;
+use haptic_sim::participants::participant;
 use haptic_sim::scenario::{FailureKind, Scenario};
 use haptic_sim::seeds::named;
 use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{Order, Session, Study, Who};
+use crate::error::{StudyError, refuse};
 use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 
 #[derive(Deserialize)]
@@ -65,17 +66,17 @@ pub(super) fn load(path: &Path) -> Result<Study, InputError> {
 
 pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study, InputError> {
     let file: StudyFile = parse_toml(source, text)?;
-    let bad = |message: String| InputError::new(source, message);
-    check_names("study", [&file.name]).map_err(bad)?;
-    check_names("condition", file.condition.iter().map(|c| &c.name)).map_err(bad)?;
-    check_names("participant", file.participant.iter().map(|p| &p.name)).map_err(bad)?;
-    in_range(
+    let named = |error: StudyError| InputError::new(source, error);
+    check_names("study", [&file.name]).map_err(named)?;
+    check_names("condition", file.condition.iter().map(|c| &c.name)).map_err(named)?;
+    check_names("participant", file.participant.iter().map(|p| &p.name)).map_err(named)?;
+    let repetitions = in_range(
         "repetitions",
         file.repetitions as f64,
         1.0..=MOST_REPETITIONS as f64,
         "",
-    )
-    .map_err(|e| bad(e.to_string()))?;
+    );
+    repetitions.map_err(|e| named(e.into()))?;
     let rows = file.order.rows(file.condition.len());
     let mut sessions = Vec::new();
     for (number, participant) in file.participant.iter().enumerate() {
@@ -108,22 +109,25 @@ pub(super) fn from_text(source: &str, text: &str, folder: &Path) -> Result<Study
     })
 }
 
-pub(crate) fn check_names<'a>(what: &str, names: impl IntoIterator<Item = &'a String>) -> Result<(), String> {
+pub(crate) fn check_names<'a>(
+    what: &str,
+    names: impl IntoIterator<Item = &'a String>,
+) -> Result<(), StudyError> {
     let mut seen = BTreeSet::new();
     for name in names {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) {
-            return Err(format!(
+            return refuse(format!(
                 "{what} {name:?}: a name is 1 to {LONGEST_NAME} letters, digits, - and _, for a directory bears it"
             ));
         }
         // Some disks do not tell large letters from small ones.
         if !seen.insert(name.to_lowercase()) {
-            return Err(format!("{what} {name:?} is there twice"));
+            return refuse(format!("{what} {name:?} is there twice"));
         }
     }
     if seen.is_empty() {
-        return Err(format!("there is no [[{what}]]"));
+        return refuse(format!("there is no [[{what}]]"));
     }
     Ok(())
 }
@@ -156,7 +160,7 @@ fn session(
             let mut driver = Table::new();
             driver.insert(
                 "driver".into(),
-                Value::Table(of_published(number, manual).map_err(bad)?),
+                Value::Table(of_published(number, manual).map_err(|e| bad(e.to_string()))?),
             );
             merge(&mut fields, &driver);
             Who::Simulated
@@ -201,10 +205,8 @@ fn session(
 }
 
 /// The driver of table 5 or 6, with the remnant that belongs to it.
-fn of_published(number: u32, manual: bool) -> Result<Table, String> {
-    let all = published();
-    let found = all.iter().find(|p| p.number == number);
-    let found = found.ok_or_else(|| format!("published = {number} is outside 1 to {}", all.len()))?;
+fn of_published(number: u32, manual: bool) -> Result<Table, RangeError> {
+    let found = participant("published", number)?;
     let (driver, remnant_nm) = if manual {
         (found.manual, REMNANT_MANUAL_NM)
     } else {
@@ -212,13 +214,13 @@ fn of_published(number: u32, manual: bool) -> Result<Table, String> {
     };
     let mut fields = Table::new();
     for (name, value) in [
-        ("a_1", Some(driver.a_1)),
-        ("a_2", Some(driver.a_2)),
+        ("a_1_rad_per_m", Some(driver.a_1)),
+        ("a_2_rad_per_m_s", Some(driver.a_2)),
         ("a_3", Some(driver.a_3)),
-        ("t_p", Some(driver.t_p)),
-        ("K_d", Some(driver.k_d)),
-        ("K_hg", driver.k_hg),
-        ("remnant_sd", Some(remnant_nm)),
+        ("t_p_s", Some(driver.t_p)),
+        ("k_d_nm_per_rad", Some(driver.k_d)),
+        ("k_hg", driver.k_hg),
+        ("remnant_sd_nm", Some(remnant_nm)),
     ] {
         if let Some(value) = value {
             fields.insert(name.into(), Value::Float(value));

@@ -28,6 +28,7 @@ pub use order::Order;
 pub(crate) use paired::interval_of_mean;
 pub use paired::{Difference, of_participants};
 
+use crate::error::{StudyError, refuse};
 use crate::left_by_themselves;
 use crate::record::RunRecord;
 use crate::vectorised::run_all;
@@ -162,7 +163,7 @@ impl Study {
     ///
     /// # Errors
     /// A session that the study does not have, is simulated or is recorded already; a file that is no drive of it.
-    pub fn import(&self, out: &Path, what: &str, file: &Path) -> Result<(), String> {
+    pub fn import(&self, out: &Path, what: &str, file: &Path) -> Result<(), StudyError> {
         let found = self.sessions.iter().find(|s| s.name() == what);
         let Some(session) = found else {
             let names: Vec<String> = self
@@ -171,13 +172,13 @@ impl Study {
                 .filter(|s| s.who == Who::Person)
                 .map(Session::name)
                 .collect();
-            return Err(format!(
+            return refuse(format!(
                 "{what}: no session of a person; there are: {}",
                 names.join(", ")
             ));
         };
         if session.who != Who::Person {
-            return Err(format!("{what}: this participant is simulated"));
+            return refuse(format!("{what}: this participant is simulated"));
         }
         let place = store::place(out, session);
         if place.exists() {
@@ -191,7 +192,7 @@ impl Study {
     ///
     /// # Errors
     /// A place with another session in it; what the disk says; a drive that differs from the shipping ECU's.
-    pub fn run(&self, out: &Path, done: impl Fn() + Sync) -> Result<(), String> {
+    pub fn run(&self, out: &Path, done: impl Fn() + Sync) -> Result<(), StudyError> {
         let missing = self.missing(out)?;
         let scenarios: Vec<Scenario> = missing.iter().map(|session| session.scenario.clone()).collect();
         let seed = scenarios.first().map_or(0, Scenario::seed);
@@ -207,7 +208,7 @@ impl Study {
     ///
     /// # Errors
     /// A place with another session in it.
-    pub fn missing(&self, out: &Path) -> Result<Vec<&Session>, String> {
+    pub fn missing(&self, out: &Path) -> Result<Vec<&Session>, StudyError> {
         let mut missing = Vec::new();
         for session in &self.sessions {
             let there = store::read(self, session, out)?.is_some();
@@ -222,8 +223,8 @@ impl Study {
     ///
     /// # Errors
     /// A recording that cannot be read, or is another session's.
-    pub fn results(&self, out: &Path) -> Result<StudyResults, String> {
-        let result = |session: &Session| -> Result<SessionResult, String> {
+    pub fn results(&self, out: &Path) -> Result<StudyResults, StudyError> {
+        let result = |session: &Session| -> Result<SessionResult, StudyError> {
             let found = store::read(self, session, out)?;
             Ok(SessionResult {
                 participant: session.participant.clone(),

@@ -14,6 +14,7 @@ use haptic_sim::simulation::{Ending, Run};
 use serde::{Deserialize, Serialize};
 
 use super::{Session, Source, Study};
+use crate::error::{StudyError, refuse};
 use crate::record::{RunRecord, default_window};
 
 /// What a session's directory says of it.
@@ -52,19 +53,19 @@ pub(super) fn read(
     study: &Study,
     session: &Session,
     out: &Path,
-) -> Result<Option<(Stored, RunRecord)>, String> {
+) -> Result<Option<(Stored, RunRecord)>, StudyError> {
     let place = place(out, session);
     if !place.exists() {
         return Ok(None);
     }
     let text = |name: &str| {
         let path = place.join(name);
-        fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+        fs::read_to_string(&path).map_err(|e| InputError::new(path.display(), e))
     };
     let name = place.join("session.toml").display().to_string();
-    let stored: Stored = parse_toml(&name, &text("session.toml")?).map_err(|e| e.to_string())?;
+    let stored: Stored = parse_toml(&name, &text("session.toml")?)?;
     let another = |what: &str| {
-        Err(format!(
+        refuse(format!(
             "{}: recorded {what}; nothing recorded is overwritten: give another --out",
             place.display()
         ))
@@ -86,17 +87,17 @@ pub(super) fn read(
     let trace = fs::File::open(&path)
         .map_err(|e| e.to_string())
         .and_then(|file| Trace::read_csv(file).map_err(|e| e.to_string()))
-        .map_err(|e| format!("{}: {e}", path.display()))?;
+        .map_err(|e| InputError::new(path.display(), e))?;
     let record = measured(session, trace, stored.diverged);
     Ok(Some((stored, record)))
 }
 
 /// The scenario of a stored text.
-fn scenario(name: &str, text: &str) -> Result<Scenario, String> {
+fn scenario(name: &str, text: &str) -> Result<Scenario, StudyError> {
     Scenario::from_toml(name, text, |course, _| {
         Err(InputError::new(course, "a stored scenario holds its course"))
     })
-    .map_err(|e| e.to_string())
+    .map_err(StudyError::from)
 }
 
 fn measured(session: &Session, trace: Trace, diverged: bool) -> RunRecord {
@@ -119,29 +120,30 @@ fn measured(session: &Session, trace: Trace, diverged: bool) -> RunRecord {
 }
 
 /// Keeps what a simulated participant drove.
-pub(super) fn keep_run(study: &Study, session: &Session, out: &Path, run: &Run) -> Result<(), String> {
+pub(super) fn keep_run(study: &Study, session: &Session, out: &Path, run: &Run) -> Result<(), StudyError> {
     let mut csv = Vec::new();
-    run.trace.write_csv(&mut csv).map_err(|e| e.to_string())?;
+    let written = run.trace.write_csv(&mut csv);
+    written.map_err(|e| InputError::new(session.name(), e))?;
     keep(study, session, out, &csv, Source::Simulated, run.diverged())
 }
 
 /// Keeps what a person's drive left, byte for byte, if it is one of this session.
-pub(super) fn import(study: &Study, session: &Session, out: &Path, file: &Path) -> Result<(), String> {
-    let named = |what: String| format!("{}: {what}", file.display());
-    let csv = fs::read(file).map_err(|e| named(e.to_string()))?;
-    let trace = Trace::read_csv(&csv[..]).map_err(|e| named(e.to_string()))?;
-    check(session, &trace).map_err(named)?;
-    check_hands(&trace).map_err(named)?;
-    check_road(session, &trace).map_err(named)?;
+pub(super) fn import(study: &Study, session: &Session, out: &Path, file: &Path) -> Result<(), StudyError> {
+    let csv = fs::read(file).map_err(|e| InputError::new(file.display(), e))?;
+    let trace = Trace::read_csv(&csv[..]).map_err(|e| InputError::new(file.display(), e))?;
+    let checked = check(session, &trace)
+        .and_then(|()| check_hands(&trace))
+        .and_then(|()| check_road(session, &trace));
+    checked.map_err(|e| InputError::new(file.display(), e))?;
     keep(study, session, out, &csv, Source::Imported, false)
 }
 
 /// A drive in which nobody drove says nothing of anybody.
-fn check_hands(trace: &Trace) -> Result<(), String> {
+fn check_hands(trace: &Trace) -> Result<(), StudyError> {
     let torques = trace.samples.iter().map(|sample| sample.driver_torque_nm.abs());
     let most = torques.fold(0.0, f64::max);
     if most < HANDS_NM {
-        return Err(format!(
+        return refuse(format!(
             "driver_torque_nm is at most {most:.3} N.m in its {} rows: nobody held the wheel",
             trace.samples.len()
         ));
@@ -150,7 +152,7 @@ fn check_hands(trace: &Trace) -> Result<(), String> {
 }
 
 /// The road of a recording is told by its curvature at each place.
-fn check_road(session: &Session, trace: &Trace) -> Result<(), String> {
+fn check_road(session: &Session, trace: &Trace) -> Result<(), StudyError> {
     let course = session.scenario.course().centreline();
     let told = || {
         trace
@@ -170,7 +172,7 @@ fn check_road(session: &Session, trace: &Trace) -> Result<(), String> {
     let Sample {
         s_m, curvature_1pm, ..
     } = told().find(differs).copied().unwrap_or_default();
-    Err(format!(
+    refuse(format!(
         "driven on another road: {differing} of {} rows do not lie on that of condition {}, {}; at {s_m:.1} m the file has a curvature \
          of {curvature_1pm:.5} 1/m, and that road, {:.1} m long, {:.5} 1/m",
         trace.samples.len(),
@@ -182,9 +184,9 @@ fn check_road(session: &Session, trace: &Trace) -> Result<(), String> {
 }
 
 /// What tells a recording of this session from one of another.
-fn check(session: &Session, trace: &Trace) -> Result<(), String> {
+fn check(session: &Session, trace: &Trace) -> Result<(), StudyError> {
     let (Some(first), Some(last)) = (trace.samples.first(), trace.samples.last()) else {
-        return Err("there are no rows".into());
+        return refuse("there are no rows");
     };
     for (row, sample) in trace.samples.iter().enumerate() {
         let values = [
@@ -194,7 +196,7 @@ fn check(session: &Session, trace: &Trace) -> Result<(), String> {
             sample.driver_torque_nm,
         ];
         if values.iter().any(|value| !value.is_finite()) {
-            return Err(format!("row {}: a value is missing", row + 1));
+            return refuse(format!("row {}: a value is missing", row + 1));
         }
     }
     let steps = || {
@@ -206,7 +208,7 @@ fn check(session: &Session, trace: &Trace) -> Result<(), String> {
     let usual_s = steps().next().unwrap_or_default();
     if let Some(row) = steps().position(|step| (step - usual_s).abs() > 0.5 * usual_s) {
         let [before, after] = [row, row + 1].map(|row| trace.samples[row].time_s);
-        return Err(format!(
+        return refuse(format!(
             "row {}: the time goes from {before} to {after} s, where others are {usual_s:.4} s apart: a drive is recorded in one \
              piece",
             row + 2
@@ -214,14 +216,14 @@ fn check(session: &Session, trace: &Trace) -> Result<(), String> {
     }
     let lasts_s = last.time_s - first.time_s;
     if lasts_s < LEAST_S {
-        return Err(format!(
+        return refuse(format!(
             "it lasts {lasts_s:.1} s, and a drive at least {LEAST_S} s"
         ));
     }
     let speed = (last.s_m - first.s_m) / lasts_s;
     let wanted = session.scenario.mean_speed_m_per_s(first.time_s, last.time_s);
     if (speed / wanted - 1.0).abs() > SPEED_WITHIN {
-        return Err(format!(
+        return refuse(format!(
             "driven at {:.1} km/h, and condition {} is at {:.1} km/h",
             speed * 3.6,
             session.condition,
@@ -235,7 +237,7 @@ fn check(session: &Session, trace: &Trace) -> Result<(), String> {
     let wanted = session.scenario.condition() != Condition::Manual;
     if guided != wanted {
         let says = |with: bool| if with { "with guidance" } else { "without guidance" };
-        return Err(format!(
+        return refuse(format!(
             "driven {}, and condition {} is {}",
             says(guided),
             session.condition,
@@ -253,7 +255,7 @@ fn keep(
     csv: &[u8],
     source: Source,
     diverged: bool,
-) -> Result<(), String> {
+) -> Result<(), StudyError> {
     let place = place(out, session);
     let stored = Stored {
         study: study.name.clone(),
@@ -265,7 +267,7 @@ fn keep(
         source,
         diverged,
     };
-    let about = toml::to_string(&stored).map_err(|e| e.to_string())?;
+    let about = toml::to_string(&stored).map_err(|e| InputError::new(session.name(), e))?;
     let folder = place.parent().unwrap_or(out);
     let beside = folder.join(format!(
         ".{}.{}.unfinished",
@@ -294,14 +296,12 @@ fn keep(
         if place.exists() {
             already(&place)
         } else {
-            format!("{}: {e}", place.display())
+            InputError::new(place.display(), e).into()
         }
     })
 }
 
-pub(super) fn already(place: &Path) -> String {
-    format!(
-        "{} is recorded already, and nothing recorded is overwritten",
-        place.display()
-    )
+pub(super) fn already(place: &Path) -> StudyError {
+    let place = place.display();
+    format!("{place} is recorded already, and nothing recorded is overwritten").into()
 }

@@ -9,7 +9,7 @@ const STUDY: &str = r#"
 name = "reliance"
 seed = 7
 [scenario]
-speed = 60
+speed_m_per_s = 16.666666666666668
 [scenario.course]
 name = "one curve"
 lane_width = 3.6
@@ -32,7 +32,7 @@ name = "P01"
 published = 3
 [[participant]]
 name = "P02"
-driver = { t_p = 0.3, remnant_sd = 0.05 }
+driver = { t_p_s = 0.3, remnant_sd_nm = 0.05 }
 [[participant]]
 name = "P03"
 person = true
@@ -115,13 +115,18 @@ fn a_study_goes_on_and_overwrites_nothing() {
     // Another seed, speed or name is another study.
     for (from, to, says) in [
         ("seed = 7", "seed = 8", "another scenario or seed"),
-        ("speed = 60", "speed = 61", "another scenario or seed"),
+        (
+            "speed_m_per_s = 16.666666666666668",
+            "speed_m_per_s = 17",
+            "another scenario or seed",
+        ),
         ("\"reliance\"", "\"trust\"", "in study reliance"),
     ] {
         let error = study(&STUDY.replace(from, to))
             .unwrap()
             .run(out.path(), || ())
-            .unwrap_err();
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(says) && error.contains("P01"), "{error}");
         assert_eq!(fs::read(kept.join("drive.csv")).unwrap(), before);
     }
@@ -175,14 +180,17 @@ fn a_persons_drive_is_imported_once_and_only_where_it_belongs() {
         ("P02/guided", &guided, "this participant is simulated"),
         ("P03/wet", &guided, "there are: P03/manual, P03/guided"),
     ] {
-        let error = study.import(out.path(), what, path).unwrap_err();
+        let error = study.import(out.path(), what, path).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
         assert!(!out.path().join("sessions").exists(), "{what}: nothing is left");
     }
     study.import(out.path(), "P03/guided", &guided).unwrap();
     let place = out.path().join("sessions/P03/2-guided");
     assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
-    let error = study.import(out.path(), "P03/guided", &fast).unwrap_err();
+    let error = study
+        .import(out.path(), "P03/guided", &fast)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("2-guided is recorded already"), "{error}");
     assert_eq!(fs::read_to_string(place.join("drive.csv")).unwrap(), text);
     let results = study.results(out.path()).unwrap();
@@ -254,7 +262,8 @@ fn repetitions_are_blocks_with_orders_and_seeds_of_their_own() {
     let out = tempfile::tempdir().unwrap();
     let missing = twice
         .import(out.path(), "P03/guided/3", Path::new("x.csv"))
-        .unwrap_err();
+        .unwrap_err()
+        .to_string();
     assert!(missing.contains("P03/guided, P03/guided/2"), "{missing}");
     twice.run(out.path(), || ()).unwrap();
     let results = twice.results(out.path()).unwrap();
@@ -299,17 +308,21 @@ fn what_is_no_study_is_refused_by_name() {
             "participant P01, condition manual: published = 15 is outside 1 to 14",
         ),
         (
-            "t_p = 0.3",
-            "t_p = 3.0",
-            "participant P02, condition guided: driver.t_p = 3 s is outside 0.001 to 2 s",
+            "t_p_s = 0.3",
+            "t_p_s = 3.0",
+            "participant P02, condition guided: driver.t_p_s = 3 s is outside 0.001 to 2 s",
         ),
         (
             "seed = 7",
             "repetitions = 0",
             "repetitions = 0 is outside 1 to 100",
         ),
-        ("speed = 60", "sped = 60", "sped"),
-        ("speed = 60", "seed = 60", "seed: every session has its own"),
+        ("speed_m_per_s = 16.666666666666668", "sped = 16", "sped"),
+        (
+            "speed_m_per_s = 16.666666666666668",
+            "seed = 16",
+            "seed: every session has its own",
+        ),
         (
             "person = true",
             "person = false",
@@ -326,7 +339,7 @@ fn what_is_no_study_is_refused_by_name() {
         ("seed = 7", "sed = 7", "sed"),
         (
             "probe = true }",
-            "probe = true }, failure = { kind = \"torque\", time = 5 }",
+            "probe = true }, failure = { kind = \"torque\", time_s = 5 }",
             "P03, condition guided: failure: a person's",
         ),
     ] {

@@ -5,6 +5,7 @@ use haptic_sim::seeds::{self, Stream};
 
 use super::file::Design;
 use super::sobol::{DIMENSIONS, Dimension};
+use crate::error::{StudyError, refuse};
 
 /// Most slices of a Latin hypercube: they are kept in memory.
 const MOST_SLICES: u64 = 20_000_000;
@@ -29,18 +30,18 @@ struct Field {
 }
 
 impl Places {
-    pub(super) fn new(design: Design, samples: u64, root: u64, names: &[String]) -> Result<Self, String> {
+    pub(super) fn new(design: Design, samples: u64, root: u64, names: &[String]) -> Result<Self, StudyError> {
         let stream = Stream::Design.seed(root);
         let each = if design == Design::Saltelli { 2 } else { 1 };
         let is_sobol = matches!(design, Design::Sobol | Design::Saltelli);
         if is_sobol && each * names.len() > DIMENSIONS {
-            return Err(format!(
+            return refuse(format!(
                 "design = \"{design}\" takes at most {} sampled fields",
                 DIMENSIONS / each
             ));
         }
         if design == Design::LatinHypercube && samples.saturating_mul(names.len() as u64) > MOST_SLICES {
-            return Err(format!(
+            return refuse(format!(
                 "samples: {samples} of {} fields are more slices than a latin-hypercube keeps, {MOST_SLICES}; sobol and \
                  random keep none",
                 names.len()
@@ -123,7 +124,7 @@ mod tests {
     use super::*;
 
     fn places(design: Design, samples: u64) -> Places {
-        let names = ["driver.t_p".to_string(), "speed".to_string()];
+        let names = ["driver.t_p_s".to_string(), "speed_m_per_s".to_string()];
         Places::new(design, samples, 1, &names).unwrap()
     }
 
@@ -170,7 +171,11 @@ mod tests {
         let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 40_000.0;
         assert!((mean - 0.5).abs() < 4.0 * 0.2887 / 200.0, "{mean}");
         assert!((variance - 1.0 / 12.0).abs() < 4.0 * 0.0745 / 200.0, "{variance}");
-        let more = ["a".to_string(), "driver.t_p".to_string(), "speed".to_string()];
+        let more = [
+            "a".to_string(),
+            "driver.t_p_s".to_string(),
+            "speed_m_per_s".to_string(),
+        ];
         let more = Places::new(Design::Random, 40_000, 1, &more).unwrap();
         assert_eq!(more.at(17, 0)[2], draws[17]);
     }

@@ -335,10 +335,10 @@ mod tests {
     /// Counted again from the rows of the table.
     #[test]
     fn what_is_compared_is_what_the_rows_say() {
-        let failing = "[scenario.failure]\ntime = 8\n[vary]\n\"failure.kind\" = [\"torque\", \"input\"]\n";
+        let failing = "[scenario.failure]\ntime_s = 8\n[vary]\n\"failure.kind\" = [\"torque\", \"input\"]\n";
         let sweep = crate::sweep::tests::with_road(
             "samples = 20\nmetrics = [\"peak_lateral_error_m\"]\nlimit = 0.3\ncompare = \"failure.kind\"\n",
-            &format!("{failing}speed = [50, 80]\n\"driver.t_p\" = {{ uniform = [0.1, 0.4] }}\n"),
+            &format!("{failing}speed_m_per_s = [14, 22]\n\"driver.t_p_s\" = {{ uniform = [0.1, 0.4] }}\n"),
         );
         let folder = tempfile::tempdir().unwrap();
         let store = crate::sweep::Store::open(&sweep, "test 1", folder.path()).unwrap();
@@ -348,11 +348,11 @@ mod tests {
         let csv = std::fs::read_to_string(folder.path().join("drives.csv")).unwrap();
         let heads: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
         let column = |name: &str| heads.iter().position(|head| *head == name).unwrap();
-        let [kind, speed, peak] = ["failure.kind", "speed", "peak_lateral_error_m"].map(column);
+        let [kind, speed, peak] = ["failure.kind", "speed_m_per_s", "peak_lateral_error_m"].map(column);
         let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|row| row.split(',').collect()).collect();
         let effect = |field: &str| summary.effects.iter().find(|of| of.field == field).unwrap();
         let mut beyond = 0;
-        for level in &effect("speed").levels {
+        for level in &effect("speed_m_per_s").levels {
             for own in &level.compared {
                 let with = |row: &&Vec<&str>| row[kind] == own.label && row[speed] == level.label;
                 let peaks: Vec<f64> = rows
@@ -374,7 +374,7 @@ mod tests {
                 .iter()
                 .all(|level| level.compared.is_empty())
         );
-        let slices = &effect("driver.t_p").levels;
+        let slices = &effect("driver.t_p_s").levels;
         let drives = slices
             .iter()
             .flat_map(|level| &level.compared)
@@ -404,7 +404,8 @@ mod tests {
         effects.finish()
     }
 
-    const TWO_FIELDS: &str = "[vary]\nspeed = [50, 60, 80]\n\"driver.t_p\" = { uniform = [0.1, 0.4] }\n";
+    const TWO_FIELDS: &str =
+        "[vary]\nspeed_m_per_s = [14, 17, 22]\n\"driver.t_p_s\" = { uniform = [0.1, 0.4] }\n";
 
     /// What every sample shares is no doubt about a list's values: means of 1.0, 0.9 and 1.1 with a spread of 1 between samples
     /// are told apart as soon as the difference is the same in each sample. Of 20 samples with peaks 0, 2, 0, 2 ... the interval
@@ -419,7 +420,7 @@ mod tests {
         let speed = &found[0];
         assert_eq!(
             (speed.best.as_slice(), speed.unit.as_deref()),
-            (&["60".to_string()][..], Some("km/h"))
+            (&["17".to_string()][..], Some("m/s"))
         );
         let drives = &speed.levels[1].drives;
         let [low, high] = drives.interval.unwrap();
@@ -460,7 +461,7 @@ mod tests {
         });
         assert_eq!(
             (found[0].best.as_slice(), found[0].levels[0].drives.diverged),
-            (&["60".to_string()][..], 1)
+            (&["17".to_string()][..], 1)
         );
     }
 
@@ -469,12 +470,12 @@ mod tests {
     fn lists_alone_and_limits_are_judged_too() {
         let lists = effects_of(
             "",
-            "[vary]\nspeed = [50, 60]\n\"driver.t_p\" = [0.1, 0.2]\n",
+            "[vary]\nspeed_m_per_s = [14, 17]\n\"driver.t_p_s\" = [0.1, 0.2]\n",
             |point| Some(1.0 + 0.1 * f64::from(point.levels[1])),
         );
-        assert_eq!(lists[0].field, "driver.t_p");
+        assert_eq!(lists[0].field, "driver.t_p_s");
         let best: Vec<_> = lists.iter().map(|effect| effect.best.clone()).collect();
-        assert_eq!(best, [Vec::<String>::new(), vec!["50".into()]]);
+        assert_eq!(best, [Vec::<String>::new(), vec!["14".into()]]);
         assert_eq!(lists[1].levels[0].drives.interval, None);
         let limited = effects_of("samples = 20\nlimit = 0.3\n", TWO_FIELDS, |point| {
             let bad = point.sample < [1, 12, 20][point.levels[0] as usize];
@@ -484,7 +485,7 @@ mod tests {
                 0.2 - 0.01 * f64::from(point.levels[0])
             })
         });
-        assert_eq!(limited[0].best, ["50"]);
+        assert_eq!(limited[0].best, ["14"]);
         assert_eq!(limited[0].levels[1].drives.beyond, Some(0.6));
     }
 }

@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::value::Distribution;
 use super::vary::varied;
+use crate::error::{StudyError, refuse};
 
 /// Most values of one list or range: more belong into a distribution.
 pub(super) const MOST_VALUES: u32 = 100_000;
@@ -221,15 +222,15 @@ pub(super) fn definition(file: &str, field: &str, metric: &str) -> Result<&'stat
 }
 
 impl TableFile {
-    fn axis(&self, at: &str) -> Result<Axis, String> {
+    fn axis(&self, at: &str) -> Result<Axis, StudyError> {
         let (Some(columns), Some(rows)) = (&self.columns, &self.rows) else {
-            return Err(format!("{at}: needs file, or columns and rows"));
+            return refuse(format!("{at}: needs file, or columns and rows"));
         };
         if columns.is_empty() || rows.is_empty() {
-            return Err(format!("{at}: at least one column and one row"));
+            return refuse(format!("{at}: at least one column and one row"));
         }
         if let Some(row) = rows.iter().position(|row| row.len() != columns.len()) {
-            return Err(format!(
+            return refuse(format!(
                 "{at}: row {} has {} values, the table {} columns",
                 row + 1,
                 rows[row].len(),

@@ -54,6 +54,7 @@ use haptic_sim::models::road::Course;
 use haptic_sim::scenario::Scenario;
 use toml::{Table, Value};
 
+use crate::error::{StudyError, refuse};
 use design::Places;
 use file::{Axis, Kind, SweepFile, definition};
 
@@ -150,7 +151,7 @@ impl Sweep {
         whole("samples", samples, MOST_SAMPLES)?;
         whole("repeats", file.repeats, MOST_SAMPLES)?;
         let names: Vec<String> = sampled.iter().map(|axis| axis.columns[0].name.clone()).collect();
-        let places = Places::new(file.design, samples, file.seed, &names).map_err(bad)?;
+        let places = Places::new(file.design, samples, file.seed, &names).map_err(|e| bad(e.to_string()))?;
         let metrics = file.metrics(name)?;
         let judge = match &file.judge {
             Some(judge) => definition(name, "judge", judge)?,
@@ -183,7 +184,7 @@ impl Sweep {
             stop: file.stop,
         };
         if let Some(field) = &file.compare {
-            sweep.compare = Some(sweep.compared(field).map_err(bad)?);
+            sweep.compare = Some(sweep.compared(field).map_err(|e| bad(e.to_string()))?);
         }
         sweep.check()?;
         Ok(sweep)
@@ -246,21 +247,21 @@ impl Sweep {
     }
 
     /// The axis of a field whose values are told apart.
-    fn compared(&self, field: &str) -> Result<usize, String> {
+    fn compared(&self, field: &str) -> Result<usize, StudyError> {
         let is_it = |axis: &Axis| axis.columns.iter().any(|column| column.name == field);
         let Some(place) = self.axes().position(is_it) else {
             let all: Vec<&str> = self.columns().collect();
-            return Err(format!(
+            return refuse(format!(
                 "compare = {field:?} is not varied; varied are {}",
                 all.join(", ")
             ));
         };
         match self.axes().nth(place).and_then(Axis::rows) {
             Some(2..=MOST_COMPARED) => Ok(place),
-            Some(rows) => Err(format!(
+            Some(rows) => refuse(format!(
                 "compare = {field:?}: has {rows} values, 2 to {MOST_COMPARED} can be told apart"
             )),
-            None => Err(format!(
+            None => refuse(format!(
                 "compare = {field:?}: is drawn from a distribution; only the values of a list or a choice can be told apart"
             )),
         }
@@ -290,7 +291,7 @@ fn courses(name: &str, table: &Table) -> Result<BTreeMap<String, Course>, InputE
         let mut scenario = Table::new();
         scenario.insert("course".into(), value.clone());
         // Slow, so that the shortest course is long enough.
-        scenario.insert("speed".into(), Value::Integer(20));
+        scenario.insert("speed_m_per_s".into(), Value::Integer(6));
         let text = toml::to_string(&scenario).map_err(|e| InputError::new(name, e))?;
         let scenario: Scenario = Scenario::from_toml(name, &text, |other, _| {
             Err(InputError::new(

@@ -7,6 +7,7 @@ use toml::Value;
 
 use super::file::Kind;
 use super::{Design, MOST_DRIVES, Point, SLICES, Sweep, value};
+use crate::error::StudyError;
 
 impl Sweep {
     /// What is varied in a drive. Repeats follow each other, then the grid (its last axis first), then the mixtures of
@@ -52,7 +53,7 @@ impl Sweep {
     }
 
     /// The text of a drive's scenario.
-    fn scenario_text(&self, point: &Point) -> Result<String, String> {
+    fn scenario_text(&self, point: &Point) -> Result<String, StudyError> {
         let mut table = self.scenario.clone();
         table.insert("seed".into(), Value::Integer(point.seed as i64));
         let columns = || self.axes().flat_map(|axis| &axis.columns);
@@ -76,7 +77,7 @@ impl Sweep {
                 value::put(&mut table, path, applied.clone()).map_err(|e| format!("vary.{e}"))?;
             }
         }
-        toml::to_string(&table).map_err(|e| e.to_string())
+        toml::to_string(&table).map_err(|e| InputError::new(&self.name, e).into())
     }
 
     /// The scenario of a drive.

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{Chunk, Store, Sweep};
+use crate::error::{StudyError, refuse};
 
 /// A part of a sweep: every n-th chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,11 +23,11 @@ impl Shard {
     ///
     /// # Errors
     /// A number outside 1 to `of`.
-    pub fn new(number: u64, of: u64) -> Result<Self, String> {
+    pub fn new(number: u64, of: u64) -> Result<Self, StudyError> {
         if (1..=of).contains(&number) {
             return Ok(Self { number, of });
         }
-        Err(format!(
+        refuse(format!(
             "shard {number} of {of}: the first number is 1 to the second"
         ))
     }
@@ -37,9 +38,9 @@ impl Shard {
 }
 
 impl std::str::FromStr for Shard {
-    type Err = String;
+    type Err = StudyError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, StudyError> {
         let parts = text
             .split_once('/')
             .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
@@ -69,7 +70,7 @@ pub fn run_all(
     shard: Shard,
     threads: usize,
     progress: impl Fn(Progress) + Sync,
-) -> Result<(), String> {
+) -> Result<(), StudyError> {
     let count = |chunk: u64| {
         let drives = sweep.drives_of(chunk);
         drives.end - drives.start
@@ -95,15 +96,13 @@ pub fn run_all(
         before,
         all,
     });
-    let work = || -> Result<(), String> {
+    let work = || -> Result<(), StudyError> {
         while !stopped.load(Ordering::Relaxed) {
             let Some(number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else {
                 break;
             };
-            let chunk = sweep.run_chunk(*number).map_err(|e| e.to_string())?;
-            store
-                .put(*number, &chunk.to_bytes(store.fingerprint()))
-                .map_err(|e| e.to_string())?;
+            let chunk = sweep.run_chunk(*number)?;
+            store.put(*number, &chunk.to_bytes(store.fingerprint()))?;
             let mut now = state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             now.done += chunk.rows.len() as u64;
             progress(*now);

@@ -8,6 +8,8 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use haptic_sim::input::InputError;
+
 use super::chunk::checksum;
 use super::summary::Summarised;
 use super::table::Tables;
@@ -24,41 +26,31 @@ pub struct Store<'a> {
 }
 
 /// Why a directory cannot be used.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StoreError {
     /// A file cannot be read or written.
-    File(PathBuf, io::Error),
+    #[error(transparent)]
+    File(InputError),
     /// The directory holds another sweep, or one of another program.
+    #[error(
+        "{} holds another sweep, or one that another version of the program began; give another --out, or remove it",
+        .0.display()
+    )]
     Another(PathBuf),
     /// Chunks are missing: how many, and of how many.
+    #[error("{0} of {1} chunks are missing: other shards have not driven them yet")]
     Missing(u64, u64),
     /// Bytes that are no chunk of this sweep.
-    Spoiled(u64),
+    #[error("chunk {0}: these bytes are no chunk of this sweep")]
+    Corrupted(u64),
 }
 
-impl std::fmt::Display for StoreError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::File(path, error) => write!(f, "{}: {error}", path.display()),
-            Self::Another(path) => write!(
-                f,
-                "{} holds another sweep, or one that another version of the program began; give another --out, or \
-                 remove it",
-                path.display()
-            ),
-            Self::Missing(missing, all) => {
-                write!(
-                    f,
-                    "{missing} of {all} chunks are missing: other shards have not driven them yet"
-                )
-            }
-            Self::Spoiled(number) => write!(f, "chunk {number}: these bytes are no chunk of this sweep"),
-        }
+impl StoreError {
+    fn file(path: &Path, error: impl std::fmt::Display) -> Self {
+        Self::File(InputError::new(path.display(), error))
     }
 }
-
-impl std::error::Error for StoreError {}
 
 impl<'a> Store<'a> {
     /// Begins a directory, or goes on with it. `version` names the program: its results are not mixed with those of
@@ -75,13 +67,13 @@ impl<'a> Store<'a> {
             fingerprint: checksum(text.as_bytes()),
         };
         let chunks = directory.join("chunks");
-        fs::create_dir_all(&chunks).map_err(|e| StoreError::File(chunks, e))?;
+        fs::create_dir_all(&chunks).map_err(|e| StoreError::file(&chunks, e))?;
         let path = directory.join("sweep.toml");
         match fs::read_to_string(&path) {
             Ok(there) if there == text => {}
             Ok(_) => return Err(StoreError::Another(directory.into())),
             Err(e) if e.kind() == io::ErrorKind::NotFound => store.write(&path, text.as_bytes())?,
-            Err(e) => return Err(StoreError::File(path, e)),
+            Err(e) => return Err(StoreError::file(&path, e)),
         }
         Ok(store)
     }
@@ -131,7 +123,7 @@ impl<'a> Store<'a> {
     /// Bytes that are no chunk of this sweep; what the disk says.
     pub fn put(&self, number: u64, bytes: &[u8]) -> Result<(), StoreError> {
         if self.chunk(bytes).is_none_or(|chunk| chunk.number != number) {
-            return Err(StoreError::Spoiled(number));
+            return Err(StoreError::Corrupted(number));
         }
         self.write(&self.path(number), bytes)
     }
@@ -150,7 +142,7 @@ impl<'a> Store<'a> {
             file.sync_all()
         });
         let moved = written.and_then(|()| fs::rename(&beside, path));
-        moved.map_err(|e| StoreError::File(path.into(), e))
+        moved.map_err(|e| StoreError::file(path, e))
     }
 
     /// A name of this process alone.
@@ -196,7 +188,7 @@ impl<'a> Store<'a> {
             match fs::rename(from, to) {
                 // A shard that finished at the same time has tidied up behind itself; its bytes are the same.
                 Err(e) if e.kind() == io::ErrorKind::NotFound && to.exists() => {}
-                moved => moved.map_err(|e| StoreError::File(to.clone(), e))?,
+                moved => moved.map_err(|e| StoreError::file(to, e))?,
             }
         }
         self.tidy();
@@ -204,7 +196,7 @@ impl<'a> Store<'a> {
     }
 
     fn table_error(&self, error: io::Error) -> StoreError {
-        StoreError::File(self.directory.join("drives"), error)
+        StoreError::file(&self.directory.join("drives"), error)
     }
 
     /// What kills have left. All chunks are there, so nobody needs it.

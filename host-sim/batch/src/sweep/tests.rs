@@ -40,18 +40,18 @@ fn refused(text: &str) -> String {
 fn lists_and_ranges_meet_each_other_and_every_sample() {
     let sweep = with_road(
         "samples = 3\nrepeats = 2\n",
-        "[vary]\nspeed = [50, 60]\ndriver.t_n = { from = 0.1, to = 0.3, count = 3 }\n\"driver.K_hg\" = { uniform = [0, 1] }\n",
+        "[vary]\nspeed_m_per_s = [14, 17]\ndriver.t_n_s = { from = 0.1, to = 0.3, count = 3 }\n\"driver.k_hg\" = { uniform = [0, 1] }\n",
     );
     assert_eq!(sweep.drives(), 3 * 2 * 2 * 3);
     assert_eq!(
         sweep.columns().collect::<Vec<_>>(),
-        ["driver.t_n", "speed", "driver.K_hg"]
+        ["driver.t_n_s", "speed_m_per_s", "driver.k_hg"]
     );
     let points: Vec<Point> = (0..sweep.drives()).map(|drive| sweep.point(drive)).collect();
     let of = |point: &Point| [0, 1].map(|i| value::text(&point.values[i]));
     let grid: BTreeSet<[String; 2]> = points.iter().map(of).collect();
     assert_eq!(grid.len(), 6);
-    assert!(grid.contains(&["0.2".to_string(), "60".into()]), "{grid:?}");
+    assert!(grid.contains(&["0.2".to_string(), "17".into()]), "{grid:?}");
     // Within a sample K_hg stays, and repeats differ by their seed, which is the same on all of the grid.
     for sample in points.chunks(12) {
         assert!(sample.iter().all(|point| point.values[2] == sample[0].values[2]));
@@ -79,14 +79,14 @@ fn lists_and_ranges_meet_each_other_and_every_sample() {
 fn a_row_is_the_drive_of_the_scenario_that_it_names() {
     let sweep = with_road(
         "samples = 2\n",
-        "[scenario.failure]\nkind = \"torque\"\n[vary]\n\"driver.t_p\" = { uniform = [0.1, 0.5] }\n\"failure.time\" = { uniform = [6, 12] }\n",
+        "[scenario.failure]\nkind = \"torque\"\n[vary]\n\"driver.t_p_s\" = { uniform = [0.1, 0.5] }\n\"failure.time_s\" = { uniform = [6, 12] }\n",
     );
     let point = sweep.point(1);
     let [t_p, time] = [0, 1].map(|i| value::number(&point.values[i]).unwrap());
     let course = "[course]\nname = \"one curve\"\nlane_width = 3.6\n[[course.segment]]\nlength = 100.0\ncurvature_start = 0.0\n\
                   curvature_end = 0.0\n[[course.segment]]\nlength = 200.0\ncurvature_start = 0.003\ncurvature_end = 0.003\n";
     let text = format!(
-        "seed = {}\n[driver]\nt_p = {t_p}\n[failure]\nkind = \"torque\"\ntime = {time}\n{course}",
+        "seed = {}\n[driver]\nt_p_s = {t_p}\n[failure]\nkind = \"torque\"\ntime_s = {time}\n{course}",
         point.seed
     );
     let scenario = Scenario::from_toml("by hand", &text, |_, _| unreachable!()).unwrap();
@@ -125,19 +125,20 @@ fn one_value_may_set_several_fields() {
     assert!((0.001..=0.002).contains(&drawn));
 }
 
-/// A place on the road in place of an instant: at 72 km/h 100 m are 5 s.
+/// A place on the road in place of an instant: at 20 m/s 100 m are 5 s.
 #[test]
 fn a_value_may_go_over_another() {
-    let place = "place = { list = [100], fields = [\"failure.time\"], times = 3.6, over = \"speed\" }";
+    let place = "place = { list = [100], fields = [\"failure.time_s\"], over = \"speed_m_per_s\" }";
     let kind = "[scenario.failure]\nkind = \"torque\"\n";
-    let sweep = with_road(kind, &format!("[vary]\nspeed = [36, 72]\n{place}\n"));
+    let sweep = with_road(kind, &format!("[vary]\nspeed_m_per_s = [10, 20]\n{place}\n"));
     let times = [0, 1].map(|drive| {
         let scenario = sweep.scenario(&sweep.point(drive)).unwrap();
         scenario.failure().at_s().unwrap()
     });
     assert_eq!(times, [10.0, 5.0]);
     assert!(
-        refused(&format!("{kind}[vary]\n{place}\n")).contains("over = \"speed\" is no other varied field")
+        refused(&format!("{kind}[vary]\n{place}\n"))
+            .contains("over = \"speed_m_per_s\" is no other varied field")
     );
 }
 
@@ -146,7 +147,7 @@ fn a_value_may_go_over_another() {
 fn the_table_does_not_depend_on_threads_shards_and_restarts() {
     let sweep = with_road(
         "samples = 40\ndesign = \"latin-hypercube\"\n",
-        "[vary]\n\"driver.t_p\" = { uniform = [0.1, 0.5] }\n",
+        "[vary]\n\"driver.t_p_s\" = { uniform = [0.1, 0.5] }\n",
     );
     let table = |work: &dyn Fn(&Store)| {
         let folder = tempfile::tempdir().unwrap();
@@ -187,7 +188,7 @@ fn a_directory_of_another_sweep_is_left_alone() {
     let of = |samples: u32| {
         with_road(
             &format!("samples = {samples}\n"),
-            "[vary]\n\"driver.t_p\" = { uniform = [0.1, 0.5] }\n",
+            "[vary]\n\"driver.t_p_s\" = { uniform = [0.1, 0.5] }\n",
         )
     };
     let (one, other) = (of(4), of(5));
@@ -203,7 +204,7 @@ fn a_directory_of_another_sweep_is_left_alone() {
     ));
     let store = Store::open(&one, "test 1", folder.path()).unwrap();
     assert!(matches!(store.finish(), Err(StoreError::Missing(1, 1))));
-    assert!(matches!(store.put(0, b"bytes"), Err(StoreError::Spoiled(0))));
+    assert!(matches!(store.put(0, b"bytes"), Err(StoreError::Corrupted(0))));
 }
 
 /// With K_hg from 0 to 1 the peak varies; its mean is known to 20 mm before all 1,000 are driven, at the same
@@ -212,7 +213,7 @@ fn a_directory_of_another_sweep_is_left_alone() {
 fn an_early_stop_stops_where_the_mean_is_known() {
     let sweep = with_road(
         "samples = 1000\nmetrics = [\"peak_lateral_error_m\"]\n",
-        "[stop]\nmetric = \"peak_lateral_error_m\"\nhalf_width = 0.02\nleast = 50\n[vary]\n\"driver.K_hg\" = { uniform = [0, 1] }\n",
+        "[stop]\nmetric = \"peak_lateral_error_m\"\nhalf_width = 0.02\nleast = 50\n[vary]\n\"driver.k_hg\" = { uniform = [0, 1] }\n",
     );
     let table = |threads| {
         let folder = tempfile::tempdir().unwrap();
@@ -243,10 +244,10 @@ fn a_table_of_drivers_varies_its_fields_together() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
         folder.path().join("drivers.csv"),
-        "driver.t_p,condition\n0.1,high\n0.3,low\n",
+        "driver.t_p_s,condition\n0.1,high\n0.3,low\n",
     )
     .unwrap();
-    let text = format!("[[table]]\nfile = \"drivers.csv\"\n{ROAD}[vary]\nspeed = [50, 60]\n");
+    let text = format!("[[table]]\nfile = \"drivers.csv\"\n{ROAD}[vary]\nspeed_m_per_s = [14, 17]\n");
     std::fs::write(folder.path().join("sweep.toml"), text).unwrap();
     let sweep = Sweep::load(&folder.path().join("sweep.toml")).unwrap();
     assert_eq!(sweep.drives(), 4);
@@ -270,44 +271,44 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     };
     has(
-        vary("speed = { uniform = [50, 300] }"),
-        &["sweep.toml: ", "speed = ", "20 to 250 km/h"],
+        vary("speed_m_per_s = { uniform = [14, 80] }"),
+        &["sweep.toml: ", "speed_m_per_s = ", "5.5 to 70 m/s"],
     );
     has(
         vary("\"driver.t_x\" = { uniform = [0, 1] }"),
         &["sweep.toml: ", "unknown field `t_x`"],
     );
     has(
-        vary("speed = { uniform = [70, 50] }"),
-        &["vary.speed: uniform = 70, 50"],
+        vary("speed_m_per_s = { uniform = [70, 50] }"),
+        &["vary.speed_m_per_s: uniform = 70, 50"],
     );
     has(
-        vary("speed = { uniform = [50, 70], list = [1] }"),
-        &["vary.speed: exactly one of"],
+        vary("speed_m_per_s = { uniform = [50, 70], list = [1] }"),
+        &["vary.speed_m_per_s: exactly one of"],
     );
     has(
-        vary("speed = { normal = [50, 5], truncated = [1, 2] }"),
-        &["vary.speed: unknown field `truncated`"],
+        vary("speed_m_per_s = { normal = [50, 5], truncated = [1, 2] }"),
+        &["vary.speed_m_per_s: unknown field `truncated`"],
     );
-    has(vary("speed = 50"), &["vary.speed: takes a list"]);
+    has(vary("speed_m_per_s = 50"), &["vary.speed_m_per_s: takes a list"]);
     has(
-        vary("speed = { from = 50, to = 70, count = 1 }"),
-        &["vary.speed: count = 1 is outside 2 to"],
+        vary("speed_m_per_s = { from = 50, to = 70, count = 1 }"),
+        &["vary.speed_m_per_s: count = 1 is outside 2 to"],
     );
     has(
-        vary("\"failure.time\" = { uniform = [10, 900] }\n[scenario.failure]\nkind = \"torque\""),
-        &["failure.time = ", "the run ends there"],
+        vary("\"failure.time_s\" = { uniform = [10, 900] }\n[scenario.failure]\nkind = \"torque\""),
+        &["failure.time_s = ", "the run ends there"],
     );
     has(
         vary("\"course.segment.7.length\" = { uniform = [10, 900] }"),
         &["vary.course.segment.7.length"],
     );
     has(
-        refused("[vary]\nspeed = { uniform = [50, 70] }\n"),
+        refused("[vary]\nspeed_m_per_s = { uniform = [50, 70] }\n"),
         &["samples: how many"],
     );
     has(
-        refused("samples = 3\n[vary]\nspeed = [50]\n"),
+        refused("samples = 3\n[vary]\nspeed_m_per_s = [14]\n"),
         &["samples: nothing is sampled"],
     );
     has(
@@ -324,18 +325,21 @@ fn what_is_wrong_is_named_with_file_field_value_and_range() {
     );
     has(refused("base = \"no-such.toml\"\n"), &["no-such.toml: "]);
     for (compare, why) in [
-        ("speed", "from a distribution"),
-        ("seed", "is not varied; varied are speed"),
+        ("speed_m_per_s", "from a distribution"),
+        ("seed", "is not varied; varied are speed_m_per_s"),
     ] {
-        let text =
-            format!("samples = 3\ncompare = \"{compare}\"\n[vary]\nspeed = {{ uniform = [50, 60] }}\n");
+        let text = format!(
+            "samples = 3\ncompare = \"{compare}\"\n[vary]\nspeed_m_per_s = {{ uniform = [50, 60] }}\n"
+        );
         has(
             refused(&text),
             &["sweep.toml: ", &format!("compare = \"{compare}\""), why],
         );
     }
     has(
-        refused("design = \"saltelli\"\nsamples = 4\n[vary]\nspeed = [50]\nseed = { choice = [1, 2] }\n"),
+        refused(
+            "design = \"saltelli\"\nsamples = 4\n[vary]\nspeed_m_per_s = [14]\nseed = { choice = [1, 2] }\n",
+        ),
         &["saltelli"],
     );
     has(

@@ -1,36 +1,18 @@
-//! The unit of a varied field: what the reference's table of fields says, which a test holds against the code
-//! (`cargo test -p host-sim --test file_fields`).
+//! The unit of a varied field, from the lists of fields.
+
+use haptic_sim::scenario::unit_of;
 
 use super::file::Column;
-
-const FIELDS: &str = include_str!("../../../../docs/files.md");
 
 /// The unit of a column's values, `-` if that is 1; none if they are not its fields' values, or the fields have several.
 pub(super) fn of(column: &Column) -> Option<String> {
     if column.times != 1.0 || column.over.is_some() {
         return None;
     }
-    let mut units = column.paths.iter().map(|path| of_field(path));
+    let mut units = column.paths.iter().map(|path| unit_of(path));
     let first = units.next()??;
-    units.all(|unit| unit == Some(first)).then(|| first.into())
-}
-
-fn of_field(path: &str) -> Option<&'static str> {
-    // A course's own fields stand in a table without its name, a segment's without its place.
-    let named: Vec<&str> = path
-        .split('.')
-        .filter(|part| *part != "course" && part.parse::<usize>().is_err())
-        .collect();
-    let spelt = |name: &str| name.replace('_', "").to_lowercase();
-    let wanted = spelt(&named.join("."));
-    let mut rows = FIELDS
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split_once("` | "));
-    let (_, rest) = rows.find(|(field, _)| spelt(field) == wanted)?;
-    match rest.split('|').next()?.trim() {
-        "" => Some("-"),
-        unit => Some(unit),
-    }
+    let all = units.all(|unit| unit == Some(first));
+    all.then(|| if first.is_empty() { "-" } else { first }.into())
 }
 
 #[cfg(test)]
@@ -39,30 +21,34 @@ mod tests {
 
     #[test]
     fn a_field_has_the_unit_of_the_reference() {
-        for (path, unit) in [
-            ("speed", Some("km/h")),
-            ("driver.t_p", Some("s")),
-            ("driver.K_hg", Some("-")),
-            ("vehicle.B_s", Some("N.m.s/rad")),
-            ("course.segment.2.curvature_end", Some("1/m")),
-            ("course.lane_width", Some("m")),
-            ("no.such", None),
-        ] {
-            assert_eq!(of_field(path), unit, "{path}");
-        }
         let column = |paths: &[&str], times| Column {
             name: "own".into(),
             paths: paths.iter().map(|path| (*path).into()).collect(),
             times,
             over: None,
         };
+        for (path, unit) in [
+            ("speed_m_per_s", Some("m/s")),
+            ("driver.t_p_s", Some("s")),
+            ("driver.k_hg", Some("-")),
+            ("vehicle.b_s_nms_per_rad", Some("N.m.s/rad")),
+            ("course.segment.2.curvature_end", Some("1/m")),
+            ("course.lane_width", Some("m")),
+            ("no.such", None),
+        ] {
+            assert_eq!(of(&column(&[path], 1.0)).as_deref(), unit, "{path}");
+        }
         assert_eq!(
-            of(&column(&["driver.t_p", "driver.t_nms"], 1.0)).as_deref(),
+            of(&column(&["driver.t_p_s", "driver.t_nms_s"], 1.0)).as_deref(),
             Some("s")
         );
-        assert_eq!(of(&column(&["driver.t_p", "driver.K_d"], 1.0)), None, "two units");
         assert_eq!(
-            of(&column(&["failure.time"], 3.6)),
+            of(&column(&["driver.t_p_s", "driver.k_d_nm_per_rad"], 1.0)),
+            None,
+            "two units"
+        );
+        assert_eq!(
+            of(&column(&["failure.time_s"], 3.6)),
             None,
             "a number of the user's own"
         );

@@ -1,5 +1,6 @@
 //! What a varied field takes: values in a list, or a distribution.
 
+use crate::error::{StudyError, refuse};
 use haptic_sim::input::InputError;
 use statrs::distribution::{ContinuousCDF, Normal};
 use toml::{Table, Value};
@@ -73,11 +74,11 @@ fn truncated(mean: f64, sd: f64, [low, high]: [f64; 2], u: f64) -> f64 {
     (mean + sd * standard.inverse_cdf(from + u * (to - from))).clamp(low, high)
 }
 
-/// Puts a value at a path such as `driver.t_p` or `course.segment.1.length`; a table that is missing is made.
+/// Puts a value at a path such as `driver.t_p_s` or `course.segment.1.length`; a table that is missing is made.
 ///
 /// # Errors
 /// A part of the path that is neither a table nor a place in a list.
-pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), String> {
+pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), StudyError> {
     let mut parts = path.split('.').peekable();
     let first = parts.next().unwrap_or("");
     if parts.peek().is_none() {
@@ -90,7 +91,7 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), Str
         let is_last = parts.peek().is_none();
         place = match place {
             Value::Table(table) if table.is_empty() && part.parse::<usize>().is_ok() => {
-                return Err(format!(
+                return refuse(format!(
                     "{path}: there is no list before {part:?}; a course's segments have to stand in [scenario]"
                 ));
             }
@@ -106,7 +107,7 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) -> Result<(), Str
                     format!("{path}: {part:?} is no place in a list of {count}, counted from 0")
                 })?
             }
-            _ => return Err(format!("{path}: what is before {part:?} is a value, not a table")),
+            _ => return refuse(format!("{path}: what is before {part:?} is a value, not a table")),
         };
         if is_last {
             *place = value;
@@ -216,26 +217,28 @@ mod tests {
         let mut table: Table = toml::from_str("[[course.segment]]\nlength = 1.0\n").unwrap();
         put(&mut table, "course.segment.0.length", Value::Float(2.0)).unwrap();
         put(&mut table, "world.mu", Value::Float(0.5)).unwrap();
-        put(&mut table, "speed", Value::Integer(50)).unwrap();
+        put(&mut table, "speed_m_per_s", Value::Integer(50)).unwrap();
         assert_eq!(table["course"]["segment"][0]["length"].as_float(), Some(2.0));
         assert_eq!(table["world"]["mu"].as_float(), Some(0.5));
-        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0)).unwrap_err();
+        let error = put(&mut table, "course.segment.3.length", Value::Float(2.0))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("list of 1"), "{error}");
-        assert!(put(&mut table, "speed.x", Value::Float(2.0)).is_err());
+        assert!(put(&mut table, "speed_m_per_s.x", Value::Float(2.0)).is_err());
     }
 
     #[test]
     fn a_table_of_cars_is_read() {
         let (columns, rows) = read_csv(
             "cars.csv",
-            "vehicle.m,world.tyres\n1100,linear\n1500.5,saturating\n",
+            "vehicle.m_kg,world.tyres\n1100,linear\n1500.5,saturating\n",
         )
         .unwrap();
-        assert_eq!(columns, ["vehicle.m", "world.tyres"]);
+        assert_eq!(columns, ["vehicle.m_kg", "world.tyres"]);
         assert_eq!(
             rows[1],
             [Value::Float(1500.5), Value::String("saturating".into())]
         );
-        assert!(read_csv("cars.csv", "vehicle.m\n").is_err());
+        assert!(read_csv("cars.csv", "vehicle.m_kg\n").is_err());
     }
 }

@@ -6,6 +6,7 @@ use toml::{Table, Value};
 
 use super::file::{Axis, Column, Kind, MOST_VALUES};
 use super::value::Distribution;
+use crate::error::{StudyError, refuse};
 
 /// One varied field.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -46,7 +47,7 @@ pub(super) fn varied(file: &str, above: &str, table: &Table, axes: &mut Vec<Axis
         } else {
             format!("{above}.{key}")
         };
-        let error = |e: String| InputError::new(file, format!("vary.{path}: {e}"));
+        let error = |e: StudyError| InputError::new(file, format!("vary.{path}: {e}"));
         match value {
             Value::Array(list) => {
                 let form = VaryFile {
@@ -65,10 +66,10 @@ pub(super) fn varied(file: &str, above: &str, table: &Table, axes: &mut Vec<Axis
             Value::Table(more) => varied(file, &path, more, axes)?,
             _ => {
                 let form = "takes a list [..] or a table with one of";
-                return Err(error(format!(
-                    "{form} {}; a fixed value belongs to [scenario]",
-                    KINDS.join(", ")
-                )));
+                let kinds = KINDS.join(", ");
+                return Err(error(
+                    format!("{form} {kinds}; a fixed value belongs to [scenario]").into(),
+                ));
             }
         }
     }
@@ -76,10 +77,10 @@ pub(super) fn varied(file: &str, above: &str, table: &Table, axes: &mut Vec<Axis
 }
 
 impl VaryFile {
-    fn axis(&self, path: &str) -> Result<Axis, String> {
+    fn axis(&self, path: &str) -> Result<Axis, StudyError> {
         let paths = self.fields.clone().unwrap_or_else(|| vec![path.into()]);
         if paths.is_empty() {
-            return Err("fields: at least one".into());
+            return refuse("fields: at least one");
         }
         let kinds = [
             self.list.is_some(),
@@ -91,13 +92,13 @@ impl VaryFile {
             self.choice.is_some(),
         ];
         if kinds.iter().filter(|there| **there).count() != 1 {
-            return Err(format!("exactly one of {}", KINDS.join(", ")));
+            return refuse(format!("exactly one of {}", KINDS.join(", ")));
         }
         if self.truncate.is_some() && self.normal.is_none() && self.lognormal.is_none() {
-            return Err("truncate goes with normal and lognormal alone".into());
+            return refuse("truncate goes with normal and lognormal alone");
         }
         if self.from.is_none() && (self.to.is_some() || self.count.is_some() || self.step.is_some()) {
-            return Err("to, count and step go with from alone".into());
+            return refuse("to, count and step go with from alone");
         }
         let kind = match (&self.list, &self.choice, self.from) {
             (Some(list), ..) => Kind::Grid(rows("list", list)?),
@@ -116,17 +117,17 @@ impl VaryFile {
         })
     }
 
-    fn range(&self, from: f64) -> Result<Vec<Vec<Value>>, String> {
+    fn range(&self, from: f64) -> Result<Vec<Vec<Value>>, StudyError> {
         let to = self.to.ok_or("a range has from, to, and count or step")?;
         let [low, high] = ends("from, to", [from, to])?;
         let count = match (self.count, self.step) {
             (Some(count), None) if (2..=MOST_VALUES).contains(&count) => count,
-            (Some(count), None) => return Err(format!("count = {count} is outside 2 to {MOST_VALUES}")),
+            (Some(count), None) => return refuse(format!("count = {count} is outside 2 to {MOST_VALUES}")),
             (None, Some(step)) => {
                 // A thousandth of a step is an error of rounding, not a value too few.
                 let count = ((high - low) / step + 1e-3).floor() + 1.0;
                 if !(step > 0.0 && count <= f64::from(MOST_VALUES)) {
-                    return Err(format!(
+                    return refuse(format!(
                         "step = {step} is outside {} to {}",
                         (high - low) / f64::from(MOST_VALUES),
                         high - low
@@ -136,7 +137,7 @@ impl VaryFile {
                     .map(|i| vec![Value::Float((low + f64::from(i) * step).min(high))])
                     .collect());
             }
-            _ => return Err("a range has either count or step".into()),
+            _ => return refuse("a range has either count or step"),
         };
         let last = f64::from(count - 1);
         let at = |i: u32| {
@@ -149,7 +150,7 @@ impl VaryFile {
         Ok((0..count).map(|i| vec![Value::Float(at(i))]).collect())
     }
 
-    fn distribution(&self) -> Result<Distribution, String> {
+    fn distribution(&self) -> Result<Distribution, StudyError> {
         let within = self.truncate.map(|within| ends("truncate", within)).transpose()?;
         if let Some(of) = self.uniform {
             return Ok(Distribution::Uniform(ends("uniform", of)?));
@@ -159,12 +160,12 @@ impl VaryFile {
             return if of[0] > 0.0 {
                 Ok(Distribution::LogUniform(of))
             } else {
-                Err("log_uniform: above 0".into())
+                refuse("log_uniform: above 0")
             };
         }
         if let Some([mean, sd]) = self.normal {
             if !(mean.is_finite() && sd > 0.0 && sd.is_finite()) {
-                return Err(format!(
+                return refuse(format!(
                     "normal = [{mean}, {sd}]: mean and standard deviation, which is above 0"
                 ));
             }
@@ -173,13 +174,13 @@ impl VaryFile {
         }
         let [median, sd_log] = self.lognormal.unwrap_or_default();
         if !(median > 0.0 && median.is_finite() && sd_log > 0.0 && sd_log.is_finite()) {
-            return Err(format!(
+            return refuse(format!(
                 "lognormal = [{median}, {sd_log}]: median and standard deviation of the natural logarithm, both above 0"
             ));
         }
         let within = within.unwrap_or([0.0, f64::INFINITY]);
         if within[0] < 0.0 {
-            return Err(format!(
+            return refuse(format!(
                 "truncate = [{}, {}]: a lognormal value is above 0",
                 within[0], within[1]
             ));
@@ -192,18 +193,18 @@ impl VaryFile {
     }
 }
 
-fn rows(field: &str, list: &[Value]) -> Result<Vec<Vec<Value>>, String> {
+fn rows(field: &str, list: &[Value]) -> Result<Vec<Vec<Value>>, StudyError> {
     if list.is_empty() || list.len() > MOST_VALUES as usize {
-        return Err(format!("{field}: 1 to {MOST_VALUES} values, not {}", list.len()));
+        return refuse(format!("{field}: 1 to {MOST_VALUES} values, not {}", list.len()));
     }
     Ok(list.iter().map(|value| vec![value.clone()]).collect())
 }
 
-fn ends(field: &str, [low, high]: [f64; 2]) -> Result<[f64; 2], String> {
+fn ends(field: &str, [low, high]: [f64; 2]) -> Result<[f64; 2], StudyError> {
     if low < high && low.is_finite() && high.is_finite() {
         return Ok([low, high]);
     }
-    Err(format!(
+    refuse(format!(
         "{field} = {low}, {high}: two numbers, the lower one first"
     ))
 }

@@ -109,9 +109,9 @@ mod tests {
         let sweep = with_road(
             "samples = 12\nmetrics = [\"time_to_recover_s\", \"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
             "[vary]\nfailure.kind = [\"none\", \"torque\", \"input\"]\nsensors = [\"paper\", \"exact\"]\n\
-             \"failure.time\" = { uniform = [1.5, 9] }\nspeed = { uniform = [40, 90] }\n\
-             \"driver.t_p\" = { uniform = [0.05, 0.5] }\n\"driver.K_hg\" = { uniform = [0, 1] }\n\
-             \"driver.remnant_sd\" = [0, 0.1]\n",
+             \"failure.time_s\" = { uniform = [1.5, 9] }\nspeed_m_per_s = { uniform = [11, 25] }\n\
+             \"driver.t_p_s\" = { uniform = [0.05, 0.5] }\n\"driver.k_hg\" = { uniform = [0, 1] }\n\
+             \"driver.remnant_sd_nm\" = [0, 0.1]\n",
         );
         let (batched, out) = same_bytes(&sweep);
         assert!(batched > 40 && out > 40, "{batched} side by side, {out} not");
@@ -122,10 +122,10 @@ mod tests {
     fn nor_does_it_where_the_world_is_not_the_papers() {
         let sweep = with_road(
             "samples = 24\nmetrics = [\"sdlp_m\", \"peak_driver_torque_nm\", \"limited_time_share\"]\n",
-            "[vary]\nfailure.kind = [\"none\", \"input\"]\n\"failure.time\" = { uniform = [3, 9] }\n\
-             speed = { uniform = [40, 90] }\n\"driver.remnant_sd\" = [0, 0.1]\n\"guidance.probe\" = [false, true]\n\
-             \"tolerances.load\" = { uniform = [0, 300] }\n\"sensor_errors.lane_noise\" = [0, 0.01]\n\
-             \"world.gust_sd\" = { uniform = [0, 150] }\n\"world.friction\" = { uniform = [0, 0.4] }\n",
+            "[vary]\nfailure.kind = [\"none\", \"input\"]\n\"failure.time_s\" = { uniform = [3, 9] }\n\
+             speed_m_per_s = { uniform = [11, 25] }\n\"driver.remnant_sd_nm\" = [0, 0.1]\n\"guidance.probe\" = [false, true]\n\
+             \"tolerances.load_kg\" = { uniform = [0, 300] }\n\"sensor_errors.lane_noise_m\" = [0, 0.01]\n\
+             \"world.gust_sd_n\" = { uniform = [0, 150] }\n\"world.friction_nm\" = { uniform = [0, 0.4] }\n",
         );
         let (batched, out) = same_bytes(&sweep);
         assert!(batched > 0 && out == 0, "{batched} side by side, {out} not");

@@ -2,6 +2,7 @@
 
 use haptic_core::bus::Frame;
 
+use super::broken::Broken;
 use super::{LIMIT_NM, MEMORY_FAULT, OVERRIDE_FROM_NM, OVERRIDE_SLOPE};
 use crate::bytes::{self, ACTIVE, FAULT, HANDOVER, LANE_STEP, LOCKED, Status};
 
@@ -18,16 +19,16 @@ fn classes_of(faults: u64) -> u64 {
     present[0] | present[1] << 1 | present[2] << 2
 }
 
-pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Result<(), String> {
+pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status>) -> Result<(), Broken> {
     if frame.id() != bytes::GUIDANCE || !bytes::is_intact(frame) {
-        return Err(format!("frame {:#x}: identifier, length or CRC", frame.id()));
+        return Err(Broken::Frame { id: frame.id() });
     }
     if status.limit > 7
         || status.mode > LOCKED
         || status.reset > 6
         || status.classes != classes_of(status.faults)
     {
-        return Err(format!("frame: a code that does not exist in {status:?}"));
+        return Err(Broken::Code(*status));
     }
     match before {
         // An ECU that lost its memory counts anew.
@@ -35,24 +36,27 @@ pub(super) fn well_formed(frame: &Frame, status: &Status, before: Option<&Status
             if status.counter != (before.counter + 1) % 16
                 && (status.faults & !before.faults) & MEMORY_FAULT == 0 =>
         {
-            Err(format!(
-                "frame: counter {} after {}",
-                status.counter, before.counter
-            ))
+            Err(Broken::Counter {
+                found: status.counter,
+                before: before.counter,
+            })
         }
         _ => Ok(()),
     }
 }
 
-pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), String> {
+pub(super) fn warned(status: &Status, before: bool, others: &[Frame]) -> Result<(), Broken> {
     let must_warn = matches!(status.mode, HANDOVER | FAULT | LOCKED)
         || status.faults & HANDS_OFF != 0
         || (status.mode == ACTIVE && status.faults & LANE_STEP != 0);
     if status.warning != must_warn {
-        return Err(format!("warning bit {} in mode {}", status.warning, status.mode));
+        return Err(Broken::WarningBit {
+            warning: status.warning,
+            mode: status.mode,
+        });
     }
     if status.warning && !before && !others.iter().any(|frame| frame.id() == bytes::WARNING) {
-        return Err("no warning frame in the cycle of the reaction".into());
+        return Err(Broken::NoWarningFrame);
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Change, Hand, Injection, RequestFault, Signal, Start, Wire};
 use crate::residual::Seen;
 
-use Change::{Approaching, Drifting, Frozen, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
+use Change::{Approaching, Drifting, Frozen, Growing, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
 use Injection::{Invalid, Sensor};
 use Signal::{DriverTorque, LateralError, Speed1, Speed2, WheelAngle, YawError, YawRate};
 
@@ -18,6 +18,21 @@ const JERK: Injection = Injection::Hand(Hand::Jerk {
     ms: 600,
     before_ms: 300,
 });
+
+/// The same half a second after the onset.
+const SWERVE: Injection = Injection::Hand(Hand::Jerk {
+    peak_nm: 2.5,
+    ms: 600,
+    before_ms: -500,
+});
+
+/// Both speeds grow within two seconds: no step, and no difference.
+const fn speeds_times(to: f64) -> [Injection; 2] {
+    [
+        Sensor(Speed1, Growing { to, ms: 2000 }),
+        Sensor(Speed2, Growing { to, ms: 2000 }),
+    ]
+}
 
 /// A raw value in every frame from the onset on.
 const fn always(id: u16, start: u32, bits: u32, value: i64) -> Injection {
@@ -398,6 +413,18 @@ pub(super) const ROWS: &[FaultCase] = &[
     )
     .may_hand_over(),
     row(
+        "lateral-error-x0.5",
+        "e_y' times 0.5",
+        &[JERK, Sensor(LateralError, Times(0.5))],
+    )
+    .may_hand_over(),
+    row(
+        "yaw-error-offset-10",
+        "e_theta' 10 mrad off",
+        &[Sensor(YawError, Plus(0.01))],
+    )
+    .may_hand_over(),
+    row(
         "lateral-error-x2",
         "e_y' times 2",
         &[JERK, Sensor(LateralError, Times(2.0))],
@@ -451,7 +478,25 @@ pub(super) const ROWS: &[FaultCase] = &[
         "T_d stuck at 0",
         &[Sensor(DriverTorque, StuckAt(0.0))],
     )
-    .may_hand_over(),
+    .may_hand_over_at_once(),
+    row(
+        "driver-torque-frozen",
+        "T_d frozen",
+        &[Sensor(DriverTorque, Frozen)],
+    )
+    .may_hand_over_at_once(),
+    row(
+        "driver-torque-zero-and-swerve",
+        "T_d stuck at 0, and 0.5 s later the driver swerves",
+        &[SWERVE, Sensor(DriverTorque, StuckAt(0.0))],
+    )
+    .may_hand_over_at_once(),
+    row(
+        "wheel-angle-flipped",
+        "wheel angle with the wrong sign",
+        &[JERK, Sensor(WheelAngle, Times(-1.0))],
+    )
+    .may_hand_over_at_once(),
     row(
         "driver-torque-full-left",
         "T_d stuck at 20 N.m",
@@ -563,6 +608,18 @@ pub(super) const ROWS: &[FaultCase] = &[
     )
     .bridged()
     .lasts(250),
+    row(
+        "speeds-x0.8",
+        "both speeds 20 % low, within 2 s",
+        &speeds_times(0.8),
+    )
+    .may_hand_over(),
+    row(
+        "speeds-x1.2",
+        "both speeds 20 % high, within 2 s",
+        &speeds_times(1.2),
+    )
+    .may_hand_over(),
     row(
         "speeds-apart",
         "second speed 2 m/s higher",

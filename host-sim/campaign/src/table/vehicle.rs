@@ -35,6 +35,13 @@ pub(super) const ROWS: &[FaultCase] = &[
     .torque(5.0)
     .lasts(1000),
     row(
+        "camera-slides-slowly",
+        "e_y' slides to the next lane's line: 3.5 m in 4.5 s",
+        &[Sensor(LateralError, Sliding { by: 3.5, ms: 4500 })],
+    )
+    .may_hand_over()
+    .torque(5.0),
+    row(
         "yaw-error-flipped-before-curve",
         "e_theta' with the wrong sign from before a curve",
         &[Sensor(YawError, Times(-1.0))],
@@ -74,21 +81,21 @@ pub(super) const ROWS: &[FaultCase] = &[
         &[OVERRIDES],
     )
     .opposed()
-    .on(|w| w.motor_lag = 0.002),
+    .on(|w| w.motor_lag_s = 0.002),
     row(
         "motor-lags-10",
         "honest motor with 10 ms of lag, overridden by 8 N.m",
         &[OVERRIDES],
     )
     .opposed()
-    .on(|w| w.motor_lag = 0.010),
+    .on(|w| w.motor_lag_s = 0.010),
     row(
         "motor-lags-20",
         "honest motor with 20 ms of lag, overridden by 8 N.m",
         &[OVERRIDES],
     )
     .opposed()
-    .on(|w| w.motor_lag = 0.020),
+    .on(|w| w.motor_lag_s = 0.020),
     row(
         "motor-errs",
         "honest motor with 10 % of error and 0.02 N.m of ripple",
@@ -96,7 +103,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     )
     .on(|w| {
         w.motor_error = 0.1;
-        w.motor_ripple = 0.02;
+        w.motor_ripple_nm = 0.02;
     }),
     row(
         "torque-offset",
@@ -119,14 +126,14 @@ pub(super) const ROWS: &[FaultCase] = &[
         "yaw rate 3 mrad/s off",
         &[Sensor(YawRate, Plus(0.003))],
     ),
-    row("friction", "column with 0.3 N.m of dry friction", &[]).on(|w| w.friction = 0.3),
+    row("friction", "column with 0.3 N.m of dry friction", &[]).on(|w| w.friction_nm = 0.3),
     row(
         "assist",
         "power assist of 8 N.m at 3 N.m of driver torque, half of it at 60 km/h",
         &[],
     )
-    .on(|w| w.assist = 8.0),
-    row("bank", "the whole road banked by 6 %", &[]).on(|w| w.bank = 0.06),
+    .on(|w| w.assist_nm = 8.0),
+    row("bank", "the whole road banked by 6 %", &[]).on(|w| w.bank_rad = 0.06),
     row(
         "slippery-yaw-error-flipped",
         "mu 0.4, and e_theta' with the wrong sign",

@@ -8,12 +8,13 @@ use std::fmt::Write;
 
 use super::calendar;
 use crate::candump::CandumpFrame;
+use crate::recording::RecordingError;
 
 /// Every data frame of classic CAN.
 ///
 /// # Errors
 /// A frame whose identifier or data cannot be read, with its line; no frame at all.
-pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
+pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, RecordingError> {
     let (mut base, mut relative, mut now_s, mut began) = (16, false, 0.0, false);
     let mut frames = Vec::new();
     for (line, content) in (1..).zip(text.lines()) {
@@ -49,7 +50,7 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
         if channel.parse::<u32>().is_err() || !kind.eq_ignore_ascii_case("d") {
             continue;
         }
-        let refuse = |what: &str| format!("line {line}: {what}: {:?}", content.trim());
+        let refuse = |what: &str| RecordingError(format!("line {line}: {what}: {:?}", content.trim()));
         let (id, extended) = match id.strip_suffix(['x', 'X']) {
             Some(id) => (id, true),
             None => (*id, false),
@@ -76,7 +77,9 @@ pub fn parse(text: &str) -> Result<Vec<CandumpFrame>, String> {
         });
     }
     if !began && frames.is_empty() {
-        return Err("this is no ASC file: there is neither a date nor a base nor a frame".into());
+        return Err(RecordingError(
+            "this is no ASC file: there is neither a date nor a base nor a frame".into(),
+        ));
     }
     Ok(frames)
 }

@@ -6,8 +6,6 @@
 
 mod grid;
 
-use std::fmt;
-
 use crate::trace::{CHANNELS, Trace};
 use crate::units;
 
@@ -43,16 +41,9 @@ pub struct Recording {
 }
 
 /// Why a recording was refused: one sentence with channel and reason, and the file where one is known.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct RecordingError(pub(crate) String);
-
-impl fmt::Display for RecordingError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for RecordingError {}
 
 impl RecordingError {
     /// One sentence to print, whatever a damaged file calls its channels.

@@ -4,30 +4,19 @@
 //! run leaves the old file or none. It does not wait for the disk: a power cut may still lose it.
 
 use serde::Serialize;
-use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Why a file could not be written.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {cause}", path.display())]
 pub struct WriteError {
     /// The file.
     pub path: PathBuf,
     /// What the system said.
+    #[source]
     pub cause: io::Error,
-}
-
-impl fmt::Display for WriteError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "cannot write {}: {}", self.path.display(), self.cause)
-    }
-}
-
-impl std::error::Error for WriteError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        Some(&self.cause)
-    }
 }
 
 /// Writes what `content` writes to `path`, and creates the directories above it.

@@ -25,8 +25,6 @@ mod style;
 pub(crate) use polyline::thin;
 pub(crate) use style::{colour, dash, width};
 
-use std::fmt;
-
 use serde::Serialize;
 
 /// A drawing of panels that share an axis.
@@ -258,16 +256,9 @@ pub enum Shade {
 }
 
 /// Why a figure could not be drawn.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct PlotError(String);
-
-impl fmt::Display for PlotError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for PlotError {}
 
 /// Room left between a series and the frame, as a share of the extent of the values.
 const ROOM: f64 = 0.05;

@@ -39,6 +39,10 @@ pub fn report(results: &CompareResults) -> Report {
         sections: vec![
             Section::new("The laws", vec![Block::Table(laws(results))]),
             Section::new("Laws by drivers", blocks.collect()),
+            Section::new(
+                format!("All drivers, over {first}"),
+                vec![Block::Table(ratios(results))],
+            ),
             Section::new(format!("Against {first}"), verdicts),
         ],
         ..Report::default()
@@ -108,7 +112,11 @@ fn laws(results: &CompareResults) -> Table {
             Cell::text(law.source),
             Cell::number(before, 4),
             Cell::number(after, 4),
-            Cell::Text(values.join(", ")),
+            Cell::Text(if law.oracle && law.objective.is_some() {
+                "for each driver by itself".into()
+            } else {
+                values.join(", ")
+            }),
         ]
     };
     let caption = match results.budget {
@@ -126,6 +134,44 @@ fn laws(results: &CompareResults) -> Table {
         "Parameters",
     ];
     Table::new(caption, columns, results.laws.iter().map(row))
+}
+
+/// Every law in every world over the first law: the mean over the drivers, and who is worst off.
+fn ratios(results: &CompareResults) -> Table {
+    let shown: Vec<usize> = (0..results.metrics.len())
+        .filter(|place| FIRST.contains(&results.metrics[*place].name))
+        .collect();
+    let pairs =
+        (1..results.laws.len()).flat_map(|law| (0..results.worlds.len()).map(move |world| (law, world)));
+    let row = |(law, world): (usize, usize)| {
+        let cell = |metric: &usize| {
+            let found = results
+                .ratios
+                .iter()
+                .find(|ratio| (ratio.law, ratio.world, ratio.metric) == (law, world, *metric));
+            let Some(ratio) = found else {
+                return with_interval(None);
+            };
+            let (largest, driver) = ratio.largest;
+            let name = &results.drivers[driver][0];
+            match with_interval(Some(&ratio.mean)) {
+                Cell::Text(text) => Cell::Text(format!("{text} ({largest:.3} {name})")),
+                other => other,
+            }
+        };
+        let head = [
+            Cell::text(&results.laws[law].name),
+            Cell::text(&results.worlds[world]),
+        ];
+        head.into_iter().chain(shown.iter().map(cell)).collect()
+    };
+    let labels = shown.iter().map(|place| results.metrics[*place].label);
+    let columns = ["Law", "World"].into_iter().chain(labels);
+    let caption = format!(
+        "Means over drivers and places as shares of those of {}, with intervals over the seeds, and the largest share of a driver",
+        results.laws[0].name
+    );
+    Table::new(caption, columns, pairs.map(row))
 }
 
 /// Four digits, which tell a set again.

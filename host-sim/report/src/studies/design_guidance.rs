@@ -56,7 +56,7 @@ pub fn parameters(results: &DesignResults, chosen: usize) -> String {
     let [a_1, a_2, a_3, a_4] = results.choices[chosen].training.gains;
     let (name, row) = (&results.name, chosen + 1);
     format!(
-        "# Row {row} of the design {name}: host-sim run and host-sim ecu parameters take it.\n[guidance]\na_1 = {a_1}\na_2 = {a_2}\na_3 = {a_3}\na_4 = {a_4}\n"
+        "# Row {row} of the design {name}: host-sim run and host-sim ecu parameters take it.\n[guidance]\na_1_per_m = {a_1}\na_2_s_per_m = {a_2}\na_3_per_rad = {a_3}\na_4_s_per_rad = {a_4}\n"
     )
 }
 

@@ -1,5 +1,6 @@
 //! What each study shows: a function of each module makes a report of its results, for a page and for a terminal.
 
+pub mod adaptation;
 pub mod availability;
 pub mod bus;
 mod changes;
@@ -43,33 +44,12 @@ fn ended(line: Series, why: Option<&str>) -> impl Iterator<Item = Series> + use<
 }
 
 /// Why the files of a study could not be made.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// A file or directory cannot be written.
-    Write(WriteError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
     /// A figure cannot be drawn.
-    Plot(PlotError),
+    #[error(transparent)]
+    Plot(#[from] PlotError),
 }
-
-impl From<WriteError> for OutputError {
-    fn from(error: WriteError) -> Self {
-        Self::Write(error)
-    }
-}
-
-impl From<PlotError> for OutputError {
-    fn from(error: PlotError) -> Self {
-        Self::Plot(error)
-    }
-}
-
-impl std::fmt::Display for OutputError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Write(error) => error.fmt(f),
-            Self::Plot(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for OutputError {}

@@ -45,6 +45,10 @@ impl<H: FnMut(&DriverView, &mut dyn AnyDriver) -> f64> Driver for Around<H> {
     fn step(&mut self, view: &DriverView) -> f64 {
         (self.habit)(view, self.driver.as_mut())
     }
+
+    fn k_hg(&self) -> Option<f64> {
+        self.driver.k_hg()
+    }
 }
 
 fn around<H>(driver: Box<dyn AnyDriver>, habit: H) -> Box<dyn AnyDriver>
@@ -84,24 +88,60 @@ fn own_line(scenario: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<d
     })
 }
 
-fn trust(scenario: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
-    let (mut k_hg, g_c, g_h, follows, shock) = (v[0], v[1], v[2], weight(v[3]), v[4]);
-    let muscle = weight(scenario.driver().t_nms);
-    let (mut shares, mut felt_nm, mut was_lost) = (Shares::default(), 0.0, false);
-    around(driver, move |view, driver| {
+#[derive(Clone)]
+struct Trust {
+    driver: Box<dyn AnyDriver>,
+    k_hg: f64,
+    g_c: f64,
+    g_h: f64,
+    shock: f64,
+    /// Weights of what is new in K_hg and in the muscle.
+    follows: f64,
+    muscle: f64,
+    shares: Shares,
+    felt_nm: f64,
+    was_lost: bool,
+}
+
+impl Driver for Trust {
+    fn look_ahead_s(&self) -> [f64; 2] {
+        self.driver.look_ahead_s()
+    }
+
+    fn step(&mut self, view: &DriverView) -> f64 {
         let deaf = DriverView {
             guidance_torque_nm: 0.0,
             ..*view
         };
-        let answer_nm = driver.step(&deaf) - felt_nm;
-        let [conflict, help] = shares.step(answer_nm, view.guidance_torque_nm);
-        k_hg += follows * ((0.5 + g_c * conflict - g_h * help).clamp(0.0, 1.0) - k_hg);
-        if view.is_lost && !was_lost {
-            k_hg = (k_hg + shock).min(1.0);
+        let answer_nm = self.driver.step(&deaf) - self.felt_nm;
+        let [conflict, help] = self.shares.step(answer_nm, view.guidance_torque_nm);
+        let wanted = (0.5 + self.g_c * conflict - self.g_h * help).clamp(0.0, 1.0);
+        self.k_hg += self.follows * (wanted - self.k_hg);
+        if view.is_lost && !self.was_lost {
+            self.k_hg = (self.k_hg + self.shock).min(1.0);
         }
-        was_lost = view.is_lost;
-        felt_nm += muscle * (k_hg * view.guidance_torque_nm - felt_nm);
+        self.was_lost = view.is_lost;
+        self.felt_nm += self.muscle * (self.k_hg * view.guidance_torque_nm - self.felt_nm);
         answer_nm
+    }
+
+    fn k_hg(&self) -> Option<f64> {
+        Some(self.k_hg)
+    }
+}
+
+fn trust(scenario: &Scenario, v: &[f64], driver: Box<dyn AnyDriver>) -> Box<dyn AnyDriver> {
+    Box::new(Trust {
+        driver,
+        k_hg: v[0],
+        g_c: v[1],
+        g_h: v[2],
+        follows: weight(v[3]),
+        shock: v[4],
+        muscle: weight(scenario.driver().t_nms),
+        shares: Shares::default(),
+        felt_nm: 0.0,
+        was_lost: false,
     })
 }
 
@@ -177,7 +217,7 @@ pub(super) const KINDS: [Kind<dyn AnyDriver>; 6] = [
             Parameter::ours("k_hg", 0.5, [0.0, 1.0]),
             Parameter::ours("g_c", 0.5, [0.0, 5.0]),
             Parameter::ours("g_h", 0.5, [0.0, 5.0]),
-            Parameter::ours("tau_s", 30.0, [0.1, 1000.0]),
+            Parameter::ours("tau_s", 30.0, [0.1, 1e6]),
             Parameter::ours("shock", 0.4, [0.0, 1.0]),
         ],
         make: Make::Around(trust),

@@ -43,6 +43,10 @@ impl Driver for Box<dyn AnyDriver> {
     fn step(&mut self, view: &DriverView) -> f64 {
         self.as_mut().step(view)
     }
+
+    fn k_hg(&self) -> Option<f64> {
+        self.as_ref().k_hg()
+    }
 }
 
 /// Every driver here.
@@ -68,6 +72,10 @@ impl<D: Driver> Driver for WithRemnant<D> {
 
     fn step(&mut self, view: &DriverView) -> f64 {
         self.0.step(view) + self.1.step()
+    }
+
+    fn k_hg(&self) -> Option<f64> {
+        self.0.k_hg()
     }
 }
 

@@ -48,6 +48,11 @@ impl<L: Law> OwnLaw<L> {
         self.asked_nm
     }
 
+    /// The law.
+    pub fn law(&self) -> &L {
+        &self.law
+    }
+
     fn view(&mut self, seen: &Observation) -> LawView {
         let time_s = f64::from(seen.step) * STEP_S;
         let wheel_angle_rad = sensors::wheel_angle_rad(seen.wheel_angle_rad);

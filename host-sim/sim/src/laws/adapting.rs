@@ -11,6 +11,9 @@
 //!
 //! *By reliance*: K_1 from a table of K_hg as the ECU's probe tells it, 0.31 at 0, 0.36 at 0.5, 0.45 from 0.75 on, approached with
 //! 0.05 N.m/s; the published gain without an estimate for 60 s. Ours; without the probe it is the paper's law.
+//!
+//! *Compensating*: `K_1 = c/(1 - K_hg)`; *linear*: `K_1 = k_1 + slope*(K_hg - 0.5)`. As by reliance, within bounds of their own. Ours: they
+//! show what such a gain and a driver whose K_hg follows the guidance do to each other.
 
 use super::{Gains, Kind, Law, LawView, Make, boxed, weight};
 use crate::kind::Parameter;
@@ -23,6 +26,8 @@ struct Activity {
     weight: f64,
     /// The low-passed product of the pseudo-powers, and that of their sizes.
     agreement: [f64; 2],
+    /// What of the law's torque is left.
+    share: f64,
 }
 
 impl Law for Activity {
@@ -37,7 +42,12 @@ impl Law for Activity {
         } else {
             0.0
         };
-        (1.0 - (1.0 - self.least) * against) * self.law.ask(view)
+        self.share = 1.0 - (1.0 - self.least) * against;
+        self.share * self.law.ask(view)
+    }
+
+    fn k_1(&self) -> Option<f64> {
+        Some(self.share * self.law.k_1)
     }
 }
 
@@ -59,6 +69,10 @@ impl Law for RunningWide {
         self.law.k_1 = (self.law.k_1 + STEP_S * change).clamp(base, MOST * base);
         self.law.ask(view)
     }
+
+    fn k_1(&self) -> Option<f64> {
+        Some(self.law.k_1)
+    }
 }
 
 /// K_hg, and K_1 there.
@@ -66,34 +80,69 @@ const TABLE: [[f64; 2]; 3] = [[0.0, 0.31], [0.5, 0.36], [0.75, 0.45]];
 /// An estimate that has not changed for so many steps is none.
 const STALE_STEPS: u32 = 60_000;
 
+/// K_1 over K_hg.
+#[derive(Debug, Clone)]
+enum Rule {
+    /// The table, of which so much of the excess over the published gain counts.
+    Table(f64),
+    /// So much over 1 - K_hg.
+    Compensating(f64),
+    /// A gain at K_hg 0.5, and a slope.
+    Linear([f64; 2]),
+}
+
+impl Rule {
+    fn at(&self, k_hg: f64) -> f64 {
+        match self {
+            Self::Table(scale) => Gains::PAPER.k_1 + scale * (table(k_hg) - Gains::PAPER.k_1),
+            // At K_hg 1 nothing is left; the bound of the law holds.
+            Self::Compensating(c) => c / (1.0 - k_hg).max(1e-6),
+            Self::Linear([k_1, slope]) => k_1 + slope * (k_hg - 0.5),
+        }
+    }
+}
+
+fn table(k_hg: f64) -> f64 {
+    let between = [[TABLE[0], TABLE[1]], [TABLE[1], TABLE[2]]];
+    let found = between
+        .into_iter()
+        .find(|[low, high]| (low[0]..high[0]).contains(&k_hg));
+    match found {
+        Some([low, high]) => low[1] + (high[1] - low[1]) * (k_hg - low[0]) / (high[0] - low[0]),
+        None if k_hg < TABLE[0][0] => TABLE[0][1],
+        None => TABLE[2][1],
+    }
+}
+
 #[derive(Debug, Clone)]
 struct ByReliance {
     law: Gains,
-    /// Times the excess over the published gain.
-    scale: f64,
+    rule: Rule,
+    /// The least and the largest K_1.
+    bounds: [f64; 2],
     rate_nm_per_s: f64,
     last: Option<f64>,
     since: u32,
 }
 
 impl ByReliance {
+    fn new(rule: Rule, bounds: [f64; 2], rate_nm_per_s: f64) -> Self {
+        Self {
+            law: Gains::PAPER,
+            rule,
+            bounds,
+            rate_nm_per_s,
+            last: None,
+            since: 0,
+        }
+    }
+
     fn wanted(&self) -> f64 {
-        let base = Gains::PAPER.k_1;
-        let Some(k_hg) = self.last else { return base };
-        if self.since > STALE_STEPS {
-            return base;
-        }
-        let mut wanted = if k_hg < TABLE[0][0] {
-            TABLE[0][1]
-        } else {
-            TABLE[2][1]
-        };
-        for [low, high] in [[TABLE[0], TABLE[1]], [TABLE[1], TABLE[2]]] {
-            if (low[0]..high[0]).contains(&k_hg) {
-                wanted = low[1] + (high[1] - low[1]) * (k_hg - low[0]) / (high[0] - low[0]);
-            }
-        }
-        (base + self.scale * (wanted - base)).min(MOST * base)
+        let [least, most] = self.bounds;
+        let fresh = self.last.filter(|_| self.since <= STALE_STEPS);
+        let wanted = fresh.map_or(Gains::PAPER.k_1, |k_hg| self.rule.at(k_hg));
+        // Not `clamp`: a file's bounds may cross.
+        wanted.max(least).min(most)
     }
 }
 
@@ -108,6 +157,10 @@ impl Law for ByReliance {
         let most = self.rate_nm_per_s * STEP_S;
         self.law.k_1 += (self.wanted() - self.law.k_1).clamp(-most, most);
         self.law.ask(view)
+    }
+
+    fn k_1(&self) -> Option<f64> {
+        Some(self.law.k_1)
     }
 }
 
@@ -128,6 +181,7 @@ pub(super) const ACTIVITY: Kind<dyn Law> = Kind {
             least: v[1],
             weight: weight(v[2]),
             agreement: [0.0; 2],
+            share: 1.0,
         })
     }),
 };
@@ -156,12 +210,32 @@ pub(super) const BY_RELIANCE: Kind<dyn Law> = Kind {
         Parameter::ours("rate_nm_per_s", 0.05, [0.0, 1.0]),
     ],
     make: Make::Part(|_, v| {
-        boxed(ByReliance {
-            law: Gains::PAPER,
-            scale: v[0],
-            rate_nm_per_s: v[1],
-            last: None,
-            since: 0,
-        })
+        let base = Gains::PAPER.k_1;
+        boxed(ByReliance::new(Rule::Table(v[0]), [base, MOST * base], v[1]))
     }),
+};
+
+pub(super) const COMPENSATING: Kind<dyn Law> = Kind {
+    name: "compensating",
+    source: "ours",
+    parameters: &[
+        Parameter::ours("c_nm", 0.19, [0.0, 1.0]),
+        Parameter::ours("least_nm", 0.25, [0.0, 4.0]),
+        Parameter::ours("most_nm", 0.65, [0.0, 4.0]),
+        Parameter::ours("rate_nm_per_s", 0.05, [0.0, 1.0]),
+    ],
+    make: Make::Part(|_, v| boxed(ByReliance::new(Rule::Compensating(v[0]), [v[1], v[2]], v[3]))),
+};
+
+pub(super) const LINEAR: Kind<dyn Law> = Kind {
+    name: "linear",
+    source: "ours",
+    parameters: &[
+        Parameter::ours("k_1", 0.36, [0.0, 4.0]),
+        Parameter::ours("slope_nm", -0.4, [-10.0, 10.0]),
+        Parameter::ours("least_nm", 0.05, [0.0, 4.0]),
+        Parameter::ours("most_nm", 0.65, [0.0, 4.0]),
+        Parameter::ours("rate_nm_per_s", 0.05, [0.0, 1.0]),
+    ],
+    make: Make::Part(|_, v| boxed(ByReliance::new(Rule::Linear([v[0], v[1]]), [v[2], v[3]], v[4]))),
 };

@@ -53,6 +53,11 @@ pub struct LawView {
 pub trait Law: CloneLaw + Send + Sync {
     /// The torque that it asks for in this step of 1 ms, N.m. Whatever it is, the ECU bounds it; NaN asks for nothing.
     fn ask(&mut self, view: &LawView) -> f64;
+
+    /// K_1 in the last step, N.m, if the law is (9) with a gain of its own; nothing of the loop depends on it.
+    fn k_1(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// A copy of a law behind a pointer; every law that is `Clone` has it.
@@ -77,6 +82,10 @@ impl Law for Box<dyn Law> {
     fn ask(&mut self, view: &LawView) -> f64 {
         self.as_mut().ask(view)
     }
+
+    fn k_1(&self) -> Option<f64> {
+        self.as_ref().k_1()
+    }
 }
 
 /// No guidance: it asks for nothing.
@@ -90,7 +99,7 @@ impl Law for Nothing {
 }
 
 /// Every law here.
-pub const LAWS: [Kind<dyn Law>; 9] = [
+pub const LAWS: [Kind<dyn Law>; 11] = [
     Kind {
         name: "none",
         source: "no guidance",
@@ -104,6 +113,8 @@ pub const LAWS: [Kind<dyn Law>; 9] = [
     adapting::ACTIVITY,
     adapting::RUNNING_WIDE,
     adapting::BY_RELIANCE,
+    adapting::COMPENSATING,
+    adapting::LINEAR,
     driver_limit::KIND,
 ];
 

@@ -34,6 +34,10 @@ impl Law for Gains {
     fn ask(&mut self, view: &LawView) -> f64 {
         self.k_1 * self.bracket(view)
     }
+
+    fn k_1(&self) -> Option<f64> {
+        Some(self.k_1)
+    }
 }
 
 pub(super) const KIND: Kind<dyn Law> = Kind {

@@ -32,6 +32,7 @@ fn law(name: &str, changed: &[(&str, f64)]) -> Box<dyn Law> {
     }
     match kind.make {
         Make::Part(make) => make(&Scenario::default(), &values).unwrap(),
+        Make::Given(make) => make(&Scenario::default(), &values).unwrap(),
         Make::Around(make) => make(&Scenario::default(), &values, Box::new(Gains::PAPER)),
     }
 }
@@ -122,6 +123,29 @@ fn a_gain_by_reliance_goes_to_its_table_and_back() {
         (10_000, Some(-0.2), 0.31),
     ] {
         assert!((gain(steps, k_hg) - expected).abs() < 1e-4, "{k_hg:?}");
+    }
+}
+
+/// By hand: 0.19 N.m over 0.5, its bound at K_hg 0.8, and the other at -1; 0.36 - 0.4*0.25 and its bound at 1.4. Each is reached in 10 s.
+#[test]
+fn a_gain_over_k_hg_compensates_or_follows_a_line_within_its_bounds() {
+    for (name, k_hg, expected) in [
+        ("compensating", 0.5, 0.38),
+        ("compensating", 0.8, 0.65),
+        ("compensating", 1.0, 0.65),
+        ("compensating", -1.0, 0.25),
+        ("linear", 0.75, 0.26),
+        ("linear", 1.4, 0.05),
+    ] {
+        let mut law = law(name, &[]);
+        let seen = LawView {
+            e_theta_rad: 0.025,
+            k_hg: Some(k_hg),
+            ..LawView::default()
+        };
+        let asked = (0..10_000).map(|_| law.ask(&seen)).last().unwrap();
+        assert!((asked - expected).abs() < 1e-9, "{name} at {k_hg}: {asked}");
+        assert_eq!(law.k_1(), Some(asked));
     }
 }
 

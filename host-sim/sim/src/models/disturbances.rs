@@ -9,94 +9,45 @@ use std::collections::VecDeque;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
-use serde::{Deserialize, Serialize};
 
 use super::{STEP_S, STEPS_PER_SECOND};
-use crate::input::{RangeError, in_range};
+use crate::fields::fields;
 
-/// The table `[sensor_errors]` of a scenario.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SensorErrors {
-    /// Bias of the driver torque, N.m.
-    pub torque_bias: f64,
-    /// Gain of the driver torque.
-    pub torque_gain: f64,
-    /// Bias of the wheel angle, deg.
-    pub angle_bias: f64,
-    /// Gain of the speed.
-    pub speed_gain: f64,
-    /// Bias of the yaw rate, mrad/s.
-    pub yaw_rate_bias: f64,
-    /// Gain of the yaw rate.
-    pub yaw_rate_gain: f64,
-    /// Standard deviation of the yaw rate's noise, mrad/s.
-    pub yaw_rate_noise: f64,
-    /// Standard deviation of e_y', m.
-    pub lane_noise: f64,
-    /// Standard deviation of e_theta', mrad.
-    pub heading_noise: f64,
-    /// Bias of e_theta', mrad: the yaw of the camera's mount.
-    pub camera_yaw: f64,
-    /// Time from a picture to its lane errors, s.
-    pub camera_latency: f64,
-    /// Standard deviation of that time, s.
-    pub camera_jitter: f64,
-    /// Dropouts in an hour.
-    pub dropouts: f64,
-    /// How long each lasts, s.
-    pub dropout: f64,
-    /// Changes of the line to one beside it and back in an hour.
-    pub line_jumps: f64,
-    /// How far the other line lies to the left, m.
-    pub line_jump: f64,
-}
-
-impl Default for SensorErrors {
-    fn default() -> Self {
-        Self {
-            torque_bias: 0.0,
-            torque_gain: 1.0,
-            angle_bias: 0.0,
-            speed_gain: 1.0,
-            yaw_rate_bias: 0.0,
-            yaw_rate_gain: 1.0,
-            yaw_rate_noise: 0.0,
-            lane_noise: 0.0,
-            heading_noise: 0.0,
-            camera_yaw: 0.0,
-            camera_latency: 0.0,
-            camera_jitter: 0.0,
-            dropouts: 0.0,
-            dropout: 0.2,
-            line_jumps: 0.0,
-            line_jump: 0.3,
-        }
-    }
-}
-
-impl SensorErrors {
-    /// Whether every value is one that a sensor can have.
-    ///
-    /// # Errors
-    /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), RangeError> {
-        in_range("torque_bias", self.torque_bias, -2.0..=2.0, "N.m")?;
-        in_range("torque_gain", self.torque_gain, 0.5..=1.5, "")?;
-        in_range("angle_bias", self.angle_bias, -20.0..=20.0, "deg")?;
-        in_range("speed_gain", self.speed_gain, 0.5..=1.5, "")?;
-        in_range("yaw_rate_bias", self.yaw_rate_bias, -100.0..=100.0, "mrad/s")?;
-        in_range("yaw_rate_gain", self.yaw_rate_gain, 0.5..=1.5, "")?;
-        in_range("yaw_rate_noise", self.yaw_rate_noise, 0.0..=100.0, "mrad/s")?;
-        in_range("lane_noise", self.lane_noise, 0.0..=1.0, "m")?;
-        in_range("heading_noise", self.heading_noise, 0.0..=50.0, "mrad")?;
-        in_range("camera_yaw", self.camera_yaw, -50.0..=50.0, "mrad")?;
-        in_range("camera_latency", self.camera_latency, 0.0..=0.5, "s")?;
-        in_range("camera_jitter", self.camera_jitter, 0.0..=0.1, "s")?;
-        in_range("dropouts", self.dropouts, 0.0..=3600.0, "1/h")?;
-        in_range("dropout", self.dropout, 0.0..=10.0, "s")?;
-        in_range("line_jumps", self.line_jumps, 0.0..=3600.0, "1/h")?;
-        in_range("line_jump", self.line_jump, -5.0..=5.0, "m")
+fields! {
+    /// What sensors add to the truth.
+    SensorErrors, "sensor_errors" {
+        /// bias of the driver torque
+        torque_bias_nm: f64 = 0.0, "torque_bias_nm", "", "N.m", Between(-2.0, 2.0);
+        /// gain of the driver torque
+        torque_gain: f64 = 1.0, "torque_gain", "", "", Between(0.5, 1.5);
+        /// bias of the wheel angle
+        angle_bias_rad: f64 = 0.0, "angle_bias_rad", "", "rad", Between(-0.35, 0.35);
+        /// gain of the speed
+        speed_gain: f64 = 1.0, "speed_gain", "", "", Between(0.5, 1.5);
+        /// bias of the yaw rate
+        yaw_rate_bias_rad_per_s: f64 = 0.0, "yaw_rate_bias_rad_per_s", "", "rad/s", Between(-0.1, 0.1);
+        /// gain of the yaw rate
+        yaw_rate_gain: f64 = 1.0, "yaw_rate_gain", "", "", Between(0.5, 1.5);
+        /// standard deviation of the yaw rate's noise, a draw every 10 ms
+        yaw_rate_noise_rad_per_s: f64 = 0.0, "yaw_rate_noise_rad_per_s", "", "rad/s", Between(0.0, 0.1);
+        /// standard deviation of e_y'
+        lane_noise_m: f64 = 0.0, "lane_noise_m", "", "m", Between(0.0, 1.0);
+        /// standard deviation of e_theta'
+        heading_noise_rad: f64 = 0.0, "heading_noise_rad", "", "rad", Between(0.0, 0.05);
+        /// bias of e_theta': the yaw of the camera's mount
+        camera_yaw_rad: f64 = 0.0, "camera_yaw_rad", "", "rad", Between(-0.05, 0.05);
+        /// from a picture to its lane errors, which say how old they are
+        camera_latency_s: f64 = 0.0, "camera_latency_s", "", "s", Between(0.0, 0.5);
+        /// standard deviation of that time
+        camera_jitter_s: f64 = 0.0, "camera_jitter_s", "", "s", Between(0.0, 0.1);
+        /// how often the camera begins to see nothing
+        dropout_rate_per_s: f64 = 0.0, "dropout_rate_per_s", "", "1/s", Between(0.0, 1.0);
+        /// for how long each time
+        dropout_duration_s: f64 = 0.2, "dropout_duration_s", "", "s", Between(0.0, 10.0);
+        /// how often the camera changes to the line beside its own, and back
+        line_jump_rate_per_s: f64 = 0.0, "line_jump_rate_per_s", "", "1/s", Between(0.0, 1.0);
+        /// how far that line lies to the left
+        line_jump_m: f64 = 0.3, "line_jump_m", "", "m", Between(-5.0, 5.0);
     }
 }
 
@@ -121,11 +72,11 @@ impl ErringGyro {
     /// What it makes of the truth at a step, rad/s.
     pub fn see(&mut self, step: u32, truth_rad_per_s: f64) -> f64 {
         let errors = &self.errors;
-        if errors.yaw_rate_noise > 0.0 && step.is_multiple_of(10) {
+        if errors.yaw_rate_noise_rad_per_s > 0.0 && step.is_multiple_of(10) {
             let white: f64 = StandardNormal.sample(&mut self.generator);
-            self.noise_rad_per_s = 1e-3 * errors.yaw_rate_noise * white;
+            self.noise_rad_per_s = errors.yaw_rate_noise_rad_per_s * white;
         }
-        errors.yaw_rate_gain * truth_rad_per_s + 1e-3 * errors.yaw_rate_bias + self.noise_rad_per_s
+        errors.yaw_rate_gain * truth_rad_per_s + errors.yaw_rate_bias_rad_per_s + self.noise_rad_per_s
     }
 }
 
@@ -167,27 +118,27 @@ impl ErringCamera {
         let errors = self.errors;
         let since_s = f64::from(step - self.last_step.unwrap_or(step)) * STEP_S;
         let is_first = self.last_step.replace(step).is_none();
-        if self.happens(errors.dropouts, since_s) {
-            self.blind_until = step + (errors.dropout * f64::from(STEPS_PER_SECOND)) as u32;
+        if self.happens(errors.dropout_rate_per_s, since_s) {
+            self.blind_until = step + (errors.dropout_duration_s * f64::from(STEPS_PER_SECOND)) as u32;
         }
-        if self.happens(errors.line_jumps, since_s) {
+        if self.happens(errors.line_jump_rate_per_s, since_s) {
             self.is_on_other_line = !self.is_on_other_line;
         }
         let beside_m = if self.is_on_other_line {
-            errors.line_jump
+            errors.line_jump_m
         } else {
             0.0
         };
         let seen = [
-            e_y_m + beside_m + errors.lane_noise * self.normal(errors.lane_noise),
+            e_y_m + beside_m + errors.lane_noise_m * self.normal(errors.lane_noise_m),
             e_theta_rad
-                + 1e-3 * (errors.camera_yaw + errors.heading_noise * self.normal(errors.heading_noise)),
+                + (errors.camera_yaw_rad + errors.heading_noise_rad * self.normal(errors.heading_noise_rad)),
         ];
         // A camera was there before the run began: its first picture is not waited for.
         let late_s = if is_first {
             0.0
         } else {
-            errors.camera_latency + errors.camera_jitter * self.normal(errors.camera_jitter)
+            errors.camera_latency_s + errors.camera_jitter_s * self.normal(errors.camera_jitter_s)
         };
         let late = (late_s.max(0.0) / STEP_S).round() as u32;
         if step >= self.blind_until {
@@ -207,9 +158,9 @@ impl ErringCamera {
         arrived
     }
 
-    /// Whether something that happens so often in an hour happens in a time.
-    fn happens(&mut self, per_hour: f64, time_s: f64) -> bool {
-        per_hour > 0.0 && self.generator.random::<f64>() < per_hour * time_s / 3600.0
+    /// Whether something that happens at a rate happens in a time.
+    fn happens(&mut self, per_s: f64, time_s: f64) -> bool {
+        per_s > 0.0 && self.generator.random::<f64>() < per_s * time_s
     }
 
     /// A draw, but none for what is off.
@@ -244,9 +195,9 @@ mod tests {
         let mut exact = ErringGyro::new(SensorErrors::default(), 1);
         assert_eq!(exact.see(0, 0.123), 0.123);
         let errors = SensorErrors {
-            yaw_rate_bias: 3.0,
+            yaw_rate_bias_rad_per_s: 0.003,
             yaw_rate_gain: 1.02,
-            yaw_rate_noise: 2.0,
+            yaw_rate_noise_rad_per_s: 0.002,
             ..SensorErrors::default()
         };
         let mut gyro = ErringGyro::new(errors, 1);
@@ -265,7 +216,7 @@ mod tests {
     #[test]
     fn a_late_camera_shows_the_truth_of_before() {
         let errors = SensorErrors {
-            camera_latency: 0.08,
+            camera_latency_s: 0.08,
             ..SensorErrors::default()
         };
         let seen = pictures(errors, 100);
@@ -280,9 +231,9 @@ mod tests {
     #[test]
     fn noise_has_its_spread_and_dropouts_their_number_and_length() {
         let errors = SensorErrors {
-            lane_noise: 0.03,
-            heading_noise: 2.0,
-            camera_yaw: 1.5,
+            lane_noise_m: 0.03,
+            heading_noise_rad: 0.002,
+            camera_yaw_rad: 0.0015,
             ..SensorErrors::default()
         };
         let mut camera = ErringCamera::new(errors, 5);
@@ -306,8 +257,8 @@ mod tests {
         );
 
         let errors = SensorErrors {
-            dropouts: 360.0,
-            dropout: 0.5,
+            dropout_rate_per_s: 0.1,
+            dropout_duration_s: 0.5,
             ..SensorErrors::default()
         };
         // An hour and a bit, with a dropout of 0.5 s every 10 s: 5 % of the pictures are missing.

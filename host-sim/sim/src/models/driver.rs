@@ -10,36 +10,52 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use super::STEP_S;
-use crate::input::{RangeError, in_range};
+use crate::fields::{Range, fields};
 
-/// Tables 4 and 8. The gains of the arm depend on the condition and are given apart ([`ArmGains`]).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DriverParameters {
-    /// a_1, target angle per lateral error at the near point, rad/m.
-    pub a_1: f64,
-    /// a_2, target angle per integral of that error, rad/(m.s).
-    pub a_2: f64,
-    /// a_3, target angle per yaw error at the far point.
-    pub a_3: f64,
-    /// t_p, processing delay, s, at least one step.
-    pub t_p: f64,
-    /// t_n, look-ahead time of the near point, s.
-    pub t_n: f64,
-    /// t_f, look-ahead time of the far point, s.
-    pub t_f: f64,
-    /// t_nms, time constant of the arm, s.
-    pub t_nms: f64,
-    /// K_nms, reflex gain, N.m/rad.
-    pub k_nms: f64,
-    /// Standard deviation of the remnant, N.m; 0 switches it off.
-    pub remnant_sd_nm: f64,
-    /// Corner of the first-order low-pass that colours the remnant, Hz.
-    pub remnant_corner_hz: f64,
-    /// For how long the ECU asks for a hand before the driver moves the wheel, s; infinite: never. Our own choice: so late
-    /// that nothing differs from the paper's drives but where guidance would end.
-    pub answers_hands_off_after_s: f64,
-    /// The driver's own line, m left of the lane's middle.
-    pub line_m: f64,
+fields! {
+    /// Tables 4, 7 and 8, without remnant. The gains of the arm depend on the condition and are given apart ([`ArmGains`]).
+    DriverParameters, "driver" {
+        /// visual gain on e_y at the near point, equation (7)
+        a_1: f64 = 0.1, "a_1_rad_per_m", "a_1", "rad/m", Between(0.0, 10.0);
+        /// visual gain on the integral of e_y
+        a_2: f64 = 0.05, "a_2_rad_per_m_s", "a_2", "rad/(m.s)", Between(0.0, 10.0);
+        /// visual gain on e_theta at the far point
+        a_3: f64 = 3.7, "a_3", "a_3", "", Between(0.0, 100.0);
+        /// processing delay
+        t_p: f64 = 0.1, "t_p_s", "t_p", "s", Between(STEP_S, 2.0);
+        /// look-ahead time of the near point
+        t_n: f64 = 0.3, "t_n_s", "t_n", "s", Between(0.0, 5.0);
+        /// look-ahead time of the far point
+        t_f: f64 = 1.0, "t_f_s", "t_f", "s", Between(0.0, 5.0);
+        /// time constant of the arm, equation (8)
+        t_nms: f64 = 0.1, "t_nms_s", "t_nms", "s", Between(0.01, 2.0);
+        /// reflex gain: stiffness of the arm
+        k_nms: f64 = 1.0, "k_nms_nm_per_rad", "K_nms", "N.m/rad", Between(0.0, 100.0);
+        /// standard deviation of the torque that no model explains; 0 switches it off
+        remnant_sd_nm: f64 = 0.0, "remnant_sd_nm", "", "N.m", Between(0.0, 5.0);
+        /// corner of the first-order low-pass that colours it
+        remnant_corner_hz: f64 = 0.5, "remnant_corner_hz", "", "Hz", Between(0.01, 100.0);
+        /// the ECU, which feels no hand, warns 15 s before it ends guidance: after so long the driver moves the wheel to and
+        /// fro, with 0.2 N.m over 1 s; `inf`: never. Our own choice, and so late that only drives differ in which guidance
+        /// would end
+        answers_hands_off_after_s: f64 = 14.0, "answers_hands_off_after_s", "", "s", Between(0.0, f64::INFINITY);
+        /// the driver's own line, left of the lane's middle
+        line_m: f64 = 0.0, "line_m", "", "m", Between(-2.0, 2.0);
+    }
+}
+
+fields! {
+    /// The arm in the table of a driver.
+    ArmInFile, "driver" {
+        /// gain on the target angle; without it the condition's
+        k_d: Option<f64> = None, "k_d_nm_per_rad", "K_d", "N.m/rad", ArmGains::K_D;
+        /// resistance to the guidance; without it the condition's; with `"manual"` only 0. K_d stays as it is: the paper's
+        /// drivers have K_d = 2 + 2 K_hg, and a driver with a small K_hg and a large K_d keeps the lane worse with guidance
+        /// than without
+        k_hg: Option<f64> = None, "k_hg", "K_hg", "", ArmGains::K_HG;
+        /// K_d once the driver has noticed that guidance failed, with K_hg of 0; not that of `condition = "manual"`
+        manual_k_d: f64 = ArmGains::MANUAL.k_d, "manual_k_d_nm_per_rad", "", "N.m/rad", ArmGains::K_D;
+    }
 }
 
 /// How the arm weighs vision against the guidance torque.
@@ -54,53 +70,13 @@ pub struct ArmGains {
 impl ArmGains {
     /// Without guidance, or once the driver has understood that it failed.
     pub const MANUAL: Self = Self { k_d: 4.0, k_hg: 0.0 };
-}
-
-impl Default for DriverParameters {
-    /// Driver 1 of table 7 with table 8, without remnant.
-    fn default() -> Self {
-        Self {
-            a_1: 0.1,
-            a_2: 0.05,
-            a_3: 3.7,
-            t_p: 0.1,
-            t_n: 0.3,
-            t_f: 1.0,
-            t_nms: 0.1,
-            k_nms: 1.0,
-            remnant_sd_nm: 0.0,
-            remnant_corner_hz: 0.5,
-            answers_hands_off_after_s: 14.0,
-            line_m: 0.0,
-        }
-    }
+    /// What K_d may be, N.m/rad.
+    pub(crate) const K_D: Range = Range::Between(0.0, 50.0);
+    /// What K_hg may be.
+    pub(crate) const K_HG: Range = Range::Between(0.0, 10.0);
 }
 
 impl DriverParameters {
-    /// Whether every value is in the range that the model is meant for.
-    ///
-    /// # Errors
-    /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), RangeError> {
-        in_range("a_1", self.a_1, 0.0..=10.0, "rad/m")?;
-        in_range("a_2", self.a_2, 0.0..=10.0, "rad/(m.s)")?;
-        in_range("a_3", self.a_3, 0.0..=100.0, "")?;
-        in_range("t_p", self.t_p, STEP_S..=2.0, "s")?;
-        in_range("t_n", self.t_n, 0.0..=5.0, "s")?;
-        in_range("t_f", self.t_f, 0.0..=5.0, "s")?;
-        in_range("t_nms", self.t_nms, 0.01..=2.0, "s")?;
-        in_range("K_nms", self.k_nms, 0.0..=100.0, "N.m/rad")?;
-        in_range("remnant_sd", self.remnant_sd_nm, 0.0..=5.0, "N.m")?;
-        in_range("remnant_corner", self.remnant_corner_hz, 0.01..=100.0, "Hz")?;
-        in_range(
-            "answers_hands_off_after",
-            self.answers_hands_off_after_s,
-            0.0..=f64::INFINITY,
-            "s",
-        )?;
-        in_range("line", self.line_m, -2.0..=2.0, "m")
-    }
-
     /// The line, m right of the middle: what is taken off e_y, which leaves it as it is to the sign of a zero where there is none.
     pub fn right_m(&self) -> f64 {
         0.0 - self.line_m

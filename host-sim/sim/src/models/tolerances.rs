@@ -7,49 +7,47 @@
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
-use serde::{Deserialize, Serialize};
 
 use super::disturbances::SensorErrors;
 use super::real::WorldParameters;
 use super::vehicle::VehicleParameters;
-use crate::input::{RangeError, in_range};
+use crate::fields::fields;
 
 /// Where a load lies, as a share of the wheelbase behind the front axle: a back seat and a boot.
 const LOAD_PLACE: f64 = 0.75;
 
-/// The table `[tolerances]` of a scenario: how far cars of one kind differ.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Tolerances {
-    /// Which car of the population; without it the scenario's seed draws one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub car: Option<u64>,
-    /// Cornering stiffness of an axle, share to both sides, each axle by itself.
-    pub tyres: f64,
-    /// Trail, share to both sides.
-    pub trail: f64,
-    /// Most load, kg; from none to this.
-    pub load: f64,
-    /// Least friction of the column, N.m, in place of the world's if the most is above zero.
-    pub friction_least: f64,
-    /// Most friction of the column, N.m.
-    pub friction_most: f64,
-    /// Error of the motor, share to both sides.
-    pub motor_error: f64,
-    /// Most lag of the motor, s; from none to this.
-    pub motor_lag: f64,
-    /// Standard deviation of the driver torque sensor's bias, N.m.
-    pub torque_bias: f64,
-    /// Standard deviation of its gain.
-    pub torque_gain: f64,
-    /// Standard deviation of the wheel angle's offset, deg.
-    pub angle_bias: f64,
-    /// Standard deviation of the speed's gain.
-    pub speed_gain: f64,
-    /// Standard deviation of the camera's yaw, mrad.
-    pub camera_yaw: f64,
-    /// Standard deviation of the yaw rate's bias, mrad/s.
-    pub yaw_rate_bias: f64,
+fields! {
+    /// How far cars of one kind differ.
+    Tolerances, "tolerances" {
+        /// which car of the population drives; without it `seed` draws one
+        car: Option<u64> = None, "car", "", "", Whole;
+        /// of the cornering stiffness of each axle, share to both sides
+        tyres: f64 = 0.0, "tyres", "", "", Between(0.0, 0.5);
+        /// of the trail, share to both sides
+        trail: f64 = 0.0, "trail", "", "", Between(0.0, 0.5);
+        /// most load, at three quarters of the wheelbase; drawn from none to this
+        load_kg: f64 = 0.0, "load_kg", "", "kg", Between(0.0, 2000.0);
+        /// least friction of the column
+        friction_least_nm: f64 = 0.0, "friction_least_nm", "", "N.m", Between(0.0, 5.0);
+        /// most friction, drawn in place of `world.friction_nm` if above 0
+        friction_most_nm: f64 = 0.0, "friction_most_nm", "", "N.m", Between(0.0, 5.0);
+        /// of the motor's torque, share to both sides, beside `world.motor_error`
+        motor_error: f64 = 0.0, "motor_error", "", "", Between(0.0, 0.5);
+        /// most lag of the motor, drawn from none to this, beside `world.motor_lag_s`
+        motor_lag_s: f64 = 0.0, "motor_lag_s", "", "s", Between(0.0, 0.1);
+        /// standard deviation of the driver torque's bias
+        torque_bias_nm: f64 = 0.0, "torque_bias_nm", "", "N.m", Between(0.0, 0.5);
+        /// standard deviation of its gain
+        torque_gain: f64 = 0.0, "torque_gain", "", "", Between(0.0, 0.15);
+        /// standard deviation of the wheel angle's offset
+        angle_bias_rad: f64 = 0.0, "angle_bias_rad", "", "rad", Between(0.0, 0.09);
+        /// standard deviation of the speed's gain
+        speed_gain: f64 = 0.0, "speed_gain", "", "", Between(0.0, 0.15);
+        /// standard deviation of the yaw of the camera's mount
+        camera_yaw_rad: f64 = 0.0, "camera_yaw_rad", "", "rad", Between(0.0, 0.015);
+        /// standard deviation of the yaw rate's bias
+        yaw_rate_bias_rad_per_s: f64 = 0.0, "yaw_rate_bias_rad_per_s", "", "rad/s", Between(0.0, 0.03);
+    }
 }
 
 /// A car as it is: what a scenario's tables say, with what its tolerances have drawn.
@@ -89,26 +87,6 @@ impl Draw {
 }
 
 impl Tolerances {
-    /// Whether every value is one that a population of cars can have.
-    ///
-    /// # Errors
-    /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), RangeError> {
-        in_range("tyres", self.tyres, 0.0..=0.5, "")?;
-        in_range("trail", self.trail, 0.0..=0.5, "")?;
-        in_range("load", self.load, 0.0..=2000.0, "kg")?;
-        in_range("friction_least", self.friction_least, 0.0..=5.0, "N.m")?;
-        in_range("friction_most", self.friction_most, 0.0..=5.0, "N.m")?;
-        in_range("motor_error", self.motor_error, 0.0..=0.5, "")?;
-        in_range("motor_lag", self.motor_lag, 0.0..=0.1, "s")?;
-        in_range("torque_bias", self.torque_bias, 0.0..=0.5, "N.m")?;
-        in_range("torque_gain", self.torque_gain, 0.0..=0.15, "")?;
-        in_range("angle_bias", self.angle_bias, 0.0..=5.0, "deg")?;
-        in_range("speed_gain", self.speed_gain, 0.0..=0.15, "")?;
-        in_range("camera_yaw", self.camera_yaw, 0.0..=15.0, "mrad")?;
-        in_range("yaw_rate_bias", self.yaw_rate_bias, 0.0..=30.0, "mrad/s")
-    }
-
     /// The car that `seed` draws around one on paper.
     pub fn draw(&self, seed: u64, on_paper: &Car) -> Car {
         let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
@@ -117,20 +95,21 @@ impl Tolerances {
         vehicle.k_f *= 1.0 + self.tyres * draw.both_sides();
         vehicle.k_r *= 1.0 + self.tyres * draw.both_sides();
         vehicle.e_t *= 1.0 + self.trail * draw.both_sides();
-        *vehicle = loaded(vehicle, self.load * draw.share());
-        let friction = self.friction_least + (self.friction_most - self.friction_least) * draw.share();
-        if self.friction_most > 0.0 {
-            car.world.friction = friction;
+        *vehicle = loaded(vehicle, self.load_kg * draw.share());
+        let friction =
+            self.friction_least_nm + (self.friction_most_nm - self.friction_least_nm) * draw.share();
+        if self.friction_most_nm > 0.0 {
+            car.world.friction_nm = friction;
         }
         car.world.motor_error += self.motor_error * draw.both_sides();
-        car.world.motor_lag += self.motor_lag * draw.share();
+        car.world.motor_lag_s += self.motor_lag_s * draw.share();
         let errors = &mut car.sensor_errors;
-        errors.torque_bias += self.torque_bias * draw.normal();
+        errors.torque_bias_nm += self.torque_bias_nm * draw.normal();
         errors.torque_gain *= 1.0 + self.torque_gain * draw.normal();
-        errors.angle_bias += self.angle_bias * draw.normal();
+        errors.angle_bias_rad += self.angle_bias_rad * draw.normal();
         errors.speed_gain *= 1.0 + self.speed_gain * draw.normal();
-        errors.camera_yaw += self.camera_yaw * draw.normal();
-        errors.yaw_rate_bias += self.yaw_rate_bias * draw.normal();
+        errors.camera_yaw_rad += self.camera_yaw_rad * draw.normal();
+        errors.yaw_rate_bias_rad_per_s += self.yaw_rate_bias_rad_per_s * draw.normal();
         car
     }
 }
@@ -191,10 +170,10 @@ mod tests {
     fn a_population_has_the_spread_that_was_asked_for() {
         let cars = population(Tolerances {
             tyres: 0.15,
-            friction_least: 0.2,
-            friction_most: 0.4,
-            angle_bias: 1.0,
-            load: 300.0,
+            friction_least_nm: 0.2,
+            friction_most_nm: 0.4,
+            angle_bias_rad: 1.0,
+            load_kg: 300.0,
             ..Tolerances::default()
         });
         let of = |value: fn(&Car) -> f64| cars.iter().map(value).collect::<Vec<_>>();
@@ -222,12 +201,12 @@ mod tests {
             "{}",
             sd(&tyres)
         );
-        let [low, high] = ends(&of(|car| car.world.friction));
+        let [low, high] = ends(&of(|car| car.world.friction_nm));
         assert!(
             (0.2..0.201).contains(&low) && (0.399..=0.4).contains(&high),
             "{low} {high}"
         );
-        let angles = of(|car| car.sensor_errors.angle_bias);
+        let angles = of(|car| car.sensor_errors.angle_bias_rad);
         // Cut at three standard deviations the rest has 0.9866 of it.
         assert!(
             mean(&angles).abs() < 0.05 && (sd(&angles) - 0.9866).abs() < 0.04,
@@ -235,18 +214,18 @@ mod tests {
             sd(&angles)
         );
         assert!(angles.iter().all(|a| a.abs() <= 3.0));
-        assert!(cars.iter().all(|car| car.sensor_errors.torque_bias == 0.0));
+        assert!(cars.iter().all(|car| car.sensor_errors.torque_bias_nm == 0.0));
     }
 
     #[test]
     fn a_tolerance_more_leaves_the_others_as_they_were() {
         let one = Tolerances {
-            camera_yaw: 1.5,
+            camera_yaw_rad: 0.0015,
             ..Tolerances::default()
         };
         let two = Tolerances { tyres: 0.15, ..one };
         for seed in 0..20 {
-            let [a, b] = [one, two].map(|t| t.draw(seed, &ON_PAPER()).sensor_errors.camera_yaw);
+            let [a, b] = [one, two].map(|t| t.draw(seed, &ON_PAPER()).sensor_errors.camera_yaw_rad);
             assert_eq!(a, b);
         }
     }

@@ -2,62 +2,33 @@
 //!
 //! Stiffnesses are per tyre, as in equations (1) and (2). The equations themselves are in `plant`.
 
-use serde::{Deserialize, Serialize};
+use crate::fields::fields;
 
-use crate::input::{RangeError, in_range};
-
-/// Table 9, SI units. Every value has to be positive.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct VehicleParameters {
-    /// m, mass, kg.
-    pub m: f64,
-    /// I, yaw inertia, kg.m^2.
-    #[serde(rename = "I", alias = "i")]
-    pub i: f64,
-    /// l_f, front axle to centre of gravity, m.
-    pub l_f: f64,
-    /// l_r, rear axle to centre of gravity, m.
-    pub l_r: f64,
-    /// K_f, cornering stiffness of a front tyre, N/rad.
-    #[serde(rename = "K_f", alias = "k_f")]
-    pub k_f: f64,
-    /// K_r, cornering stiffness of a rear tyre, N/rad.
-    #[serde(rename = "K_r", alias = "k_r")]
-    pub k_r: f64,
-    /// K_s, spring constant around the kingpin, N.m/rad.
-    #[serde(rename = "K_s", alias = "k_s")]
-    pub k_s: f64,
-    /// E_t, pneumatic and castor trail, m (the paper's table leaves the unit out).
-    #[serde(rename = "E_t", alias = "e_t")]
-    pub e_t: f64,
-    /// B_s, damping of the column, N.m.s/rad.
-    #[serde(rename = "B_s", alias = "b_s")]
-    pub b_s: f64,
-    /// J_s, inertia of the column, kg.m^2.
-    #[serde(rename = "J_s", alias = "j_s")]
-    pub j_s: f64,
-    /// K_t, front wheel angle per steering wheel angle.
-    #[serde(rename = "K_t", alias = "k_t")]
-    pub k_t: f64,
-}
-
-impl Default for VehicleParameters {
-    /// Table 9.
-    fn default() -> Self {
-        Self {
-            m: 1100.0,
-            i: 2940.0,
-            l_f: 1.0,
-            l_r: 1.635,
-            k_f: 53_300.0,
-            k_r: 117_000.0,
-            k_s: 48_510.0,
-            e_t: 0.026,
-            b_s: 0.57,
-            j_s: 0.11,
-            k_t: 1.0 / 17.0,
-        }
+fields! {
+    /// Table 9, SI units. Every value has to be positive.
+    VehicleParameters, "vehicle" {
+        /// mass
+        m: f64 = 1100.0, "m_kg", "m", "kg", Between(100.0, 50_000.0);
+        /// yaw inertia
+        i: f64 = 2940.0, "i_kg_m2", "I", "kg.m2", Between(100.0, 500_000.0);
+        /// centre of gravity to the front axle
+        l_f: f64 = 1.0, "l_f_m", "l_f", "m", Between(0.1, 10.0);
+        /// centre of gravity to the rear axle
+        l_r: f64 = 1.635, "l_r_m", "l_r", "m", Between(0.1, 10.0);
+        /// cornering stiffness of one front tyre
+        k_f: f64 = 53_300.0, "k_f_n_per_rad", "K_f", "N/rad", Between(1e3, 1e6);
+        /// cornering stiffness of one rear tyre
+        k_r: f64 = 117_000.0, "k_r_n_per_rad", "K_r", "N/rad", Between(1e3, 1e6);
+        /// stiffness of the steering, around the kingpin
+        k_s: f64 = 48_510.0, "k_s_nm_per_rad", "K_s", "N.m/rad", Between(1e2, 1e7);
+        /// trail, pneumatic and castor (the paper's table leaves the unit out)
+        e_t: f64 = 0.026, "e_t_m", "E_t", "m", Between(0.001, 0.2);
+        /// damping of the column
+        b_s: f64 = 0.57, "b_s_nms_per_rad", "B_s", "N.m.s/rad", Between(0.01, 10.0);
+        /// inertia of the column
+        j_s: f64 = 0.11, "j_s_kg_m2", "J_s", "kg.m2", Between(0.01, 2.0);
+        /// front wheel angle per steering wheel angle: 1/17
+        k_t: f64 = 1.0 / 17.0, "k_t", "K_t", "", Between(0.02, 0.2);
     }
 }
 
@@ -66,24 +37,6 @@ impl VehicleParameters {
     pub fn aligning_stiffness(&self) -> f64 {
         let lever = 2.0 * self.e_t * self.k_f;
         lever * self.k_t / (1.0 + lever / self.k_s)
-    }
-
-    /// Whether every value is one that a road vehicle can have.
-    ///
-    /// # Errors
-    /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), RangeError> {
-        in_range("m", self.m, 100.0..=50_000.0, "kg")?;
-        in_range("I", self.i, 100.0..=500_000.0, "kg.m^2")?;
-        in_range("l_f", self.l_f, 0.1..=10.0, "m")?;
-        in_range("l_r", self.l_r, 0.1..=10.0, "m")?;
-        in_range("K_f", self.k_f, 1e3..=1e6, "N/rad")?;
-        in_range("K_r", self.k_r, 1e3..=1e6, "N/rad")?;
-        in_range("K_s", self.k_s, 1e2..=1e7, "N.m/rad")?;
-        in_range("E_t", self.e_t, 0.001..=0.2, "m")?;
-        in_range("B_s", self.b_s, 0.01..=10.0, "N.m.s/rad")?;
-        in_range("J_s", self.j_s, 0.01..=2.0, "kg.m^2")?;
-        in_range("K_t", self.k_t, 0.02..=0.2, "")
     }
 }
 

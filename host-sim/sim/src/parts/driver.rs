@@ -51,6 +51,11 @@ pub trait Driver {
 
     /// The torque on the column in this step of 1 ms, N.m, positive turns left.
     fn step(&mut self, view: &DriverView) -> f64;
+
+    /// K_hg in the last step, if the driver has one; nothing of the loop depends on it.
+    fn k_hg(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// Nobody; a hand of an [`Action`](crate::Action) may steer in the driver's place.
@@ -115,5 +120,9 @@ impl Driver for PaperDriver {
             .arm
             .step(target_rad, view.wheel_angle_rad, view.guidance_torque_nm);
         now_nm
+    }
+
+    fn k_hg(&self) -> Option<f64> {
+        Some(self.arm.gains.k_hg)
     }
 }

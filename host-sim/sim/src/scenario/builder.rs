@@ -1,7 +1,5 @@
 //! How a scenario is made, and why it is refused.
 
-use std::fmt;
-
 use haptic_core::controller::config::Setup;
 
 use super::guidance_file::in_words_of_the_file;
@@ -9,10 +7,10 @@ use super::{
     Condition, DriverChange, Failure, FailureKind, GuidanceParameters, LEAST_DURATION_S, Scenario,
     ScenarioValues, Sensors, Speed, file,
 };
-use crate::input::{InputError, RangeError, in_range};
-use crate::models::STEP_S;
+use crate::fields::Fields;
+use crate::input::{InputError, RangeError};
 use crate::models::disturbances::SensorErrors;
-use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::real::WorldParameters;
 use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::Tolerances;
@@ -26,16 +24,20 @@ pub struct ScenarioBuilder {
 }
 
 /// Why there is no such scenario.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
     /// A value outside its range.
-    Range(RangeError),
+    #[error(transparent)]
+    Range(#[from] RangeError),
     /// An instant outside the run.
+    #[error("{0}: the run ends there")]
     AfterTheEnd(RangeError),
     /// Points of a speed that do not go together.
+    #[error("{0}")]
     Speed(String),
     /// A manual driver with something that takes guidance.
+    #[error("condition = \"manual\" has no guidance, but {what}; {cure}")]
     ManualWith {
         /// The field, with its value.
         what: String,
@@ -43,6 +45,10 @@ pub enum ScenarioError {
         cure: &'static str,
     },
     /// A course with less than a second to drive.
+    #[error(
+        "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {needed_m:.1} m: {look_ahead_m:.1} m of \
+         look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive"
+    )]
     CourseTooShort {
         /// Its name.
         course: String,
@@ -57,45 +63,6 @@ pub enum ScenarioError {
         /// The same as time, s.
         look_ahead_s: f64,
     },
-}
-
-impl From<RangeError> for ScenarioError {
-    fn from(error: RangeError) -> Self {
-        Self::Range(error)
-    }
-}
-
-impl fmt::Display for ScenarioError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Range(error) => error.fmt(f),
-            Self::AfterTheEnd(error) => write!(f, "{error}: the run ends there"),
-            Self::Speed(message) => f.write_str(message),
-            Self::ManualWith { what, cure } => {
-                write!(f, "condition = \"manual\" has no guidance, but {what}; {cure}")
-            }
-            Self::CourseTooShort {
-                course,
-                length_m,
-                needed_m,
-                speed_kmh,
-                look_ahead_m,
-                look_ahead_s,
-            } => write!(
-                f,
-                "course {course} is {length_m:.1} m long, but at {speed_kmh} km/h it needs {needed_m:.1} m: \
-                 {look_ahead_m:.1} m of look-ahead ({look_ahead_s:.2} s) and {LEAST_DURATION_S} s to drive"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for ScenarioError {}
-
-impl From<ScenarioError> for String {
-    fn from(error: ScenarioError) -> Self {
-        error.to_string()
-    }
 }
 
 impl ScenarioBuilder {
@@ -118,9 +85,9 @@ impl ScenarioBuilder {
         self
     }
 
-    /// Constant speed, km/h: 20 to 250.
+    /// Constant speed, km/h: 20 to 250. What a file says is in m/s.
     pub fn speed_kmh(mut self, speed_kmh: f64) -> Self {
-        self.values.speed = Speed::Constant(speed_kmh);
+        self.values.speed = Speed::constant_kmh(speed_kmh);
         self
     }
 
@@ -226,27 +193,24 @@ impl ScenarioBuilder {
     /// a course with less than a second to drive.
     pub fn build(self) -> Result<Scenario, ScenarioError> {
         let values = self.values;
-        let within = |table: &'static str| move |e: RangeError| e.within(table);
         let speed = values.speed.profile()?;
-        values.driver.check().map_err(within("driver"))?;
-        check_gains(values.gains).map_err(within("driver"))?;
-        in_range("manual_K_d", values.manual_k_d, K_D, "N.m/rad").map_err(within("driver"))?;
-        values.vehicle.check().map_err(within("vehicle"))?;
-        in_range("t_n", values.guidance.t_n, 0.0..=5.0, "s").map_err(within("guidance"))?;
-        // The controller's range: its plausibility checks divide by it.
-        in_range("t_f", values.guidance.t_f, 0.1..=3.0, "s").map_err(within("guidance"))?;
+        values.driver.check()?;
+        let ArmGains { k_d, k_hg } = values.gains;
+        let arm = ArmInFile {
+            k_d: Some(k_d),
+            k_hg: Some(k_hg),
+            manual_k_d: values.manual_k_d,
+        };
+        arm.check()?;
+        values.vehicle.check()?;
+        let (_, camera) = values.guidance.into();
+        camera.check()?;
         let setup = Setup::new(&values.controller_params()).map_err(|e| in_words_of_the_file(&e))?;
-        in_range("time", values.failure.time_s, 0.0..=1e6, "s").map_err(within("failure"))?;
-        if let Some(duration_s) = values.failure.duration_s {
-            in_range("duration", duration_s, STEP_S..=1e6, "s").map_err(within("failure"))?;
-        }
-        if let Some(change) = &values.driver_change {
-            in_range("time", change.time_s, 0.0..=1e6, "s").map_err(within("driver_change"))?;
-            check_gains(change.gains()).map_err(within("driver_change"))?;
-        }
-        values.world.check().map_err(within("world"))?;
-        values.sensor_errors.check().map_err(within("sensor_errors"))?;
-        values.tolerances.check().map_err(within("tolerances"))?;
+        values.failure.check()?;
+        values.driver_change.as_ref().map_or(Ok(()), Fields::check)?;
+        values.world.check()?;
+        values.sensor_errors.check()?;
+        values.tolerances.check()?;
         let scenario = Scenario { values, setup, speed };
         scenario.check_length()?;
         scenario.check_manual()?;
@@ -302,8 +266,8 @@ impl Scenario {
         }
         let changed = values.driver_change.map_or(0.0, |change| change.k_hg);
         for (field, k_hg) in [
-            ("driver.K_hg", values.gains.k_hg),
-            ("driver_change.K_hg", changed),
+            ("driver.k_hg", values.gains.k_hg),
+            ("driver_change.k_hg", changed),
         ] {
             if k_hg != 0.0 {
                 return refused(format!("{field} = {k_hg}"), "it can only be 0");
@@ -311,11 +275,4 @@ impl Scenario {
         }
         Ok(())
     }
-}
-
-const K_D: std::ops::RangeInclusive<f64> = 0.0..=50.0;
-
-fn check_gains(gains: ArmGains) -> Result<(), RangeError> {
-    in_range("K_d", gains.k_d, K_D, "N.m/rad")?;
-    in_range("K_hg", gains.k_hg, 0.0..=10.0, "")
 }

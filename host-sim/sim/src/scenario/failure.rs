@@ -4,8 +4,9 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::fields::{FieldValue, fields};
 use crate::models::driver::ArmGains;
-use crate::models::step_of;
+use crate::models::{STEP_S, step_of};
 
 /// When the paper lets the guidance fail, s.
 pub const DEFAULT_FAILURE_TIME_S: f64 = 70.0;
@@ -35,18 +36,19 @@ impl fmt::Display for FailureKind {
     }
 }
 
-/// A failure and its time.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Failure {
-    /// What fails.
-    pub kind: FailureKind,
-    /// When, s after the start.
-    #[serde(rename = "time")]
-    pub time_s: f64,
-    /// For how long, s; without it until the run ends.
-    #[serde(rename = "duration", skip_serializing_if = "Option::is_none")]
-    pub duration_s: Option<f64>,
+impl FieldValue for FailureKind {}
+
+fields! {
+    /// A failure and its time.
+    Failure, "failure" {
+        /// what fails: nothing, the torque drops to zero, or the lane preview stops and the ECU hands over
+        kind: FailureKind = FailureKind::None, "kind", "", "", OneOf(&["none", "torque", "input"]);
+        /// when, before the run ends; one second later the driver has `driver.manual_k_d_nm_per_rad`
+        time_s: f64 = DEFAULT_FAILURE_TIME_S, "time_s", "", "s", Between(0.0, 1e6);
+        /// for how long; without it until the run ends. A second after its end the driver relies on guidance again, and asks
+        /// for it anew where the ECU has handed over
+        duration_s: Option<f64> = None, "duration_s", "", "s", Between(STEP_S, 1e6);
+    }
 }
 
 impl Failure {
@@ -63,29 +65,16 @@ impl Failure {
     }
 }
 
-impl Default for Failure {
-    fn default() -> Self {
-        Self {
-            kind: FailureKind::None,
-            time_s: DEFAULT_FAILURE_TIME_S,
-            duration_s: None,
-        }
+fields! {
+    /// A driver who changes in mid-drive, before a failure is noticed.
+    DriverChange, "driver_change", complete {
+        /// when the driver changes, before the run ends
+        time_s: f64 = 0.0, "time_s", "", "s", Between(0.0, 1e6);
+        /// K_d from then on
+        k_d: f64 = 0.0, "k_d_nm_per_rad", "K_d", "N.m/rad", ArmGains::K_D;
+        /// K_hg from then on
+        k_hg: f64 = 0.0, "k_hg", "K_hg", "", ArmGains::K_HG;
     }
-}
-
-/// A driver who changes in mid-drive, before a failure is noticed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DriverChange {
-    /// When, s after the start.
-    #[serde(rename = "time")]
-    pub time_s: f64,
-    /// K_d from then on, N.m/rad.
-    #[serde(rename = "K_d", alias = "k_d")]
-    pub k_d: f64,
-    /// K_hg from then on.
-    #[serde(rename = "K_hg", alias = "k_hg")]
-    pub k_hg: f64,
 }
 
 impl DriverChange {

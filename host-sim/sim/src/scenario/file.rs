@@ -4,11 +4,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::guidance_file::GuidanceFile;
+use super::guidance_file::GuidanceInFile;
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Scenario, ScenarioBuilder, Sensors, Speed};
+use crate::fields::{Field, Fields, InFile, Range};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
-use crate::models::driver::{ArmGains, DriverParameters};
+use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::real::WorldParameters;
 use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
 use crate::models::tolerances::Tolerances;
@@ -35,52 +36,33 @@ pub(super) fn parse(
             built_in.own(name)?
         }
     };
-    let DriverFile {
-        a_1,
-        a_2,
-        a_3,
-        t_p,
-        t_n,
-        t_f,
-        t_nms,
-        k_nms,
-        k_d,
-        k_hg,
-        ..
-    } = file.driver;
+    let InFile((driver, arm)) = file.driver;
     let named = file.condition.gains();
     let gains = ArmGains {
-        k_d: k_d.unwrap_or(named.k_d),
-        k_hg: k_hg.unwrap_or(named.k_hg),
+        k_d: arm.k_d.unwrap_or(named.k_d),
+        k_hg: arm.k_hg.unwrap_or(named.k_hg),
+    };
+    let speed = match (file.speed, file.speed_m_per_s) {
+        (Some(changing), None) => changing,
+        (None, Some(constant)) => Speed::Constant(constant),
+        (None, None) => Speed::constant_kmh(DEFAULT_SPEED_KMH),
+        (Some(_), Some(_)) => return Err(InputError::new(name, "either speed_m_per_s or a table [speed]")),
     };
     Ok(Scenario::builder()
         .course(course)
-        .speed(file.speed)
+        .speed(speed)
         .condition(file.condition)
-        .driver(DriverParameters {
-            a_1,
-            a_2,
-            a_3,
-            t_p,
-            t_n,
-            t_f,
-            t_nms,
-            k_nms,
-            remnant_sd_nm: file.driver.remnant_sd,
-            remnant_corner_hz: file.driver.remnant_corner,
-            answers_hands_off_after_s: file.driver.answers_hands_off_after,
-            line_m: file.driver.line,
-        })
+        .driver(driver)
         .gains(gains)
-        .manual_k_d(file.driver.manual_k_d)
-        .vehicle(file.vehicle)
-        .guidance(file.guidance.0)
+        .manual_k_d(arm.manual_k_d)
+        .vehicle(file.vehicle.0)
+        .guidance(file.guidance.0.into())
         .sensors(file.sensors)
-        .failure(file.failure)
-        .driver_change(file.driver_change)
-        .world(file.world.unwrap_or_default())
-        .sensor_errors(file.sensor_errors.unwrap_or_default())
-        .tolerances(file.tolerances.unwrap_or_default())
+        .failure(file.failure.0)
+        .driver_change(file.driver_change.map(|change| change.0))
+        .world(file.world.unwrap_or_default().0)
+        .sensor_errors(file.sensor_errors.unwrap_or_default().0)
+        .tolerances(file.tolerances.unwrap_or_default().0)
         .seed(file.seed))
 }
 
@@ -91,7 +73,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         course,
         speed,
         manual: _,
-        driver: d,
+        driver,
         gains,
         manual_k_d,
         vehicle,
@@ -105,6 +87,15 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         seed,
     } = &scenario.values;
     let built_in = *course == Course::paper();
+    let constant = match speed {
+        Speed::Constant(m_per_s) => Some(*m_per_s),
+        _ => None,
+    };
+    let arm = ArmInFile {
+        k_d: Some(gains.k_d),
+        k_hg: Some(gains.k_hg),
+        manual_k_d: *manual_k_d,
+    };
     toml::to_string(&ScenarioFile {
         course: if built_in {
             CourseField::Named(PAPER_COURSE.into())
@@ -114,7 +105,8 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         road: None,
         lane: None,
         turn: Vec::new(),
-        speed: speed.clone(),
+        speed_m_per_s: constant,
+        speed: constant.is_none().then(|| speed.clone()),
         condition: match scenario.condition() {
             // The gains say the rest.
             Condition::Custom => Condition::Mid,
@@ -122,31 +114,64 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         },
         sensors: *sensors,
         seed: *seed,
-        driver: DriverFile {
-            a_1: d.a_1,
-            a_2: d.a_2,
-            a_3: d.a_3,
-            t_p: d.t_p,
-            t_n: d.t_n,
-            t_f: d.t_f,
-            t_nms: d.t_nms,
-            k_nms: d.k_nms,
-            k_d: Some(gains.k_d),
-            k_hg: Some(gains.k_hg),
-            manual_k_d: *manual_k_d,
-            remnant_sd: d.remnant_sd_nm,
-            remnant_corner: d.remnant_corner_hz,
-            answers_hands_off_after: d.answers_hands_off_after_s,
-            line: d.line_m,
-        },
-        vehicle: *vehicle,
-        guidance: GuidanceFile(*guidance),
-        failure: *failure,
-        driver_change: *driver_change,
-        world: (*world != WorldParameters::default()).then_some(*world),
-        sensor_errors: (*sensor_errors != SensorErrors::default()).then_some(*sensor_errors),
-        tolerances: (*tolerances != Tolerances::default()).then_some(*tolerances),
+        driver: InFile((*driver, arm)),
+        vehicle: InFile(*vehicle),
+        guidance: InFile((*guidance).into()),
+        failure: InFile(*failure),
+        driver_change: driver_change.map(InFile),
+        world: unless_default(*world),
+        sensor_errors: unless_default(*sensor_errors),
+        tolerances: unless_default(*tolerances),
     })
+}
+
+/// A table that says something.
+fn unless_default<T: Fields + PartialEq>(table: T) -> Option<InFile<T>> {
+    (table != T::default()).then_some(InFile(table))
+}
+
+/// The table `[driver]`.
+type DriverInFile = (DriverParameters, ArmInFile);
+
+/// How a list of fields is asked for.
+pub type FieldsOf = fn() -> Vec<&'static Field>;
+
+/// The lists of a scenario's tables, by the tables' names.
+pub const TABLES: [(&str, FieldsOf); 8] = [
+    (DriverInFile::TABLE, DriverInFile::fields),
+    (VehicleParameters::TABLE, VehicleParameters::fields),
+    (GuidanceInFile::TABLE, GuidanceInFile::fields),
+    (Failure::TABLE, Failure::fields),
+    (DriverChange::TABLE, DriverChange::fields),
+    (WorldParameters::TABLE, WorldParameters::fields),
+    (SensorErrors::TABLE, SensorErrors::fields),
+    (Tolerances::TABLE, Tolerances::fields),
+];
+
+/// The fields of a table; none of what is no list.
+pub fn fields_of(table: &str) -> Vec<&'static Field> {
+    let found = TABLES.iter().find(|(name, _)| *name == table);
+    found.map_or_else(Vec::new, |(_, fields)| fields())
+}
+
+/// The unit of a field by its path, such as `driver.t_p_s` or `course.segment.1.length`; empty for a number without one, none of
+/// what is no number.
+pub fn unit_of(path: &str) -> Option<&'static str> {
+    match path.split('.').collect::<Vec<_>>()[..] {
+        ["speed_m_per_s"] => Some("m/s"),
+        ["course", "lane_width"] | ["course", "segment", _, "length"] => Some("m"),
+        ["course", "segment", _, field] => match field.split('_').next()? {
+            "curvature" => Some("1/m"),
+            "bank" => Some("rad"),
+            "grade" => Some(""),
+            _ => None,
+        },
+        [table, name] => {
+            let field = fields_of(table).into_iter().find(|field| field.name == name)?;
+            matches!(field.range, Range::Between(..)).then_some(field.unit)
+        }
+        _ => None,
+    }
 }
 
 /// A course by its name, or the course itself.
@@ -258,21 +283,22 @@ struct ScenarioFile {
     lane: Option<i32>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     turn: Vec<String>,
-    speed: Speed,
+    speed_m_per_s: Option<f64>,
+    speed: Option<Speed>,
     condition: Condition,
     sensors: Sensors,
     seed: u64,
-    driver: DriverFile,
-    vehicle: VehicleParameters,
-    guidance: GuidanceFile,
-    failure: Failure,
-    driver_change: Option<DriverChange>,
+    driver: InFile<DriverInFile>,
+    vehicle: InFile<VehicleParameters>,
+    guidance: InFile<GuidanceInFile>,
+    failure: InFile<Failure>,
+    driver_change: Option<InFile<DriverChange>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    world: Option<WorldParameters>,
+    world: Option<InFile<WorldParameters>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    sensor_errors: Option<SensorErrors>,
+    sensor_errors: Option<InFile<SensorErrors>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    tolerances: Option<Tolerances>,
+    tolerances: Option<InFile<Tolerances>>,
 }
 
 impl Default for ScenarioFile {
@@ -282,81 +308,19 @@ impl Default for ScenarioFile {
             road: None,
             lane: None,
             turn: Vec::new(),
-            speed: Speed::Constant(DEFAULT_SPEED_KMH),
+            speed_m_per_s: None,
+            speed: None,
             condition: Condition::Mid,
             sensors: Sensors::default(),
             seed: 1,
-            driver: DriverFile::default(),
-            vehicle: VehicleParameters::default(),
-            guidance: GuidanceFile::default(),
-            failure: Failure::default(),
+            driver: InFile::default(),
+            vehicle: InFile::default(),
+            guidance: InFile::default(),
+            failure: InFile::default(),
             driver_change: None,
             world: None,
             sensor_errors: None,
             tolerances: None,
-        }
-    }
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(default, deny_unknown_fields)]
-struct DriverFile {
-    #[serde(alias = "a1")]
-    a_1: f64,
-    #[serde(alias = "a2")]
-    a_2: f64,
-    #[serde(alias = "a3")]
-    a_3: f64,
-    t_p: f64,
-    t_n: f64,
-    t_f: f64,
-    t_nms: f64,
-    #[serde(rename = "K_nms", alias = "k_nms")]
-    k_nms: f64,
-    #[serde(rename = "K_d", alias = "k_d")]
-    k_d: Option<f64>,
-    #[serde(rename = "K_hg", alias = "k_hg")]
-    k_hg: Option<f64>,
-    #[serde(rename = "manual_K_d", alias = "manual_k_d")]
-    manual_k_d: f64,
-    remnant_sd: f64,
-    remnant_corner: f64,
-    answers_hands_off_after: f64,
-    line: f64,
-}
-
-impl Default for DriverFile {
-    fn default() -> Self {
-        let DriverParameters {
-            a_1,
-            a_2,
-            a_3,
-            t_p,
-            t_n,
-            t_f,
-            t_nms,
-            k_nms,
-            remnant_sd_nm,
-            remnant_corner_hz,
-            answers_hands_off_after_s,
-            line_m,
-        } = DriverParameters::default();
-        Self {
-            a_1,
-            a_2,
-            a_3,
-            t_p,
-            t_n,
-            t_f,
-            t_nms,
-            k_nms,
-            k_d: None,
-            k_hg: None,
-            manual_k_d: ArmGains::MANUAL.k_d,
-            remnant_sd: remnant_sd_nm,
-            remnant_corner: remnant_corner_hz,
-            answers_hands_off_after: answers_hands_off_after_s,
-            line: line_m,
         }
     }
 }

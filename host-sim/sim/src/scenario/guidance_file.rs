@@ -1,30 +1,28 @@
 //! The table `guidance` of a scenario file: the controller's parameters by their names in the one list of
-//! [`haptic_core::controller::params`], and beside them the camera's look-ahead and the host's request for a probe.
+//! [`haptic_core::controller::params`], with their units, and beside them the camera's look-ahead and the host's request for a probe.
 //!
 //! A new parameter of the controller is a field here by itself. Not here: ranges, which the scenario checks.
 
-use std::fmt;
+use std::sync::LazyLock;
 
-use haptic_core::controller::params::{PARAMETERS, ParamError, Params};
-use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use haptic_core::controller::params::{PARAMETERS, ParamError, Parameter, Params};
+use serde::de::MapAccess;
+use serde::ser::SerializeMap;
 
 use super::GuidanceParameters;
+use crate::fields::{Field, Fields, Range, fields, suffix};
 use crate::input::RangeError;
 
 /// What the controller takes for granted, whatever the driver is; the vehicle's group follows from `[vehicle]`.
 const NOT_IN_THE_FILE: [&str; 2] = ["t_nms_s", "k_nms"];
 
-/// Names of the file that differ from the list's: the paper writes K_1.
-const OWN_NAMES: [(&str, &str); 1] = [("k_1", "K_1")];
-
-/// Other names that are still read.
-const OLD_NAMES: [(&str, &str); 5] = [
-    ("a_1", "a1"),
-    ("a_2", "a2"),
-    ("a_3", "a3"),
-    ("a_4", "a4"),
-    ("least_speed_m_per_s", "least_speed_mps"),
+/// The paper's symbols of the controller's parameters.
+const SYMBOLS: [(&str, &str); 5] = [
+    ("k_1", "K_1"),
+    ("a_1", "a'_1"),
+    ("a_2", "a'_2"),
+    ("a_3", "a'_3"),
+    ("a_4", "a'_4"),
 ];
 
 /// What is refused where the controller's parameter follows from several fields: name in the controller, formula.
@@ -42,147 +40,135 @@ const FORMULAS: [(&str, &str); 7] = [
         "vehicle.aligning_gain_nm_s2_per_m",
         "vehicle: the aligning torque per lateral acceleration m*l_r*E_t*K_t/(l_f + l_r)/(1 + 2*E_t*K_f/K_s)",
     ),
-    ("vehicle.column_damping_nm_s", "vehicle.B_s"),
-    ("vehicle.far_time_s", "guidance.t_f"),
-    ("vehicle.near_time_s", "guidance.t_n"),
+    ("vehicle.column_damping_nm_s", "vehicle.b_s_nms_per_rad"),
+    ("vehicle.far_time_s", "guidance.t_f_s"),
+    ("vehicle.near_time_s", "guidance.t_n_s"),
 ];
 
-/// A field of the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Field {
-    /// By its place in [`PARAMETERS`].
-    Parameter(usize),
-    NearTime,
-    FarTime,
-    Probe,
-}
-
-impl Field {
-    fn all() -> impl Iterator<Item = Self> {
-        let is_here = |i: &usize| {
-            let name = PARAMETERS[*i].name;
-            !NOT_IN_THE_FILE.contains(&name) && !name.contains('.')
+/// The controller's parameters that a file may set, by their places in [`PARAMETERS`].
+static LISTED: LazyLock<Vec<(usize, Field)>> = LazyLock::new(|| {
+    let here =
+        |parameter: &Parameter| !NOT_IN_THE_FILE.contains(&parameter.name) && !parameter.name.contains('.');
+    let listed = PARAMETERS
+        .iter()
+        .enumerate()
+        .filter(|(_, parameter)| here(parameter));
+    let field = |(place, parameter): (usize, &'static Parameter)| {
+        let symbol = SYMBOLS.iter().find(|(name, _)| *name == parameter.name);
+        let field = Field {
+            name: name_in_file(parameter).leak(),
+            symbol: symbol.map_or("", |(_, symbol)| symbol),
+            unit: unit_in_file(parameter.unit),
+            range: Range::Between(parameter.min, parameter.max),
+            default: Some(parameter.default),
+            meaning: parameter.meaning.trim(),
         };
-        let parameters = (0..PARAMETERS.len()).filter(is_here).map(Self::Parameter);
-        parameters.chain([Self::NearTime, Self::FarTime, Self::Probe])
-    }
+        (place, field)
+    };
+    listed.map(field).collect()
+});
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Parameter(i) => name_in_file(PARAMETERS[i].name),
-            Self::NearTime => "t_n",
-            Self::FarTime => "t_f",
-            Self::Probe => "probe",
-        }
+/// A parameter's name with its unit.
+fn name_in_file(parameter: &Parameter) -> String {
+    let unit = suffix(unit_in_file(parameter.unit));
+    if parameter.name.ends_with(&unit) {
+        return parameter.name.into();
     }
-
-    fn is_called(self, name: &str) -> bool {
-        let old = |i: usize| OLD_NAMES.contains(&(PARAMETERS[i].name, name)) || PARAMETERS[i].name == name;
-        self.name() == name || matches!(self, Self::Parameter(i) if old(i))
-    }
+    format!("{}_{unit}", parameter.name)
 }
 
-fn name_in_file(name: &'static str) -> &'static str {
-    let own = OWN_NAMES.iter().find(|(listed, _)| *listed == name);
-    own.map_or(name, |(_, own)| own)
+fn unit_in_file(unit: &'static str) -> &'static str {
+    if unit == "1" { "" } else { unit }
 }
 
 /// A refusal by the controller's parameters: the file's field or formula, its value and its range.
 pub(super) fn in_words_of_the_file(error: &ParamError) -> RangeError {
     let formula = FORMULAS.iter().find(|(name, _)| *name == error.name);
-    let field = match (formula, error.name.strip_prefix("k_1 * ")) {
+    let named = |name: &str| {
+        let parameter = PARAMETERS.iter().find(|parameter| parameter.name == name);
+        parameter.map_or(name.into(), name_in_file)
+    };
+    let field = match (formula, error.name.split_once(" * ")) {
         (Some((_, formula)), _) => (*formula).into(),
-        (None, Some(gain)) => format!("guidance: K_1*{gain}"),
+        (None, Some((one, other))) => format!("guidance: {}*{}", named(one), named(other)),
         (None, None) if error.name.contains(' ') => format!("guidance: {}", error.name),
-        (None, None) => format!("guidance.{}", name_in_file(error.name)),
+        (None, None) => format!("guidance.{}", named(error.name)),
     };
     RangeError {
         field,
         value: error.value,
         min: error.min,
         max: error.max,
-        unit: if error.unit == "1" { "" } else { error.unit },
+        unit: unit_in_file(error.unit),
     }
 }
 
-/// The table; a field that is not there has its default.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct GuidanceFile(pub(super) GuidanceParameters);
+/// The controller in the table.
+#[derive(Debug, Default)]
+pub(super) struct ControllerInFile(Params);
 
-impl Serialize for GuidanceFile {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let values = self.0.controller.to_values();
-        let mut map = serializer.serialize_map(None)?;
-        for field in Field::all() {
-            match field {
-                Field::Parameter(i) => map.serialize_entry(field.name(), &values[i])?,
-                Field::NearTime => map.serialize_entry(field.name(), &self.0.t_n)?,
-                Field::FarTime => map.serialize_entry(field.name(), &self.0.t_f)?,
-                Field::Probe => map.serialize_entry(field.name(), &self.0.probe)?,
-            }
+impl Fields for ControllerInFile {
+    const TABLE: &'static str = "guidance";
+
+    fn fields() -> Vec<&'static Field> {
+        LISTED.iter().map(|(_, field)| field).collect()
+    }
+
+    fn numbers(&self) -> Vec<Option<f64>> {
+        let values = self.0.to_values();
+        LISTED.iter().map(|(place, _)| Some(values[*place])).collect()
+    }
+
+    fn read<'de, A: MapAccess<'de>>(&mut self, name: &str, map: &mut A) -> Result<bool, A::Error> {
+        let Some((place, _)) = LISTED.iter().find(|(_, field)| field.name == name) else {
+            return Ok(false);
+        };
+        let mut values = self.0.to_values();
+        values[*place] = map.next_value()?;
+        self.0 = Params::from_values(&values);
+        Ok(true)
+    }
+
+    fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        let mut numbers = Self::fields().into_iter().zip(self.numbers());
+        numbers.try_for_each(|(field, number)| map.serialize_entry(field.name, &number))
+    }
+}
+
+fields! {
+    /// What is beside the controller in the table.
+    CameraInFile, "guidance" {
+        /// look-ahead time of the camera's near point
+        t_n: f64 = 0.3, "t_n_s", "t'_n", "s", Between(0.0, 5.0);
+        /// look-ahead time of its far point; the controller's plausibility checks divide by it
+        t_f: f64 = 0.7, "t_f_s", "t'_f", "s", Between(0.1, 3.0);
+        /// whether the host asks for the probe that reads K_hg
+        probe: bool = false, "probe", "", "", Flag;
+    }
+}
+
+/// The table.
+pub(super) type GuidanceInFile = (ControllerInFile, CameraInFile);
+
+impl From<GuidanceInFile> for GuidanceParameters {
+    fn from((ControllerInFile(controller), CameraInFile { t_n, t_f, probe }): GuidanceInFile) -> Self {
+        Self {
+            controller,
+            t_n,
+            t_f,
+            probe,
         }
-        map.end()
     }
 }
 
-impl<'de> Deserialize<'de> for GuidanceFile {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(Fields)
-    }
-}
-
-struct Fields;
-
-impl<'de> Visitor<'de> for Fields {
-    type Value = GuidanceFile;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a table of guidance parameters")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<GuidanceFile, A::Error> {
-        let mut guidance = GuidanceParameters::default();
-        let mut values = guidance.controller.to_values();
-        let mut seen = Vec::new();
-        while let Some(field) = map.next_key::<Field>()? {
-            if seen.contains(&field) {
-                return Err(de::Error::duplicate_field(field.name()));
-            }
-            seen.push(field);
-            match field {
-                Field::Parameter(i) => values[i] = map.next_value()?,
-                Field::NearTime => guidance.t_n = map.next_value()?,
-                Field::FarTime => guidance.t_f = map.next_value()?,
-                Field::Probe => guidance.probe = map.next_value()?,
-            }
-        }
-        guidance.controller = Params::from_values(&values);
-        Ok(GuidanceFile(guidance))
-    }
-}
-
-impl<'de> Deserialize<'de> for Field {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Name;
-
-        impl Visitor<'_> for Name {
-            type Value = Field;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a field")
-            }
-
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Field, E> {
-                Field::all().find(|field| field.is_called(name)).ok_or_else(|| {
-                    let names: Vec<_> = Field::all().map(|field| format!("`{}`", field.name())).collect();
-                    E::custom(format!(
-                        "unknown field `{name}`, expected one of {}",
-                        names.join(", ")
-                    ))
-                })
-            }
-        }
-
-        deserializer.deserialize_identifier(Name)
+impl From<GuidanceParameters> for GuidanceInFile {
+    fn from(guidance: GuidanceParameters) -> Self {
+        let GuidanceParameters {
+            controller,
+            t_n,
+            t_f,
+            probe,
+        } = guidance;
+        (ControllerInFile(controller), CameraInFile { t_n, t_f, probe })
     }
 }

@@ -1,6 +1,6 @@
 //! A scenario: everything that decides a run, from a TOML file in which every field has a default.
 //!
-//! Fields bear the paper's symbols; defaults are tables 7 to 9. Terms: *condition*, how much the driver relies
+//! Fields bear the paper's symbols and their units ([`crate::fields`]); defaults are tables 7 to 9. Terms: *condition*, how much the driver relies
 //! on the guidance (section 5.1): a name for a pair of arm gains, or manual driving. *Failure*: the guidance
 //! torque drops to zero, or its lane preview stops; the driver keeps the gains for one more second and then
 //! drives as manually.
@@ -21,7 +21,8 @@ use haptic_core::controller::params::Params;
 pub use builder::{ScenarioBuilder, ScenarioError};
 pub use condition::{Condition, Sensors};
 pub use failure::{DEFAULT_FAILURE_TIME_S, DriverChange, FAILURE_REACTION_S, Failure, FailureKind};
-pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_KMH, SPEED_KMH, Speed, SpeedProfile};
+pub use file::{FieldsOf, TABLES, fields_of, unit_of};
+pub use speed::{ACCELERATION_M_PER_S2, CHANGING_SPEED_M_PER_S, SPEED_M_PER_S, Speed, SpeedProfile};
 pub use values::{GuidanceParameters, ScenarioValues};
 
 use crate::input::{InputError, in_range};
@@ -32,6 +33,9 @@ use crate::models::road::{Course, LaneChoice};
 use crate::models::tolerances::{Car, Tolerances};
 use crate::models::vehicle::VehicleParameters;
 use crate::seeds::Stream;
+
+/// Speeds that a person asks a command for, km/h.
+pub const SPEED_KMH: std::ops::RangeInclusive<f64> = 20.0..=250.0;
 
 /// Speed of the paper's experiment and evaluation, km/h.
 pub const DEFAULT_SPEED_KMH: f64 = 60.0;
@@ -62,7 +66,7 @@ impl Default for Scenario {
         Self {
             values: ScenarioValues::default(),
             setup: Setup::PAPER,
-            speed: SpeedProfile::constant(DEFAULT_SPEED_KMH),
+            speed: SpeedProfile::constant(DEFAULT_SPEED_KMH / 3.6),
         }
     }
 }
@@ -114,8 +118,8 @@ impl Scenario {
     pub fn check_times(&self) -> Result<(), ScenarioError> {
         let change_s = self.values.driver_change.map(|change| change.time_s);
         let times = [
-            ("failure.time", self.failure().at_s()),
-            ("driver_change.time", change_s),
+            ("failure.time_s", self.failure().at_s()),
+            ("driver_change.time_s", change_s),
         ];
         for (field, time_s) in times {
             if let Some(time_s) = time_s {

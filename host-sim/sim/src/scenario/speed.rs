@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::ScenarioError;
 use crate::input::in_range;
 
-/// Speeds that a scenario may have all the time, km/h. The controller guides from 5 m/s on.
-pub const SPEED_KMH: RangeInclusive<f64> = 20.0..=250.0;
-/// Speeds that one may go through, km/h: below what is guided, and no standstill, whose equations are others.
-pub const CHANGING_SPEED_KMH: RangeInclusive<f64> = 10.0..=250.0;
+/// Speeds that a scenario may have all the time, m/s: 20 to 250 km/h and a little more. The controller guides from 5 m/s on.
+pub const SPEED_M_PER_S: RangeInclusive<f64> = 5.5..=70.0;
+/// Speeds that one may go through, m/s: below what is guided, and no standstill, whose equations are others.
+pub const CHANGING_SPEED_M_PER_S: RangeInclusive<f64> = 2.5..=70.0;
 /// Accelerations between two points, m/s2: full braking on a dry road, and more than most cars can accelerate.
 pub const ACCELERATION_M_PER_S2: RangeInclusive<f64> = -8.0..=5.0;
 /// Where the points of a profile may lie.
@@ -27,60 +27,86 @@ const PLACES_M: RangeInclusive<f64> = 0.0..=1e6;
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "expected a number, the speed in km/h, or a table [speed] with either `time` (s) or `place` (m) and \
-                 `kmh`, each a list of numbers"
+    expecting = "expected a table [speed] with either `time_s` or `place_m` and `speed_m_per_s`, each a list of numbers"
 )]
 pub enum Speed {
-    /// The same all the time, km/h.
+    /// The same all the time, m/s. In a file it is a number at the top.
+    #[serde(skip)]
     Constant(f64),
     /// Through points by time.
     ByTime {
         /// Seconds since the start.
-        time: Vec<f64>,
-        /// Speeds there, km/h.
-        kmh: Vec<f64>,
+        time_s: Vec<f64>,
+        /// Speeds there.
+        speed_m_per_s: Vec<f64>,
     },
     /// Through points by place.
     ByPlace {
-        /// Arc length along the centreline, m.
-        place: Vec<f64>,
-        /// Speeds there, km/h.
-        kmh: Vec<f64>,
+        /// Arc length along the centreline.
+        place_m: Vec<f64>,
+        /// Speeds there.
+        speed_m_per_s: Vec<f64>,
     },
 }
 
+/// A speed in km/h, for people to read: the number of km/h that it was made of, if it was.
+fn kmh(m_per_s: f64) -> f64 {
+    (3.6e9 * m_per_s).round() / 1e9
+}
+
 impl Speed {
+    /// The same all the time.
+    pub fn constant_kmh(kmh: f64) -> Self {
+        Self::Constant(kmh / 3.6)
+    }
+
+    /// Through speeds (km/h) by time (s).
+    pub fn by_time_kmh(time_s: Vec<f64>, kmh: &[f64]) -> Self {
+        let speed_m_per_s = kmh.iter().map(|kmh| kmh / 3.6).collect();
+        Self::ByTime {
+            time_s,
+            speed_m_per_s,
+        }
+    }
+
     /// What it is at the start, km/h.
     pub fn start_kmh(&self) -> f64 {
-        match self {
-            Self::Constant(kmh) => *kmh,
-            Self::ByTime { kmh, .. } | Self::ByPlace { kmh, .. } => kmh.first().copied().unwrap_or(f64::NAN),
-        }
+        let points = match self {
+            Self::Constant(m_per_s) => return kmh(*m_per_s),
+            Self::ByTime { speed_m_per_s, .. } | Self::ByPlace { speed_m_per_s, .. } => speed_m_per_s,
+        };
+        points.first().map_or(f64::NAN, |first| kmh(*first))
     }
 
     /// Checks everything.
     pub(super) fn profile(&self) -> Result<SpeedProfile, ScenarioError> {
         match self {
-            Self::Constant(kmh) => {
-                in_range("speed", *kmh, SPEED_KMH, "km/h")?;
-                Ok(SpeedProfile::constant(*kmh))
+            Self::Constant(m_per_s) => {
+                in_range("speed_m_per_s", *m_per_s, SPEED_M_PER_S, "m/s")?;
+                Ok(SpeedProfile::constant(*m_per_s))
             }
-            Self::ByTime { time, kmh } => SpeedProfile::through(Axis::Time, time, kmh),
-            Self::ByPlace { place, kmh } => SpeedProfile::through(Axis::Place, place, kmh),
+            Self::ByTime {
+                time_s,
+                speed_m_per_s,
+            } => SpeedProfile::through(Axis::Time, time_s, speed_m_per_s),
+            Self::ByPlace {
+                place_m,
+                speed_m_per_s,
+            } => SpeedProfile::through(Axis::Place, place_m, speed_m_per_s),
         }
     }
 }
 
 impl fmt::Display for Speed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (kmh, by) = match self {
-            Self::Constant(kmh) => return write!(f, "{kmh} km/h"),
-            Self::ByTime { kmh, .. } => (kmh, "time"),
-            Self::ByPlace { kmh, .. } => (kmh, "place"),
+        let (points, by) = match self {
+            Self::Constant(m_per_s) => return write!(f, "{} km/h", kmh(*m_per_s)),
+            Self::ByTime { speed_m_per_s, .. } => (speed_m_per_s, "time"),
+            Self::ByPlace { speed_m_per_s, .. } => (speed_m_per_s, "place"),
         };
-        let least = kmh.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = kmh.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        write!(f, "{least} to {most} km/h by {by}")
+        let least = points.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        write!(f, "{} to {} km/h by {by}", kmh(least), kmh(most))
     }
 }
 
@@ -109,49 +135,49 @@ pub struct SpeedProfile {
 }
 
 impl SpeedProfile {
-    pub(super) fn constant(kmh: f64) -> Self {
+    pub(super) fn constant(v_m_per_s: f64) -> Self {
         Self {
             axis: Axis::Time,
             points: vec![Point {
                 time_s: 0.0,
                 place_m: 0.0,
-                v_m_per_s: kmh / 3.6,
+                v_m_per_s,
                 acceleration_m_per_s2: 0.0,
             }],
         }
     }
 
-    fn through(axis: Axis, at: &[f64], kmh: &[f64]) -> Result<Self, ScenarioError> {
+    fn through(axis: Axis, at: &[f64], speeds: &[f64]) -> Result<Self, ScenarioError> {
         let (field, unit, range) = match axis {
-            Axis::Time => ("speed.time", "s", TIMES_S),
-            Axis::Place => ("speed.place", "m", PLACES_M),
+            Axis::Time => ("speed.time_s", "s", TIMES_S),
+            Axis::Place => ("speed.place_m", "m", PLACES_M),
         };
         let refused = |message: String| Err(ScenarioError::Speed(message));
-        if at.len() != kmh.len() {
+        if at.len() != speeds.len() {
             return refused(format!(
-                "{field} has {} and speed.kmh {} values: each point takes one of both",
+                "{field} has {} and speed.speed_m_per_s {} values: each point takes one of both",
                 at.len(),
-                kmh.len()
+                speeds.len()
             ));
         }
         if at.len() < 2 {
             return refused(format!(
-                "{field}: a speed that changes takes two points at least, not {}; one that does not is `speed = 60`",
+                "{field}: a speed that changes takes two points at least, not {}; one that does not is `speed_m_per_s = 20`",
                 at.len()
             ));
         }
-        let mut profile = Self::constant(kmh[0]);
+        let mut profile = Self::constant(speeds[0]);
         profile.axis = axis;
-        for (i, (at, kmh)) in at.iter().zip(kmh).enumerate() {
+        for (i, (at, v)) in at.iter().zip(speeds).enumerate() {
             let number = i + 1;
             in_range(&format!("{field} (point {number})"), *at, range.clone(), unit)?;
             in_range(
-                &format!("speed.kmh (point {number})"),
-                *kmh,
-                CHANGING_SPEED_KMH,
-                "km/h",
+                &format!("speed.speed_m_per_s (point {number})"),
+                *v,
+                CHANGING_SPEED_M_PER_S,
+                "m/s",
             )?;
-            profile.go_on(number, *at, kmh / 3.6, (field, unit))?;
+            profile.go_on(number, *at, *v, (field, unit))?;
         }
         Ok(profile)
     }

@@ -35,13 +35,13 @@ fn an_empty_file_is_tables_4_8_and_9() {
 #[test]
 fn every_field_can_be_set() {
     let s = parse(
-        "course = 'paper-course'\nspeed = 80\ncondition = 'high'\nsensors = 'exact'\nseed = 9\n\
-         [driver]\nt_p = 0.3\nK_hg = 0.25\nremnant_sd = 0.1\n[vehicle]\nm = 1500\nI = 3000\n\
-         [guidance]\nK_1 = 0.5\na2 = 0.1\nt_f = 0.8\ntorque_limit_nm = 3\n\
-         [failure]\nkind = 'torque'\ntime = 50",
+        "course = 'paper-course'\nspeed_m_per_s = 20\ncondition = 'high'\nsensors = 'exact'\nseed = 9\n\
+         [driver]\nt_p_s = 0.3\nk_hg = 0.25\nremnant_sd_nm = 0.1\n[vehicle]\nm_kg = 1500\ni_kg_m2 = 3000\n\
+         [guidance]\nk_1_nm = 0.5\na_2_s_per_m = 0.1\nt_f_s = 0.8\ntorque_limit_nm = 3\n\
+         [failure]\nkind = 'torque'\ntime_s = 50",
     )
     .unwrap();
-    assert_eq!((s.speed_kmh(), s.sensors(), s.seed()), (80.0, Sensors::Exact, 9));
+    assert_eq!((s.speed_kmh(), s.sensors(), s.seed()), (72.0, Sensors::Exact, 9));
     assert_eq!((s.driver().t_p, s.driver().remnant_sd_nm), (0.3, 0.1));
     assert_eq!(
         (s.gains().k_d, s.gains().k_hg, s.condition()),
@@ -62,7 +62,9 @@ fn every_field_can_be_set() {
         ArmGains { k_d: 4.0, k_hg: 1.0 }
     );
     assert_eq!(
-        parse("[driver]\nK_d = 2\nK_hg = 0").unwrap().condition(),
+        parse("[driver]\nk_d_nm_per_rad = 2\nk_hg = 0")
+            .unwrap()
+            .condition(),
         Condition::High
     );
 }
@@ -87,10 +89,69 @@ fn a_file_of_another_kind_is_named() {
             "this is a course: a scenario names it",
         ),
         (
-            "[[law]]\nkind = 'fdca'\n[scenario]\nspeed = 60",
+            "[[law]]\nkind = 'fdca'\n[scenario]\nspeed_m_per_s = 16",
             "this is a comparison of laws, for `host-sim compare`",
         ),
     ]);
+}
+
+/// The name, and the number in the unit of today where that was another.
+#[test]
+fn an_old_name_is_refused_with_the_new_one_and_its_unit() {
+    each_is_refused(&[
+        (
+            "speed = 72",
+            "s.toml: speed is called speed_m_per_s: 72 km/h are 20",
+        ),
+        (
+            "[speed]\ntime = [0, 9]\nkmh = [60, 60]",
+            "speed.kmh is called speed_m_per_s: 1 km/h is 0.27777",
+        ),
+        ("driver.t_p = 0.3", "driver.t_p is called t_p_s"),
+        (
+            "[driver]\nmanual_K_d = 4",
+            "driver.manual_K_d is called manual_k_d_nm_per_rad",
+        ),
+        ("[driver]\na_1 = 0.1", "driver.a_1 is called a_1_rad_per_m"),
+        ("[guidance]\na_1 = 2", "guidance.a_1 is called a_1_per_m"),
+        ("[vehicle]\nI = 3000", "vehicle.I is called i_kg_m2"),
+        ("[vehicle]\nK_t = 0.06", "vehicle.K_t is called k_t"),
+        (
+            "[world]\nfriction_give = 1",
+            "world.friction_give is called friction_give_rad: 1 deg are 0.0174532925",
+        ),
+        (
+            "[sensor_errors]\ncamera_yaw = 2",
+            "sensor_errors.camera_yaw is called camera_yaw_rad: 2 mrad are 0.002",
+        ),
+        (
+            "[sensor_errors]\ndropouts = 720",
+            "sensor_errors.dropouts is called dropout_rate_per_s: 720 1/h are 0.2",
+        ),
+        (
+            "[sensor_errors]\ndropout = 1",
+            "sensor_errors.dropout is called dropout_duration_s",
+        ),
+        (
+            "[failure]\nkind = 'torque'\ntime = 40",
+            "failure.time is called time_s",
+        ),
+    ]);
+}
+
+/// One rule for every name: the paper's symbol in small letters or words, and behind it the unit.
+#[test]
+fn every_name_ends_with_its_unit_and_begins_with_its_symbol() {
+    let mut count = 0;
+    for field in TABLES.iter().flat_map(|(_, fields)| fields()) {
+        let unit = crate::fields::suffix(field.unit);
+        assert!(field.name.ends_with(&unit), "{field:?}");
+        let symbol = field.symbol.replace('\'', "").to_lowercase();
+        assert!(field.name.starts_with(&symbol), "{field:?}");
+        assert_eq!(field.name, field.name.to_lowercase());
+        count += 1;
+    }
+    assert!(count > 90, "{count}");
 }
 
 #[test]
@@ -101,59 +162,65 @@ fn every_bad_field_is_named_with_its_value_and_range() {
         ("[guidance]\nt_x = 3", "t_x"),
         ("[failure]\nwhen = 3", "when"),
         ("[vehicle]\nmass = 3", "mass"),
-        ("speed = 0", "speed = 0 km/h is outside 20 to 250 km/h"),
-        ("speed = nan", "speed = NaN"),
-        ("speed = 'fast'", "line 1"),
-        ("speed = 'fast'", "expected a number"),
+        (
+            "speed_m_per_s = 0",
+            "speed_m_per_s = 0 m/s is outside 5.5 to 70 m/s",
+        ),
+        ("speed_m_per_s = nan", "speed_m_per_s = NaN"),
+        ("speed_m_per_s = 'fast'", "line 1"),
+        ("speed_m_per_s = 'fast'", "expected a number"),
         ("seed = -1", "expected a whole number, 0 or more"),
         ("condition = 'custom'", "custom"),
         ("sensors = 'perfect'", "perfect"),
         ("[failure]\nkind = 'brakes'", "brakes"),
-        ("[driver]\nt_p = 0", "driver.t_p = 0 s is outside 0.001 to 2 s"),
         (
-            "[driver]\nK_d = -1",
-            "driver.K_d = -1 N.m/rad is outside 0 to 50 N.m/rad",
-        ),
-        ("[driver]\nremnant_sd = -1", "driver.remnant_sd = -1"),
-        ("[vehicle]\nm = 0", "vehicle.m = 0 kg"),
-        (
-            "[guidance]\nK_1 = 50",
-            "guidance.K_1 = 50 N.m is outside 0 to 4 N.m",
+            "[driver]\nt_p_s = 0",
+            "driver.t_p_s = 0 s is outside 0.001 to 2 s",
         ),
         (
-            "[guidance]\na3 = 1e3",
-            "guidance.a_3 = 1000 1/rad is outside 0 to 100 1/rad",
+            "[driver]\nk_d_nm_per_rad = -1",
+            "driver.k_d_nm_per_rad = -1 N.m/rad is outside 0 to 50 N.m/rad",
+        ),
+        ("[driver]\nremnant_sd_nm = -1", "driver.remnant_sd_nm = -1"),
+        ("[vehicle]\nm_kg = 0", "vehicle.m_kg = 0 kg"),
+        (
+            "[guidance]\nk_1_nm = 50",
+            "guidance.k_1_nm = 50 N.m is outside 0 to 4 N.m",
         ),
         (
-            "[guidance]\na4 = -1",
-            "guidance.a_4 = -1 s/rad is outside 0 to 100 s/rad",
+            "[guidance]\na_3_per_rad = 1e3",
+            "guidance.a_3_per_rad = 1000 1/rad is outside 0 to 100 1/rad",
         ),
         (
-            "[guidance]\nK_1 = 4\na1 = 9",
-            "guidance: K_1*a_1 = 36 N.m/m is outside 0 to 32 N.m/m",
+            "[guidance]\na_4_s_per_rad = -1",
+            "guidance.a_4_s_per_rad = -1 s/rad is outside 0 to 100 s/rad",
         ),
         (
-            "[guidance]\nt_f = 0.05",
-            "guidance.t_f = 0.05 s is outside 0.1 to 3 s",
+            "[guidance]\nk_1_nm = 4\na_1_per_m = 9",
+            "guidance: k_1_nm*a_1_per_m = 36 N.m/m is outside 0 to 32 N.m/m",
         ),
         (
-            "[vehicle]\nK_t = 0.2\nl_f = 0.1\nl_r = 0.1",
+            "[guidance]\nt_f_s = 0.05",
+            "guidance.t_f_s = 0.05 s is outside 0.1 to 3 s",
+        ),
+        (
+            "[vehicle]\nk_t = 0.2\nl_f_m = 0.1\nl_r_m = 0.1",
             "vehicle: K_t/(l_f + l_r) = 1 1/m is outside 0.001 to 0.1 1/m",
         ),
-        ("[guidance]\nt_n = -0.1", "guidance.t_n = -0.1"),
-        ("[failure]\ntime = -3", "failure.time = -3"),
-        ("[driver_change]\ntime = 3\nK_d = 2", "K_hg"),
+        ("[guidance]\nt_n_s = -0.1", "guidance.t_n_s = -0.1"),
+        ("[failure]\ntime_s = -3", "failure.time_s = -3"),
+        ("[driver_change]\ntime_s = 3\nk_d_nm_per_rad = 2", "k_hg"),
         (
-            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = -1",
-            "driver_change.K_hg = -1",
+            "[driver_change]\ntime_s = 3\nk_d_nm_per_rad = 2\nk_hg = -1",
+            "driver_change.k_hg = -1",
         ),
         (
             "[guidance]\nprobe_amplitude_nm = 0.31",
             "guidance.probe_amplitude_nm = 0.31",
         ),
         (
-            "[driver]\nt_f = 5\n[guidance]\nt_f = 5.5",
-            "guidance.t_f = 5.5 s is outside 0.1 to 3 s",
+            "[driver]\nt_f_s = 5\n[guidance]\nt_f_s = 5.5",
+            "guidance.t_f_s = 5.5 s is outside 0.1 to 3 s",
         ),
     ];
     each_is_refused(&cases);
@@ -172,11 +239,11 @@ fn a_manual_driver_has_nothing_that_needs_guidance() {
     for (text, expected) in [
         ("[failure]\nkind = 'torque'", "failure.kind = \"torque\""),
         ("[failure]\nkind = 'input'", "failure.kind = \"input\""),
-        ("[driver]\nK_hg = 0.5", "driver.K_hg = 0.5"),
+        ("[driver]\nk_hg = 0.5", "driver.k_hg = 0.5"),
         ("[guidance]\nprobe = true", "guidance.probe = true"),
         (
-            "[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0.25",
-            "driver_change.K_hg = 0.25",
+            "[driver_change]\ntime_s = 3\nk_d_nm_per_rad = 2\nk_hg = 0.25",
+            "driver_change.k_hg = 0.25",
         ),
     ] {
         let error = manual(text).unwrap_err().to_string();
@@ -185,8 +252,10 @@ fn a_manual_driver_has_nothing_that_needs_guidance() {
             "{error}"
         );
     }
-    let own_arm =
-        manual("[driver]\nK_d = 3\nK_hg = 0\n[driver_change]\ntime = 3\nK_d = 2\nK_hg = 0").unwrap();
+    let own_arm = manual(
+        "[driver]\nk_d_nm_per_rad = 3\nk_hg = 0\n[driver_change]\ntime_s = 3\nk_d_nm_per_rad = 2\nk_hg = 0",
+    )
+    .unwrap();
     assert_eq!(
         (own_arm.condition(), own_arm.gains().k_d),
         (Condition::Manual, 3.0)
@@ -213,7 +282,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
         after(30.1, FailureKind::Input)
             .check_times()
             .map_err(|e| e.to_string()),
-        Err("failure.time = 30.1 s is outside 0 to 30 s: the run ends there".into())
+        Err("failure.time_s = 30.1 s is outside 0 to 30 s: the run ends there".into())
     );
     let change = DriverChange {
         time_s: 31.0,
@@ -223,7 +292,7 @@ fn what_happens_in_mid_drive_happens_before_the_run_ends() {
     let changing = after(0.0, FailureKind::None).to_builder();
     let changing = changing.driver_change(Some(change)).build().unwrap();
     let error = changing.check_times().unwrap_err().to_string();
-    assert!(error.starts_with("driver_change.time = 31 s"), "{error}");
+    assert!(error.starts_with("driver_change.time_s = 31 s"), "{error}");
 }
 
 #[test]
@@ -248,10 +317,10 @@ fn a_course_with_less_than_a_second_to_drive_is_refused() {
 fn a_scenario_written_and_read_again_is_the_same() {
     let course = "lane_width = 3.1\n[[segment]]\nlength = 150.5\n\
                   [[segment]]\nlength = 1000\ncurvature_start = 0.0\ncurvature_end = -0.00123456789012345\n";
-    let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed = 71.3\nseed = 7\n\
-                  [driver]\nt_p = 0.1234567890123\nK_d = 3.21\nremnant_sd = 0.1\n\
-                  [guidance]\na2 = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime = 3.3\n\
-                  [driver_change]\ntime = 2\nK_d = 3\nK_hg = 0.25\n[vehicle]\nm = 1234.5\n";
+    let others = "condition = 'low'\ncourse = 'my road.toml'\nspeed_m_per_s = 19.7\nseed = 7\n\
+                  [driver]\nt_p_s = 0.1234567890123\nk_d_nm_per_rad = 3.21\nremnant_sd_nm = 0.1\n\
+                  [guidance]\na_2_s_per_m = 0.07\nprobe = true\n[failure]\nkind = 'input'\ntime_s = 3.3\n\
+                  [driver_change]\ntime_s = 2\nk_d_nm_per_rad = 3\nk_hg = 0.25\n[vehicle]\nm_kg = 1234.5\n";
     for text in ["", "condition = 'manual'", others] {
         let load = |name: &str, _: &LaneChoice| Course::from_toml(name, course);
         let scenario = Scenario::from_toml("s.toml", text, load).unwrap();
@@ -292,8 +361,8 @@ fn neutral_and_oversteering_vehicles_can_be_driven() {
 
 #[test]
 fn a_real_world_is_driven_and_stands_in_the_file_of_the_scenario() {
-    let text = "seed = 3\n[world]\ntyres = \"saturating\"\nmu = 0.8\nfriction = 0.3\nmotor_lag = 0.005\n\
-                gust_sd = 100\n[sensor_errors]\ntorque_bias = 0.05\nlane_noise = 0.01\n";
+    let text = "seed = 3\n[world]\ntyres = \"saturating\"\nmu = 0.8\nfriction_nm = 0.3\nmotor_lag_s = 0.005\n\
+                gust_sd_n = 100\n[sensor_errors]\ntorque_bias_nm = 0.05\nlane_noise_m = 0.01\n";
     let scenario = Scenario::from_toml("s", text, |_, _| unreachable!()).unwrap();
     let again = Scenario::from_toml("s", &scenario.to_toml(), |_, _| unreachable!()).unwrap();
     assert_eq!(again, scenario);

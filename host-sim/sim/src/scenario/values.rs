@@ -73,7 +73,7 @@ impl Default for ScenarioValues {
     fn default() -> Self {
         Self {
             course: Course::paper(),
-            speed: Speed::Constant(DEFAULT_SPEED_KMH),
+            speed: Speed::constant_kmh(DEFAULT_SPEED_KMH),
             manual: false,
             driver: DriverParameters::default(),
             gains: Condition::Mid.gains(),

@@ -36,8 +36,8 @@ impl Sensing {
         Observation {
             lane: seen.map(|([e_y_m, e_theta_rad], _)| LaneErrors { e_y_m, e_theta_rad }),
             lane_age_ms: seen.map_or(0, |(_, age_steps)| age_steps),
-            driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias,
-            wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias.to_radians(),
+            driver_torque_nm: self.errors.torque_gain * truth.driver_torque_nm + self.errors.torque_bias_nm,
+            wheel_angle_rad: truth.wheel_angle_rad + self.errors.angle_bias_rad,
             speed_m_per_s: self.errors.speed_gain * truth.speed_m_per_s,
             yaw_rate_rad_per_s: truth
                 .yaw_rate_rad_per_s

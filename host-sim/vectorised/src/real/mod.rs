@@ -144,11 +144,11 @@ impl<const N: usize> Reals<N> {
                 (&mut self.damping, column.damping),
                 (&mut self.friction, column.friction_nm),
                 (&mut self.give, column.give_rad),
-                (&mut self.assist, world.assist),
-                (&mut self.assist_speed, world.assist_speed),
-                (&mut self.lag, world.motor_lag),
+                (&mut self.assist, world.assist_nm),
+                (&mut self.assist_speed, world.assist_speed_m_per_s),
+                (&mut self.lag, world.motor_lag_s),
                 (&mut self.gain, 1.0 + world.motor_error),
-                (&mut self.ripple, world.motor_ripple),
+                (&mut self.ripple, world.motor_ripple_nm),
                 (&mut self.k_nms, driver.k_nms),
                 (&mut self.t_nms, driver.t_nms),
                 (&mut self.gravity, gravity(0.0, plant)),
@@ -159,7 +159,7 @@ impl<const N: usize> Reals<N> {
             }
             self.saturates[lane] = track.tyres == Tyres::Saturating;
             self.has_banks[lane] = has_banks;
-            let is_ideal = world.motor_lag == 0.0 && world.motor_error == 0.0;
+            let is_ideal = world.motor_lag_s == 0.0 && world.motor_error == 0.0;
             self.motors[lane] = (!is_ideal).then(Actuator::default);
         }
         self.plants[lane] = plant;
@@ -290,7 +290,7 @@ impl<const N: usize> Reals<N> {
 
 /// Acceleration across on a road with a bank, m/s2.
 fn gravity(bank_rad: f64, plant: &RealPlant) -> f64 {
-    -GRAVITY_M_PER_S2 * (bank_rad + plant.world.bank).sin()
+    -GRAVITY_M_PER_S2 * (bank_rad + plant.world.bank_rad).sin()
 }
 
 #[inline(always)]

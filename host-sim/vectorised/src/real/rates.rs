@@ -34,7 +34,7 @@ impl<const N: usize> Reals<N> {
             let turning = (self.l_f[l] * front[l] - self.l_r[l] * rear[l] + self.moment[l]) / self.i[l];
             let hands = arm[l] + acting.remnant_nm[l];
             let boost = (hands.abs() / FULL_ASSIST_AT_NM).min(1.0);
-            let slowness = self.assist_speed[l] / (self.assist_speed[l] + 3.6 * v[l]);
+            let slowness = self.assist_speed[l] / (self.assist_speed[l] + v[l]);
             let assist = self.assist[l] * slowness * boost * boost * hands.signum();
             let all = hands + acts + assist + -lever * front[l];
             let given_way = deflection[l] / self.give[l];

@@ -19,7 +19,7 @@ use std::path::Path;
 use can_dbc::Dbc;
 
 use super::log::jumps::jump;
-use super::log::{DriveLog, LogError};
+use super::log::{DriveLog, LogError, refuse};
 use super::recording::Layout;
 pub use far_point::SingleTrack;
 use haptic_log::candump::{self, CandumpFrame};
@@ -91,22 +91,21 @@ pub fn open_recording_with(
     path: &Path,
     recording: &Recording<'_>,
 ) -> Result<(DriveLog, Option<&'static str>), LogError> {
-    let named = |e: String| LogError::new(format!("{}: {e}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| named(e.to_string()))?;
-    of_text(&bytes, recording).map_err(named)
+    let bytes = std::fs::read(path).map_err(|e| LogError::of(path.display(), e))?;
+    of_text(&bytes, recording).map_err(|e| LogError::of(path.display(), e))
 }
 
 /// A log of the text of either kind, and the sentence about it.
 pub(super) fn of_text(
     bytes: &[u8],
     recording: &Recording<'_>,
-) -> Result<(DriveLog, Option<&'static str>), String> {
+) -> Result<(DriveLog, Option<&'static str>), LogError> {
     let text = std::str::from_utf8(bytes)
         .ok()
         .filter(|t| candump::looks_like_one(t));
     let Some(text) = text else {
         let log = DriveLog::read_within(bytes, recording.manual, recording.stretches);
-        return Ok((log.map_err(|e| e.to_string())?, None));
+        return Ok((log?, None));
     };
     let (log, note) = of_frames(&candump::parse(text)?, recording)?;
     Ok((log, Some(note)))
@@ -116,8 +115,8 @@ pub(super) fn of_text(
 pub(super) fn of_frames(
     records: &[CandumpFrame],
     recording: &Recording<'_>,
-) -> Result<(DriveLog, &'static str), String> {
-    let dbc = dbc_text(recording.dbc).map_err(|e| e.to_string())?;
+) -> Result<(DriveLog, &'static str), LogError> {
+    let dbc = dbc_text(recording.dbc)?;
     let log = read_trace(records, &dbc, recording)?;
     let note = if recording.vehicle.is_some() {
         NOTE_OF_OTHER
@@ -132,7 +131,7 @@ pub(super) fn dbc_text(dbc: Option<&Path>) -> Result<String, LogError> {
     let Some(dbc) = dbc else {
         return Ok(HAPTIC_DBC.to_owned());
     };
-    std::fs::read_to_string(dbc).map_err(|e| LogError::new(format!("{}: {e}", dbc.display())))
+    std::fs::read_to_string(dbc).map_err(|e| LogError::of(dbc.display(), e))
 }
 
 /// A signal over time.
@@ -146,7 +145,7 @@ struct Course {
 /// Place of T_h among the signals that a log needs: behind e_y, e_theta, T_d and the wheel angle.
 const GUIDANCE: usize = 4;
 
-fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Result<DriveLog, String> {
+fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Result<DriveLog, LogError> {
     let dbc = Dbc::try_from(dbc).map_err(|e| format!("the DBC file is not understood: {e}"))?;
     let mut audits: Vec<Audit> = Vec::new();
     let mut course = |name| Course::of(name, &dbc, records, &mut audits);
@@ -218,24 +217,23 @@ fn read_trace(records: &[CandumpFrame], dbc: &str, how: &Recording<'_>) -> Resul
             guidance_nm,
             cut(on_grid(2, Hold::Line)),
         ],
-    )
-    .map_err(|e| e.to_string())?;
+    )?;
     log.findings = findings;
     log.tell_speed(&speed.value);
     Ok(log)
 }
 
 /// When the last of the signals begins.
-fn begin(courses: &[Course]) -> Result<f64, String> {
+fn begin(courses: &[Course]) -> Result<f64, LogError> {
     if let Some(c) = courses.iter().find(|c| c.time_s.len() < 2) {
-        return Err(format!("no frame of {} can be used", c.name));
+        return refuse(format!("no frame of {} can be used", c.name));
     }
     let starts_s = courses.iter().map(|c| c.time_s[0]);
     Ok(starts_s.fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// From when to when the signals are used: to a jump of the clock, or from it on.
-fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<RangeInclusive<f64>, String> {
+fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<RangeInclusive<f64>, LogError> {
     let of =
         |c: &Course| -> Vec<(f64, usize)> { c.time_s.iter().copied().zip(c.line.iter().copied()).collect() };
     let mut frames: Vec<(f64, usize)> = courses.iter().flat_map(of).collect();
@@ -245,10 +243,7 @@ fn used(courses: &[Course], zero_s: f64, stretches: &[(f64, f64)]) -> Result<Ran
     while let Some(jump) = jump(&time_s[first..], 1.0 / RATE_HZ) {
         let next = first + jump.row + 1;
         let place = format!("line {}", lines[next]);
-        if jump
-            .use_after(&place, zero_s, stretches)
-            .map_err(|e| e.to_string())?
-        {
+        if jump.use_after(&place, zero_s, stretches)? {
             first = next;
         } else {
             time_s.truncate(next);
@@ -264,13 +259,13 @@ impl Course {
         dbc: &Dbc,
         records: &[CandumpFrame],
         audits: &mut Vec<Audit>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, LogError> {
         let found = dbc
             .messages
             .iter()
             .find_map(|m| Some((m, m.signals.iter().find(|s| s.name == name)?)));
         let Some((message, signal)) = found else {
-            return Err(format!("the DBC file has no signal {name}"));
+            return refuse(format!("the DBC file has no signal {name}"));
         };
         let unit = match signal.unit.as_str() {
             "deg" => std::f64::consts::PI / 180.0,
@@ -299,7 +294,7 @@ impl Course {
                 )
             })?;
             if course.time_s.last().is_some_and(|&last| record.time_s < last) {
-                return Err(format!("line {}: the time goes back", record.line));
+                return refuse(format!("line {}: the time goes back", record.line));
             }
             course.line.push(record.line);
             course.time_s.push(record.time_s);
@@ -308,7 +303,7 @@ impl Course {
                 .push((raw as f64 * signal.factor + signal.offset) * unit);
         }
         if course.value.len() < 2 {
-            return Err(match seen {
+            return refuse(match seen {
                 0 | 1 => format!("no frame {id:03X} ({}), so no {name}", message.name),
                 _ => format!(
                     "none of {seen} frames {id:03X} ({}) has a right CRC, so no {name}",
@@ -393,14 +388,14 @@ impl Course {
     }
 
     /// The part of it that is used, if it is a speed at which there is guidance, in the mean.
-    fn guided(mut self, used: &RangeInclusive<f64>) -> Result<Self, String> {
+    fn guided(mut self, used: &RangeInclusive<f64>) -> Result<Self, LogError> {
         self.cut(used);
         if self.value.is_empty() {
-            return Err(format!("no frame of {} can be used", self.name));
+            return refuse(format!("no frame of {} can be used", self.name));
         }
         let mean = self.value.iter().sum::<f64>() / self.value.len() as f64;
         if mean < SLOWEST_M_PER_S {
-            return Err(format!(
+            return refuse(format!(
                 "{} is {mean:.2} m/s in the mean, below {SLOWEST_M_PER_S}: there is no guidance",
                 self.name
             ));

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::LogError;
+use super::{LogError, refuse};
 
 /// Rows that the gaps of a log may leave empty, all together: 2.3 hours at 120 Hz.
 const MOST_EMPTY_ROWS: f64 = 1e6;
@@ -54,11 +54,11 @@ impl Jump {
         if before != after {
             return Ok(after);
         }
-        Err(LogError::new(format!(
+        refuse(format!(
             "{place}: the time goes from {} to {} s: a clock that was set, or a logger that slept; use one side of it, with \
              --to {before_s} or --from {after_s} (between_s in Python), or cut the file there",
             self.before_s, self.after_s
-        )))
+        ))
     }
 }
 

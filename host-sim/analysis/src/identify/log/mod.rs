@@ -20,6 +20,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use grid::{Grid, usual_step};
+use haptic_log::recording::RecordingError;
 use haptic_log::table::{TableError, TableReader, number};
 
 /// Names of the columns that a log must have, in the order of the fields of [`DriveLog`].
@@ -87,16 +88,9 @@ pub const SPEED_COLUMN: &str = "speed_m_per_s";
 const ONE_SPEED: f64 = 1.06;
 
 /// Why a log was refused. The text names the line (1 is the header) and the column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
 pub struct LogError(String);
-
-impl fmt::Display for LogError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for LogError {}
 
 impl From<TableError> for LogError {
     fn from(error: TableError) -> Self {
@@ -104,9 +98,22 @@ impl From<TableError> for LogError {
     }
 }
 
+impl From<RecordingError> for LogError {
+    fn from(error: RecordingError) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl From<String> for LogError {
+    fn from(sentence: String) -> Self {
+        Self(sentence)
+    }
+}
+
 impl LogError {
-    pub(crate) fn new(message: String) -> Self {
-        Self(message)
+    /// Of a file, an option or a channel, which the text then begins with.
+    pub(crate) fn of(name: impl fmt::Display, error: impl fmt::Display) -> Self {
+        Self(format!("{name}: {error}"))
     }
 
     /// Of a file without lines: counted are the rows.
@@ -118,7 +125,7 @@ impl LogError {
     }
 }
 
-fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
+pub(super) fn refuse<T>(message: impl Into<String>) -> Result<T, LogError> {
     Err(LogError(message.into()))
 }
 
@@ -174,9 +181,8 @@ impl DriveLog {
     /// # Errors
     /// The file cannot be read, or what it holds is refused; the text begins with the path.
     pub fn open(path: &Path, manual: bool) -> Result<Self, LogError> {
-        let named = |e: String| LogError(format!("{}: {e}", path.display()));
-        let file = File::open(path).map_err(|e| named(e.to_string()))?;
-        Self::read(BufReader::new(file), manual).map_err(|e| named(e.0))
+        let file = File::open(path).map_err(|e| LogError::of(path.display(), e))?;
+        Self::read(BufReader::new(file), manual).map_err(|e| LogError::of(path.display(), e))
     }
 
     /// Reads and checks a log from `source`; see [`DriveLog::open`].

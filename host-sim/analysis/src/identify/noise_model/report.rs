@@ -15,7 +15,7 @@ use super::{
 use crate::identify::balance::balance;
 use crate::identify::diagnostics;
 use crate::identify::log::DriveLog;
-use crate::identify::options::Options;
+use crate::identify::options::{FixError, Options};
 use crate::identify::paper::TABLE_4;
 use crate::identify::prepare::Prepared;
 use crate::identify::result::{
@@ -146,7 +146,7 @@ impl Problem<'_> {
         }
         let balance = balance(log, &prepared.stretches, options.manual);
         let mut notes = self.notes(log, options, &parameters, &trim, &starts);
-        notes.extend(split.err());
+        notes.extend(split.err().map(|e| e.0));
         let along_k_hg = trim.bounds.iter().all(|&(i, _)| i == K_HG);
         let combinations = if !options.manual && !k_hg.identified && along_k_hg {
             self.combinations(&unbiased, &errors)
@@ -406,7 +406,7 @@ fn split_scale(
     pull: &DVector<f64>,
     errors: &DMatrix<f64>,
     options: &Options,
-) -> Result<(Parameter, [Parameter; 3]), String> {
+) -> Result<(Parameter, [Parameter; 3]), FixError> {
     let k_nms = options.muscle.k_nms;
     if let Some(k_d) = options.k_d {
         return Ok((
@@ -421,12 +421,12 @@ fn split_scale(
     let optimum = [0, 1, 2].map(|i| gains[i].optimum.unwrap_or(0.0));
     let k_d = optimum[known] / a - k_nms;
     if k_d <= 0.0 {
-        return Err(format!(
+        return Err(FixError(format!(
             "a_{n} = {a} contradicts the data: gain_{n} = {:.4} would make k_d {k_d:.4}, which is not above 0; \
              k_d, and the a_i with it, stay unknown.",
             optimum[known],
             n = known + 1
-        ));
+        )));
     }
     let sum = gains[known].scaled(1.0 / a);
     let k_d = Parameter {
@@ -512,7 +512,7 @@ mod tests {
         options.fix("a_3=50").unwrap();
         let gains = [gain(0.4), gain(0.04), gain(15.0)];
         let (pull, errors) = (DVector::zeros(COUNT), DMatrix::zeros(COUNT, COUNT));
-        let error = split_scale(&gains, &pull, &errors, &options).unwrap_err();
+        let FixError(error) = split_scale(&gains, &pull, &errors, &options).unwrap_err();
         assert!(
             error.contains("a_3 = 50") && error.contains("k_d -0.7"),
             "{error}"

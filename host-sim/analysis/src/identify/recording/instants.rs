@@ -1,6 +1,6 @@
 //! Channels with instants of their own, at those of the driver torque.
 
-use super::{Column, DRIVER, GUIDANCE, Values};
+use super::{Column, DRIVER, GUIDANCE, LogError, Values, refuse};
 
 const LANE: [usize; 2] = [1, 2];
 /// A lane signal whose usual step is so many of the driver torque's is slower.
@@ -16,7 +16,7 @@ struct Course {
 }
 
 impl Course {
-    fn of(column: &Column<'_>) -> Result<Self, String> {
+    fn of(column: &Column<'_>) -> Result<Self, LogError> {
         let (group, series) = (column.group, column.series);
         let known = group
             .time_s
@@ -24,7 +24,7 @@ impl Course {
             .zip(&series.values)
             .filter(|(_, v)| !v.is_nan());
         let (time_s, values): (Vec<f64>, Vec<f64>) = known.map(|(t, v)| (*t, v * column.scale)).unzip();
-        let refuse = |what: String| Err(format!("channel {}: {what}", series.name));
+        let refuse = |what: String| Err(LogError::of(format_args!("channel {}", series.name), what));
         if let Some(w) = time_s.windows(2).find(|w| w[1].is_nan() || w[1] <= w[0]) {
             return refuse(format!("the time goes from {} to {} s: it must grow", w[0], w[1]));
         }
@@ -68,7 +68,7 @@ impl Course {
 pub(super) fn at_the_torque(
     columns: &[Option<Column<'_>>; 6],
     notes: &mut Vec<String>,
-) -> Result<(Vec<f64>, Values), String> {
+) -> Result<(Vec<f64>, Values), LogError> {
     let mut courses: [Option<Course>; 6] = Default::default();
     for (course, column) in courses.iter_mut().zip(columns) {
         *course = column.as_ref().map(Course::of).transpose()?;
@@ -85,7 +85,7 @@ pub(super) fn at_the_torque(
         .filter(|t| (from..=to).contains(t))
         .collect();
     if instants.is_empty() {
-        return Err("the channels have no time in common".to_owned());
+        return refuse("the channels have no time in common");
     }
     let pace_s = courses[DRIVER].as_ref().map_or(0.0, |c| c.usual_s);
     notes.push(format!(

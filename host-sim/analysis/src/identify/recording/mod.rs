@@ -18,7 +18,7 @@ use haptic_log::table::TableReader;
 use haptic_log::units;
 
 use super::bus_trace;
-use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN};
+use super::log::{COLUMNS, DriveLog, LogError, SPEED_COLUMN, refuse};
 use instants::at_the_torque;
 pub use layout::{Layout, Table};
 pub use mapping::Mapping;
@@ -43,9 +43,8 @@ pub fn open(
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
 ) -> Result<(DriveLog, Vec<String>), LogError> {
-    let named = |e: String| LogError::new(format!("{}: {e}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| named(e.to_string()))?;
-    of_bytes(bytes, Format::of(path).ok(), maps, how).map_err(|e| named(e.to_string()))
+    let bytes = std::fs::read(path).map_err(|e| LogError::of(path.display(), e))?;
+    of_bytes(bytes, Format::of(path).ok(), maps, how).map_err(|e| LogError::of(path.display(), e))
 }
 
 /// Reads a log's bytes; without a format they are text, a table or a trace by their looks.
@@ -60,27 +59,27 @@ pub fn of_bytes(
 ) -> Result<(DriveLog, Vec<String>), LogError> {
     once(maps)?;
     if let Some(layout) = how.layout {
-        return layout.read(&bytes, format, maps, how).map_err(LogError::new);
+        return layout.read(&bytes, format, maps, how);
     }
     // Text files keep their own readers: those name lines, and tell a table from a trace by its looks.
     let is_text = matches!(format, None | Some(Format::Csv | Format::Candump));
     if maps.is_empty() && is_text && !has_units(&bytes) {
-        let (log, note) = bus_trace::of_text(&bytes, how).map_err(LogError::new)?;
+        let (log, note) = bus_trace::of_text(&bytes, how)?;
         return Ok((log, note.map(String::from).into_iter().collect()));
     }
     let contents = formats::read_bytes(bytes, format.unwrap_or(Format::Csv), time_of(maps).as_ref());
-    let recording = match contents.map_err(|e| LogError::new(e.to_string()))? {
+    let recording = match contents? {
         Contents::Frames(frames) if maps.is_empty() => {
-            let (log, note) = bus_trace::of_frames(&frames, how).map_err(LogError::new)?;
+            let (log, note) = bus_trace::of_frames(&frames, how)?;
             return Ok((log, vec![note.into()]));
         }
         Contents::Frames(frames) => {
             let dbc = bus_trace::dbc_text(how.dbc)?;
-            formats::dbc::channels(&frames, &dbc).map_err(|e| LogError::new(e.to_string()))?
+            formats::dbc::channels(&frames, &dbc)?
         }
         Contents::Channels(recording) => recording,
     };
-    of_channels(&recording, maps, how).map_err(LogError::new)
+    of_channels(&recording, maps, how)
 }
 
 /// The log of a table's columns in memory, by their names with or without units in brackets. What is not asked for may have
@@ -106,10 +105,7 @@ pub fn of_table(
         } else {
             names.join(", ")
         };
-        return Err(LogError::new(format!(
-            "there is no channel {}; there are {there}",
-            map.channel
-        )));
+        return refuse(format!("there is no channel {}; there are {there}", map.channel));
     }
     let asked = NAMES
         .into_iter()
@@ -117,17 +113,14 @@ pub fn of_table(
     let asked: Vec<&str> = asked.map(units::bare).collect();
     columns.retain(|(name, _)| asked.contains(&units::bare(name)));
     let recording = formats::table(columns, time_of(maps).as_ref());
-    let recording = recording.map_err(|e| LogError::new(e.to_string()))?;
-    of_channels(&recording, maps, how).map_err(LogError::new)
+    let recording = recording?;
+    of_channels(&recording, maps, how)
 }
 
 fn once(maps: &[Mapping]) -> Result<(), LogError> {
     let again = (1..maps.len()).find(|&i| maps[..i].iter().any(|other| other.column == maps[i].column));
     again.map_or(Ok(()), |i| {
-        Err(LogError::new(format!(
-            "{} is mapped twice",
-            NAMES[maps[i].column]
-        )))
+        refuse(format!("{} is mapped twice", NAMES[maps[i].column]))
     })
 }
 
@@ -159,7 +152,7 @@ fn of_channels(
     recording: &Recording,
     maps: &[Mapping],
     how: &bus_trace::Recording<'_>,
-) -> Result<(DriveLog, Vec<String>), String> {
+) -> Result<(DriveLog, Vec<String>), LogError> {
     let manual = how.manual;
     let mut notes = Vec::new();
     let mut columns: [Option<Column<'_>>; 6] = Default::default();
@@ -170,11 +163,11 @@ fn of_channels(
             Err(_) if manual && i == GUIDANCE && map.is_none() => continue,
             Err(error) if map.is_none() => {
                 let wanted = COLUMNS[i];
-                return Err(format!(
+                return refuse(format!(
                     "{error}; --map {wanted}=CHANNEL[*SCALE] names another one"
                 ));
             }
-            Err(error) => return Err(error.to_string()),
+            Err(error) => return Err(error.into()),
         };
         let scale = scale(series, i, map)?;
         if scale != 1.0 {
@@ -191,7 +184,7 @@ fn of_channels(
     } else {
         at_the_torque(&columns, &mut notes)?
     };
-    let mut log = DriveLog::from_rows(time_s, values, manual, how.stretches).map_err(|e| e.to_string())?;
+    let mut log = DriveLog::from_rows(time_s, values, manual, how.stretches)?;
     tell_speed(&mut log, recording, maps, &mut notes)?;
     Ok((log, notes))
 }
@@ -206,7 +199,7 @@ fn wanted<'a>(
 }
 
 /// What a channel's values are multiplied by to be a column's.
-fn scale(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, String> {
+fn scale(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, LogError> {
     let (wanted, name) = (UNITS[column], &series.name);
     match (map.and_then(|map| map.scale), series.unit.as_str()) {
         (Some(scale), _) => Ok(scale),
@@ -217,6 +210,7 @@ fn scale(series: &Series, column: usize, map: Option<&Mapping>) -> Result<f64, S
                  many {wanted} it is",
                 NAMES[column]
             )
+            .into()
         }),
     }
 }
@@ -234,9 +228,9 @@ fn tell_speed(
     recording: &Recording,
     maps: &[Mapping],
     notes: &mut Vec<String>,
-) -> Result<(), String> {
+) -> Result<(), LogError> {
     let map = maps.iter().find(|map| map.column == SPEED);
-    let found = wanted(recording, SPEED, map).map_err(|e| e.to_string());
+    let found = wanted(recording, SPEED, map).map_err(LogError::from);
     let found = found.and_then(|(_, series)| Ok((series, scale(series, SPEED, map)?)));
     let (series, scale) = match found {
         Ok(found) => found,

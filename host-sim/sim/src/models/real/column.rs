@@ -23,8 +23,8 @@ impl SteeringColumn {
         Self {
             inertia: vehicle.j_s,
             damping: vehicle.b_s,
-            friction_nm: world.friction,
-            give_rad: world.friction_give.to_radians(),
+            friction_nm: world.friction_nm,
+            give_rad: world.friction_give_rad,
         }
     }
 }

@@ -97,7 +97,7 @@ impl RealPlant {
             input: *input,
             surroundings: Surroundings {
                 mu: self.world.mu,
-                bank_rad: bank_rad + self.world.bank,
+                bank_rad: bank_rad + self.world.bank_rad,
                 force_n,
                 moment_nm,
             },
@@ -121,7 +121,7 @@ impl RealPlant {
         let sum: State = std::array::from_fn(|i| k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
         let next = plus(&sum, STEP_S / 6.0);
         self.deflection_rad = next[4];
-        self.motor_nm = if self.world.motor_lag > 0.0 {
+        self.motor_nm = if self.world.motor_lag_s > 0.0 {
             next[6]
         } else {
             input.guidance_torque_nm
@@ -163,17 +163,17 @@ impl RealPlant {
         } = held;
         let v_m_per_s = from + share * (to - from);
         let world = &self.world;
-        let lagging = world.motor_lag > 0.0;
+        let lagging = world.motor_lag_s > 0.0;
         let torque = if lagging { motor } else { input.guidance_torque_nm };
         let motor_rate = if lagging {
-            (input.guidance_torque_nm - motor) / world.motor_lag
+            (input.guidance_torque_nm - motor) / world.motor_lag_s
         } else {
             0.0
         };
-        let ripple = if world.motor_ripple == 0.0 {
+        let ripple = if world.motor_ripple_nm == 0.0 {
             0.0
         } else {
-            world.motor_ripple * (RIPPLES * wheel).sin()
+            world.motor_ripple_nm * (RIPPLES * wheel).sin()
         };
         let acting = torque * (1.0 + world.motor_error) + ripple;
 

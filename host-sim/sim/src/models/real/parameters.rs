@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::input::{RangeError, in_range};
+use crate::fields::{FieldValue, fields};
 
 /// Driver torque at which the power assist is whole, N.m.
 pub const FULL_ASSIST_AT_NM: f64 = 3.0;
@@ -18,118 +18,65 @@ pub enum Tyres {
     Saturating,
 }
 
-/// The table `[world]` of a scenario.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WorldParameters {
-    /// How tyres answer slip.
-    pub tyres: Tyres,
-    /// Friction between saturating tyres and road.
-    pub mu: f64,
-    /// Share of the trail that stays when the pneumatic trail has fallen.
-    pub castor_share: f64,
-    /// Bank of the whole road beside the course's own, rad, positive where the left edge is the higher one.
-    pub bank: f64,
-    /// Dry friction of the column, N.m.
-    pub friction: f64,
-    /// Wheel angle at which it gives way, deg.
-    pub friction_give: f64,
-    /// Power assist at 3 N.m of driver torque and standstill, N.m.
-    pub assist: f64,
-    /// Speed at which the assist is half of that, km/h.
-    pub assist_speed: f64,
-    /// Time constant of the motor, s.
-    pub motor_lag: f64,
-    /// Error of its torque as a share.
-    pub motor_error: f64,
-    /// Amplitude of its torque ripple, N.m.
-    pub motor_ripple: f64,
-    /// Steady side force of the wind, N, to the left.
-    pub wind: f64,
-    /// Standard deviation of its gusts, N.
-    pub gust_sd: f64,
-    /// Corner of the gusts' low-pass, Hz.
-    pub gust_corner: f64,
-    /// How far before the centre of gravity the side force attacks, m.
-    pub wind_lever: f64,
-}
+impl FieldValue for Tyres {}
 
-impl Default for WorldParameters {
-    fn default() -> Self {
-        Self {
-            tyres: Tyres::Linear,
-            mu: 1.0,
-            castor_share: 0.4,
-            bank: 0.0,
-            friction: 0.0,
-            friction_give: 0.2,
-            assist: 0.0,
-            assist_speed: 60.0,
-            motor_lag: 0.0,
-            motor_error: 0.0,
-            motor_ripple: 0.0,
-            wind: 0.0,
-            gust_sd: 0.0,
-            gust_corner: 0.2,
-            wind_lever: 0.3,
-        }
+fields! {
+    /// What is less than ideal in the world.
+    WorldParameters, "world" {
+        /// tyres in proportion to slip, or up to the friction of the road with a falling trail
+        tyres: Tyres = Tyres::Linear, "tyres", "", "", OneOf(&["linear", "saturating"]);
+        /// friction between saturating tyres and road
+        mu: f64 = 1.0, "mu", "", "", Between(0.05, 1.5);
+        /// share of the trail E_t that stays when the pneumatic trail has fallen
+        castor_share: f64 = 0.4, "castor_share", "", "", Between(0.0, 1.0);
+        /// of the whole road beside the course's own, positive: left edge higher
+        bank_rad: f64 = 0.0, "bank_rad", "", "rad", Between(-0.3, 0.3);
+        /// dry friction of the column (Dahl)
+        friction_nm: f64 = 0.0, "friction_nm", "", "N.m", Between(0.0, 5.0);
+        /// wheel angle at which it gives way: 0.2 degrees
+        friction_give_rad: f64 = 0.2_f64.to_radians(), "friction_give_rad", "", "rad", Between(0.0005, 0.1);
+        /// power assist at 3 N.m of driver torque and standstill, with the square of the torque up to there
+        assist_nm: f64 = 0.0, "assist_nm", "", "N.m", Between(0.0, 30.0);
+        /// speed at which the assist is half of that: 60 km/h
+        assist_speed_m_per_s: f64 = 60.0 / 3.6, "assist_speed_m_per_s", "", "m/s", Between(0.2, 300.0);
+        /// time constant of the motor
+        motor_lag_s: f64 = 0.0, "motor_lag_s", "", "s", Between(0.0, 0.1);
+        /// error of its torque as a share
+        motor_error: f64 = 0.0, "motor_error", "", "", Between(-0.5, 0.5);
+        /// amplitude of its ripple, 24 in a turn of the wheel
+        motor_ripple_nm: f64 = 0.0, "motor_ripple_nm", "", "N.m", Between(0.0, 1.0);
+        /// steady side force, to the left
+        wind_n: f64 = 0.0, "wind_n", "", "N", Between(-5000.0, 5000.0);
+        /// standard deviation of its gusts
+        gust_sd_n: f64 = 0.0, "gust_sd_n", "", "N", Between(0.0, 5000.0);
+        /// corner of the gusts' low-pass
+        gust_corner_hz: f64 = 0.2, "gust_corner_hz", "", "Hz", Between(0.01, 10.0);
+        /// how far before the centre of gravity the side force attacks
+        wind_lever_m: f64 = 0.3, "wind_lever_m", "", "m", Between(-3.0, 3.0);
     }
 }
 
 impl WorldParameters {
-    /// Whether every value is one that a road or a car can have.
-    ///
-    /// # Errors
-    /// The first field out of range, with its value and range.
-    pub fn check(&self) -> Result<(), RangeError> {
-        in_range("mu", self.mu, 0.05..=1.5, "")?;
-        in_range("castor_share", self.castor_share, 0.0..=1.0, "")?;
-        in_range("bank", self.bank, -0.3..=0.3, "rad")?;
-        in_range("friction", self.friction, 0.0..=5.0, "N.m")?;
-        in_range("friction_give", self.friction_give, 0.05..=5.0, "deg")?;
-        in_range("assist", self.assist, 0.0..=30.0, "N.m")?;
-        in_range("assist_speed", self.assist_speed, 1.0..=1000.0, "km/h")?;
-        in_range("motor_lag", self.motor_lag, 0.0..=0.1, "s")?;
-        in_range("motor_error", self.motor_error, -0.5..=0.5, "")?;
-        in_range("motor_ripple", self.motor_ripple, 0.0..=1.0, "N.m")?;
-        in_range("wind", self.wind, -5000.0..=5000.0, "N")?;
-        in_range("gust_sd", self.gust_sd, 0.0..=5000.0, "N")?;
-        in_range("gust_corner", self.gust_corner, 0.01..=10.0, "Hz")?;
-        in_range("wind_lever", self.wind_lever, -3.0..=3.0, "m")
-    }
-
     /// Whether the paper's plant is all there is to it.
     pub fn is_ideal(&self) -> bool {
-        let Self {
-            tyres,
-            bank,
-            friction,
-            assist,
-            motor_lag,
-            motor_error,
-            motor_ripple,
-            wind,
-            gust_sd,
-            ..
-        } = *self;
         let off = [
-            bank,
-            friction,
-            assist,
-            motor_lag,
-            motor_error,
-            motor_ripple,
-            wind,
-            gust_sd,
+            self.bank_rad,
+            self.friction_nm,
+            self.assist_nm,
+            self.motor_lag_s,
+            self.motor_error,
+            self.motor_ripple_nm,
+            self.wind_n,
+            self.gust_sd_n,
         ];
-        tyres == Tyres::Linear && off.iter().all(|value| *value == 0.0)
+        self.tyres == Tyres::Linear && off.iter().all(|value| *value == 0.0)
     }
 
     /// Torque of the power assist, N.m: with the square of the driver's torque up to 3 N.m, as most boost curves
     /// bend, constant beyond, and falling with speed.
     pub(super) fn assist_nm(&self, hands_nm: f64, v_m_per_s: f64) -> f64 {
         let share = (hands_nm.abs() / FULL_ASSIST_AT_NM).min(1.0);
-        let slowness = self.assist_speed / (self.assist_speed + 3.6 * v_m_per_s);
-        self.assist * slowness * share * share * hands_nm.signum()
+        let slowness = self.assist_speed_m_per_s / (self.assist_speed_m_per_s + v_m_per_s);
+        self.assist_nm * slowness * share * share * hands_nm.signum()
     }
 }

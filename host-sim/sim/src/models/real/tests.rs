@@ -117,7 +117,7 @@ fn a_tyre_gives_no_more_than_the_road_and_its_trail_falls() {
 #[test]
 fn friction_holds_the_wheel_until_it_is_overcome() {
     let world = WorldParameters {
-        friction: 0.3,
+        friction_nm: 0.3,
         ..WorldParameters::default()
     };
     let (vehicle, driver) = (VehicleParameters::default(), DriverParameters::default());
@@ -147,7 +147,7 @@ fn a_bank_pushes_to_the_lower_side_and_wind_to_where_it_blows() {
     let banked = steady(WorldParameters::default(), 0.0, V, gains, 0.05);
     assert!(banked.yaw_rate_rad_s < -1e-3, "{banked:?}");
     let windy = WorldParameters {
-        wind: 500.0,
+        wind_n: 500.0,
         ..WorldParameters::default()
     };
     let blown = steady(windy, 0.0, V, gains, 0.0);

@@ -21,12 +21,12 @@ pub struct Wind {
 
 impl Wind {
     pub(super) fn new(world: &WorldParameters, seed: u64) -> Self {
-        let decay = (-std::f64::consts::TAU * world.gust_corner * STEP_S).exp();
+        let decay = (-std::f64::consts::TAU * world.gust_corner_hz * STEP_S).exp();
         Self {
-            steady_n: world.wind,
-            lever_m: world.wind_lever,
+            steady_n: world.wind_n,
+            lever_m: world.wind_lever_m,
             decay,
-            scale_n: world.gust_sd * (1.0 - decay * decay).sqrt(),
+            scale_n: world.gust_sd_n * (1.0 - decay * decay).sqrt(),
             gust_n: 0.0,
             generator: Xoshiro256PlusPlus::seed_from_u64(seed),
         }

@@ -6,7 +6,6 @@
 //! where the left edge is the higher one) and `grade` (rise per distance). All may jump between segments (an arc
 //! without a clothoid); heading never does.
 
-use std::fmt;
 use std::sync::{Arc, LazyLock, OnceLock};
 
 use serde::Deserialize;
@@ -72,26 +71,25 @@ impl PartialEq for Course {
 }
 
 /// Why there is no such course.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CourseError {
-    /// A value out of range; of a segment, with its number from 1.
-    Range(Option<usize>, RangeError),
+    /// A value out of range.
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    /// A segment, by its number from 1, that cannot be.
+    #[error("segment {0}: {1}")]
+    Segment(usize, Box<Self>),
     /// No segment at all.
+    #[error("a course needs at least one [[segment]]")]
     Empty,
+    /// A quantity that is given for all of a segment and for an end of it.
+    #[error("give either `{0}` or `{0}_start` and `{0}_end`, not both")]
+    Both(&'static str),
+    /// A quantity that is given for one end of a segment alone.
+    #[error("`{0}_start` and `{0}_end` go together")]
+    OneEnd(&'static str),
 }
-
-impl fmt::Display for CourseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Range(Some(number), error) => write!(f, "segment {number}: {error}"),
-            Self::Range(None, error) => error.fmt(f),
-            Self::Empty => f.write_str("a course needs at least one [[segment]]"),
-        }
-    }
-}
-
-impl std::error::Error for CourseError {}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -185,20 +183,21 @@ impl Course {
         lane_width_m: f64,
         segments: Vec<Segment>,
     ) -> Result<Self, CourseError> {
-        let whole = |e| CourseError::Range(None, e);
-        in_range("lane_width", lane_width_m, LANE_WIDTH_M, "m").map_err(whole)?;
+        in_range("lane_width", lane_width_m, LANE_WIDTH_M, "m")?;
         if segments.is_empty() {
             return Err(CourseError::Empty);
         }
         for (i, segment) in segments.iter().enumerate() {
-            segment.check().map_err(|e| CourseError::Range(Some(i + 1), e))?;
+            segment
+                .check()
+                .map_err(|e| CourseError::Segment(i + 1, Box::new(e.into())))?;
         }
         let course = Self::of_segments(name, lane_width_m, segments);
         let length_m = course.length_m();
-        in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m").map_err(whole)?;
+        in_range("course length", length_m, MIN_SEGMENT_M..=MAX_COURSE_M, "m")?;
         let sharpest = |s: &Segment| s.curvature_start_1pm.abs().max(s.curvature_end_1pm.abs());
         let turn = course.segments.iter().map(|s| s.length_m * sharpest(s)).sum();
-        in_range("total turn", turn, 0.0..=MAX_TURN_RAD, "rad").map_err(whole)?;
+        in_range("total turn", turn, 0.0..=MAX_TURN_RAD, "rad")?;
         Ok(course)
     }
 
@@ -238,14 +237,13 @@ impl Course {
     /// and range).
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
         let file: CourseFile = parse_toml(name, text)?;
-        let fail = |e: String| InputError::new(name, e);
         let segments = file.segment.iter().enumerate().map(|(i, segment)| {
-            segment
-                .parsed()
-                .map_err(|e| fail(format!("segment {}: {e}", i + 1)))
+            let parsed = segment.parsed();
+            parsed.map_err(|e| CourseError::Segment(i + 1, Box::new(e)))
         });
-        let segments = segments.collect::<Result<_, _>>()?;
-        Self::new(name, file.lane_width, segments).map_err(|e| InputError::new(name, e))
+        let course = segments.collect::<Result<_, _>>();
+        let course = course.and_then(|segments| Self::new(name, file.lane_width, segments));
+        course.map_err(|e| InputError::new(name, e))
     }
 
     /// `paper-course`, or the name the course was loaded under.
@@ -364,7 +362,7 @@ impl Segment {
 }
 
 impl SegmentFile {
-    fn parsed(&self) -> Result<Segment, String> {
+    fn parsed(&self) -> Result<Segment, CourseError> {
         let curvature = [self.curvature, self.curvature_start, self.curvature_end];
         let bank = [self.bank, self.bank_start, self.bank_end];
         let grade = [self.grade, self.grade_start, self.grade_end];
@@ -375,14 +373,12 @@ impl SegmentFile {
 }
 
 /// A quantity of a segment: `NAME` for all of it, or `NAME_start` and `NAME_end`.
-fn ends(name: &str, given: [Option<f64>; 3]) -> Result<[f64; 2], String> {
+fn ends(name: &'static str, given: [Option<f64>; 3]) -> Result<[f64; 2], CourseError> {
     match given {
         [constant, None, None] => Ok([constant.unwrap_or(0.0); 2]),
         [None, Some(start), Some(end)] => Ok([start, end]),
-        [Some(_), ..] => Err(format!(
-            "give either `{name}` or `{name}_start` and `{name}_end`, not both"
-        )),
-        [None, ..] => Err(format!("`{name}_start` and `{name}_end` go together")),
+        [Some(_), ..] => Err(CourseError::Both(name)),
+        [None, ..] => Err(CourseError::OneEnd(name)),
     }
 }
 

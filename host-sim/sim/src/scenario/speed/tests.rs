@@ -6,16 +6,13 @@ use crate::models::road::Course;
 use crate::scenario::Scenario;
 
 fn by_time(time: &[f64], kmh: &[f64]) -> Speed {
-    Speed::ByTime {
-        time: time.to_vec(),
-        kmh: kmh.to_vec(),
-    }
+    Speed::by_time_kmh(time.to_vec(), kmh)
 }
 
 fn by_place(place: &[f64], kmh: &[f64]) -> Speed {
     Speed::ByPlace {
-        place: place.to_vec(),
-        kmh: kmh.to_vec(),
+        place_m: place.to_vec(),
+        speed_m_per_s: kmh.iter().map(|kmh| kmh / 3.6).collect(),
     }
 }
 
@@ -92,7 +89,7 @@ fn a_run_ends_when_the_look_ahead_gets_to_the_end_of_the_road() {
 
 #[test]
 fn a_speed_that_stays_has_the_end_that_it_always_had() {
-    let profile = Speed::Constant(61.7).profile().unwrap();
+    let profile = Speed::constant_kmh(61.7).profile().unwrap();
     let v = 61.7 / 3.6;
     assert_eq!(profile.end(3350.0, 1.3), ((3350.0 - v * 1.3) / v, v));
 }
@@ -106,55 +103,64 @@ fn points_that_make_no_sense_are_refused_by_name() {
     };
     for (table, expected) in [
         (
-            "time = [0, 10, 5]\nkmh = [60, 50, 60]",
-            "speed.time (point 3) = 5 s is not behind point 2",
+            "time_s = [0, 10, 5]\nspeed_m_per_s = [16, 14, 16]",
+            "speed.time_s (point 3) = 5 s is not behind point 2",
         ),
         (
-            "time = [0, 10, 10]\nkmh = [60, 50, 60]",
-            "speed.time (point 3) = 10 s is not behind point 2",
+            "time_s = [0, 10, 10]\nspeed_m_per_s = [16, 14, 16]",
+            "speed.time_s (point 3) = 10 s is not behind point 2",
         ),
         (
-            "time = [0, nan]\nkmh = [60, 60]",
-            "speed.time (point 2) = NaN s is outside 0 to 1000000 s",
+            "time_s = [0, nan]\nspeed_m_per_s = [16, 16]",
+            "speed.time_s (point 2) = NaN s is outside 0 to 1000000 s",
         ),
         (
-            "place = [-1, 5]\nkmh = [60, 60]",
-            "speed.place (point 1) = -1 m is outside 0 to 1000000 m",
+            "place_m = [-1, 5]\nspeed_m_per_s = [16, 16]",
+            "speed.place_m (point 1) = -1 m is outside 0 to 1000000 m",
         ),
         (
-            "time = [0, 9]\nkmh = [60, nan]",
-            "speed.kmh (point 2) = NaN km/h is outside 10 to 250 km/h",
+            "time_s = [0, 9]\nspeed_m_per_s = [16, nan]",
+            "speed.speed_m_per_s (point 2) = NaN m/s is outside 2.5 to 70 m/s",
         ),
         (
-            "time = [0, 9]\nkmh = [60, 0]",
-            "speed.kmh (point 2) = 0 km/h is outside 10 to 250 km/h",
+            "time_s = [0, 9]\nspeed_m_per_s = [16, 0]",
+            "speed.speed_m_per_s (point 2) = 0 m/s is outside 2.5 to 70 m/s",
         ),
         (
-            "time = [0, 9]\nkmh = [60, 60, 60]",
-            "speed.time has 2 and speed.kmh 3 values",
-        ),
-        ("time = [0]\nkmh = [60]", "takes two points at least, not 1"),
-        ("place = []\nkmh = []", "takes two points at least, not 0"),
-        // 40 km/h less in a second are -11.111 m/s2.
-        (
-            "time = [0, 1]\nkmh = [100, 60]",
-            "speed: acceleration to point 2 = -11.111 m/s2 is outside -8 to 5 m/s2",
-        ),
-        // (27.778^2 - 16.667^2)/(2*30)
-        (
-            "place = [0, 30]\nkmh = [60, 100]",
-            "acceleration to point 2 = 8.23 m/s2 is outside -8 to 5",
+            "time_s = [0, 9]\nspeed_m_per_s = [16, 16, 16]",
+            "speed.time_s has 2 and speed.speed_m_per_s 3 values",
         ),
         (
-            "time = [0, 9]\nplace = [0, 9]\nkmh = [60, 60]",
-            "either `time` (s) or `place` (m)",
+            "time_s = [0]\nspeed_m_per_s = [16]",
+            "takes two points at least, not 1",
         ),
         (
-            "time = [0, 9]\nspeed = [60, 60]",
-            "either `time` (s) or `place` (m) and `kmh`",
+            "place_m = []\nspeed_m_per_s = []",
+            "takes two points at least, not 0",
         ),
-        ("kmh = [60, 60]", "either `time` (s) or `place` (m) and `kmh`"),
-        ("time = 0\nkmh = 60", "each a list of numbers"),
+        // 11 m/s less in a second.
+        (
+            "time_s = [0, 1]\nspeed_m_per_s = [28, 17]",
+            "speed: acceleration to point 2 = -11 m/s2 is outside -8 to 5 m/s2",
+        ),
+        // (28^2 - 17^2)/(2*30)
+        (
+            "place_m = [0, 30]\nspeed_m_per_s = [17, 28]",
+            "acceleration to point 2 = 8.25 m/s2 is outside -8 to 5",
+        ),
+        (
+            "time_s = [0, 9]\nplace_m = [0, 9]\nspeed_m_per_s = [16, 16]",
+            "either `time_s` or `place_m`",
+        ),
+        (
+            "time_s = [0, 9]\nspeeds = [60, 60]",
+            "either `time_s` or `place_m` and `speed_m_per_s`",
+        ),
+        (
+            "speed_m_per_s = [16, 16]",
+            "either `time_s` or `place_m` and `speed_m_per_s`",
+        ),
+        ("time_s = 0\nspeed_m_per_s = 16", "each a list of numbers"),
     ] {
         let error = text(table).unwrap_err();
         assert!(
@@ -162,12 +168,15 @@ fn points_that_make_no_sense_are_refused_by_name() {
             "{table}: {error}"
         );
     }
-    let both = "speed = 60\n[speed]\ntime = [0, 9]\nkmh = [60, 60]";
+    let both = "speed_m_per_s = 16\n[speed]\ntime_s = [0, 9]\nspeed_m_per_s = [16, 16]";
     let none = |name: &str, _: &_| -> Result<Course, _> { Err(InputError::new(name, "not there")) };
     let error = Scenario::from_toml("s.toml", both, none).unwrap_err().to_string();
-    assert!(error.contains("duplicate key"), "{error}");
+    assert!(
+        error.contains("either speed_m_per_s or a table [speed]"),
+        "{error}"
+    );
     // Behind the end of the road nothing is wrong: the run ends before.
-    assert!(text("time = [0, 1e6]\nkmh = [60, 250]").is_ok());
+    assert!(text("time_s = [0, 1e6]\nspeed_m_per_s = [16, 69]").is_ok());
 }
 
 #[test]

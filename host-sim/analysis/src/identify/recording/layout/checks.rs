@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::points::{SLOPE_S, Table, line};
-use super::{Layout, Limit, SPEED_COLUMN, Slope};
+use super::{Layout, Limit, LogError, SPEED_COLUMN, Slope, refuse};
 
 /// No car changes its speed or its wheel angle faster: m/s and rad, at once and per second.
 const FASTEST: [(&str, f64, f64); 2] = [(SPEED_COLUMN, 1.0, 15.0), ("wheel_angle_rad", 0.1, 12.0)];
@@ -11,7 +11,7 @@ const FASTEST: [(&str, f64, f64); 2] = [(SPEED_COLUMN, 1.0, 15.0), ("wheel_angle
 const TOGETHER: f64 = 0.8;
 
 impl Layout {
-    pub(super) fn within_limits(&self, table: &Table) -> Result<(), String> {
+    pub(super) fn within_limits(&self, table: &Table) -> Result<(), LogError> {
         for (
             name,
             Limit {
@@ -24,7 +24,7 @@ impl Layout {
             let values = table.get(name).map_or(&[][..], Vec::as_slice);
             if let Some(k) = values.iter().position(outside) {
                 let value = values[k];
-                return Err(format!(
+                return refuse(format!(
                     "row {}: {name} is {value}, outside {low} to {high}: {why}",
                     k + 1
                 ));
@@ -33,7 +33,7 @@ impl Layout {
         Ok(())
     }
 
-    pub(super) fn slopes_agree(&self, table: &Table, is_free: &[bool]) -> Result<(), String> {
+    pub(super) fn slopes_agree(&self, table: &Table, is_free: &[bool]) -> Result<(), LogError> {
         for Slope {
             of,
             on,
@@ -42,7 +42,7 @@ impl Layout {
         } in &self.slopes
         {
             let (Some(y), Some(x)) = (table.get(of), table.get(on)) else {
-                return Err(format!(
+                return refuse(format!(
                     "layout {}: there is no column {of} or no {on}",
                     self.name
                 ));
@@ -53,7 +53,7 @@ impl Layout {
                 .collect();
             let (slope, correlation) = line(&pairs);
             if correlation.abs() >= TOGETHER && !(*low..=*high).contains(&slope) {
-                return Err(format!(
+                return refuse(format!(
                     "{of} is {slope:.3} times {on}, outside {low} to {high}: {why}"
                 ));
             }

@@ -9,13 +9,14 @@ mod checks;
 mod points;
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use haptic_log::formats::{self, Contents, Format, TimeColumn};
 use haptic_log::recording::{Group, Recording, Series};
 use serde::Deserialize;
 
 use super::super::bus_trace;
-use super::{DriveLog, LogError, Mapping, NAMES, SPEED_COLUMN, UNITS, of_channels};
+use super::{DriveLog, LogError, Mapping, NAMES, SPEED_COLUMN, UNITS, of_channels, refuse};
 use checks::counted;
 use points::{SLOPE_S, slopes, two_points};
 
@@ -91,19 +92,19 @@ impl Layout {
     /// # Errors
     /// No such name or file; a file that is no layout.
     pub fn named(name: &str) -> Result<Self, LogError> {
-        let refuse = |what: String| LogError::new(format!("layout {name}: {what}"));
+        let refused = |why: &dyn fmt::Display| LogError::of(format_args!("layout {name}"), why);
         let built_in = BUILT_IN.iter().find(|(known, _)| *known == name);
         let text = match built_in {
             Some((_, text)) => (*text).to_owned(),
-            None if name.ends_with(".toml") => {
-                std::fs::read_to_string(name).map_err(|e| refuse(e.to_string()))?
-            }
+            None if name.ends_with(".toml") => std::fs::read_to_string(name).map_err(|e| refused(&e))?,
             None => {
                 let known = BUILT_IN.map(|(known, _)| known).join(", ");
-                return Err(refuse(format!("one of {known}, or a file NAME.toml is wanted")));
+                return Err(refused(&format_args!(
+                    "one of {known}, or a file NAME.toml is wanted"
+                )));
             }
         };
-        let layout: Self = toml::from_str(&text).map_err(|e| refuse(e.to_string()))?;
+        let layout: Self = toml::from_str(&text).map_err(|e| refused(&e))?;
         Ok(Self {
             name: name.into(),
             ..layout
@@ -131,7 +132,7 @@ impl Layout {
         format: Option<Format>,
         maps: &[Mapping],
         how: &bus_trace::Recording<'_>,
-    ) -> Result<(DriveLog, Vec<String>), String> {
+    ) -> Result<(DriveLog, Vec<String>), LogError> {
         let (time_s, mut table) = self.signals(bytes, format, maps)?;
         let (dt_s, seconds) = step_of(&time_s);
         if let Some(speed) = table.get(SPEED_COLUMN) {
@@ -147,7 +148,7 @@ impl Layout {
         let used_s = dt_s * is_free.iter().filter(|free| **free).count() as f64;
         if used_s < LEAST_S {
             let list: Vec<String> = findings.iter().map(|f| format!("{} {}", f[0], f[1])).collect();
-            return Err(format!(
+            return refuse(format!(
                 "{used_s:.1} s of {seconds:.1} s are left, less than {LEAST_S} s; left out: {}",
                 list.join(", ")
             ));
@@ -196,20 +197,20 @@ impl Layout {
         bytes: &[u8],
         format: Option<Format>,
         maps: &[Mapping],
-    ) -> Result<(Vec<f64>, Table), String> {
+    ) -> Result<(Vec<f64>, Table), LogError> {
         let (time_s, table) = self.table(bytes, format, maps)?;
         let (_, seconds) = step_of(&time_s);
         self.within_limits(&table)?;
         if let Some(missing) = &self.missing {
             let rows = time_s.len();
-            return Err(format!(
+            return refuse(format!(
                 "{rows} rows of {seconds:.1} s are read, but {} recordings lack {missing}: no driver can be identified",
                 self.name
             ));
         }
         if let Some(k) = time_s.windows(2).position(|w| w[1].is_nan() || w[1] <= w[0]) {
             let (from, to) = (time_s[k], time_s[k + 1]);
-            return Err(format!(
+            return refuse(format!(
                 "row {}: the time goes from {from} to {to}: it must grow",
                 k + 2
             ));
@@ -223,17 +224,17 @@ impl Layout {
         bytes: &[u8],
         format: Option<Format>,
         maps: &[Mapping],
-    ) -> Result<(Vec<f64>, Table), String> {
+    ) -> Result<(Vec<f64>, Table), LogError> {
         let mut columns = self.columns.clone();
         for map in maps {
             if let Some(why) = self.never.get(&map.channel) {
-                return Err(format!("channel {}: {why}", map.channel));
+                return refuse(format!("channel {}: {why}", map.channel));
             }
             let scale = map.scale.unwrap_or(1.0);
             columns.insert(NAMES[map.column].into(), format!("{}*{scale}", map.channel));
         }
         let Some((time, scale)) = columns.remove("time_s").and_then(|text| term(&text)) else {
-            return Err(format!(
+            return refuse(format!(
                 "layout {}: time_s is not given; --map time_s=CHANNEL*SCALE",
                 self.name
             ));
@@ -248,8 +249,8 @@ impl Layout {
         }
         whole.extend_from_slice(bytes);
         let contents = formats::read_bytes(whole, format.unwrap_or(Format::Csv), Some(&time));
-        let Contents::Channels(recording) = contents.map_err(|e| e.to_string())? else {
-            return Err("a table is wanted, this is a recording of the bus".into());
+        let Contents::Channels(recording) = contents? else {
+            return refuse("a table is wanted, this is a recording of the bus");
         };
         let mut table = Table::new();
         for (name, text) in columns {
@@ -257,7 +258,7 @@ impl Layout {
             for part in text.split(" + ") {
                 let (channel, scale) = term(part)
                     .ok_or_else(|| format!("layout {}: {name} = {text:?} is no CHANNEL*SCALE", self.name))?;
-                let (_, series) = recording.find(&channel).map_err(|e| e.to_string())?;
+                let (_, series) = recording.find(&channel)?;
                 sum.resize(series.values.len(), 0.0);
                 for (sum, value) in sum.iter_mut().zip(&series.values) {
                     *sum += scale * value;

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::error::{RoadError, refuse};
 use super::network::{Leg, Network, Next, listed};
 use super::road::{Lane, Road};
 use crate::input::InputError;
@@ -55,9 +56,9 @@ pub(super) fn start(
     network: &Network,
     choice: &LaneChoice,
     notes: &mut Vec<String>,
-) -> Result<(Leg, i32), String> {
+) -> Result<(Leg, i32), RoadError> {
     if choice.lane == Some(0) {
-        return Err("lane 0 is the centre lane, which has no width".into());
+        return refuse("lane 0 is the centre lane, which has no width");
     }
     let candidates = match &choice.road {
         Some(id) => {
@@ -84,7 +85,7 @@ pub(super) fn start(
 }
 
 /// The legs from which all roads of the file can be driven in one go, those along the road's s first.
-fn chain_ends(network: &Network) -> Result<Vec<Leg>, String> {
+fn chain_ends(network: &Network) -> Result<Vec<Leg>, RoadError> {
     let legs = [true, false].map(|along| (0..network.roads.len()).map(move |index| (index, along)));
     let legs: Vec<Leg> = legs.into_iter().flatten().collect();
     let mut followers = HashSet::new();
@@ -105,7 +106,7 @@ fn chain_ends(network: &Network) -> Result<Vec<Leg>, String> {
     }
     if whole.is_empty() {
         let (legs, stuck) = network.chain((0, true))?;
-        return Err(not_one_chain(network, &legs, stuck));
+        return refuse(not_one_chain(network, &legs, stuck));
     }
     Ok(whole)
 }
@@ -147,7 +148,7 @@ fn not_one_chain(network: &Network, chain: &[Leg], stuck: Option<Next>) -> Strin
 }
 
 /// The lane to begin in on a leg: the one asked for, if it is driven in that direction, or the rightmost.
-fn lane_on(network: &Network, (index, along): Leg, lane: Option<i32>) -> Result<i32, String> {
+fn lane_on(network: &Network, (index, along): Leg, lane: Option<i32>) -> Result<i32, RoadError> {
     let node = &network.roads[index];
     let road = Road::read(node.id, node.node)?;
     // The side that is driven along s.
@@ -165,7 +166,7 @@ fn lane_on(network: &Network, (index, along): Leg, lane: Option<i32>) -> Result<
             return Ok(id);
         }
         let against = if along { "against" } else { "along" };
-        return Err(format!(
+        return refuse(format!(
             "road {}: lane {id} is driven {against} the road's s there",
             node.id
         ));
@@ -186,5 +187,6 @@ fn lane_on(network: &Network, (index, along): Leg, lane: Option<i32>) -> Result<
                 "road {}: it has no driving lane {direction} its s; choose one with --lane",
                 node.id
             )
+            .into()
         })
 }

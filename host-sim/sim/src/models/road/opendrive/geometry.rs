@@ -5,6 +5,7 @@
 
 use roxmltree::Node;
 
+use super::error::{RoadError, refuse};
 use super::polynomial::Polynomial;
 use super::xml::{cubic, number, text};
 use crate::models::road::centreline::quadrature;
@@ -58,7 +59,7 @@ pub(super) enum Kind {
 ///
 /// # Errors
 /// An element that is broken or unknown, or that does not begin where the one before ends.
-pub(super) fn read(road: &str, plan_view: Node) -> Result<Vec<Geometry>, String> {
+pub(super) fn read(road: &str, plan_view: Node) -> Result<Vec<Geometry>, RoadError> {
     let mut line: Vec<Geometry> = Vec::new();
     for node in plan_view.children().filter(|n| n.tag_name().name() == "geometry") {
         let start_m = number(node, "s", &format!("road {road}: planView"))?;
@@ -70,10 +71,10 @@ pub(super) fn read(road: &str, plan_view: Node) -> Result<Vec<Geometry>, String>
             } else {
                 ("s", start_m)
             };
-            return Err(format!("{place}: {what} = {value} m is negative"));
+            return refuse(format!("{place}: {what} = {value} m is negative"));
         }
         if start_m + length_m > MAX_COURSE_M {
-            return Err(format!(
+            return refuse(format!(
                 "{place}: length = {length_m} m makes the road longer than {MAX_COURSE_M} m"
             ));
         }
@@ -88,7 +89,7 @@ pub(super) fn read(road: &str, plan_view: Node) -> Result<Vec<Geometry>, String>
         if let Some(last) = line.last() {
             joins(last, start_m, start).map_err(|e| format!("{place}: {e}"))?;
         } else if start_m > GAP_ALONG_M {
-            return Err(format!("{place}: the first geometry has to begin at s = 0"));
+            return refuse(format!("{place}: the first geometry has to begin at s = 0"));
         }
         line.push(Geometry {
             start_m,
@@ -98,15 +99,15 @@ pub(super) fn read(road: &str, plan_view: Node) -> Result<Vec<Geometry>, String>
         });
     }
     if line.is_empty() {
-        return Err(format!("road {road}: <planView> has no geometry"));
+        return refuse(format!("road {road}: <planView> has no geometry"));
     }
     Ok(line)
 }
 
-fn joins(last: &Geometry, start_m: f64, start: Pose) -> Result<(), String> {
+fn joins(last: &Geometry, start_m: f64, start: Pose) -> Result<(), RoadError> {
     let end_m = last.start_m + last.length_m;
     if (start_m - end_m).abs() > GAP_ALONG_M {
-        return Err(format!(
+        return refuse(format!(
             "the geometry before it begins at s = {} m and is {} m long, so it ends at {end_m} m",
             last.start_m, last.length_m
         ));
@@ -114,14 +115,14 @@ fn joins(last: &Geometry, start_m: f64, start: Pose) -> Result<(), String> {
     let end = last.at(end_m).pose;
     let gap_m = (start.x_m - end.x_m).hypot(start.y_m - end.y_m);
     if gap_m > GAP_M {
-        return Err(format!(
+        return refuse(format!(
             "it begins {gap_m:.2} m beside the end of the geometry before it"
         ));
     }
     Ok(())
 }
 
-fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, String> {
+fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, RoadError> {
     let elements = node.children().filter(Node::is_element);
     let mut kinds = elements.filter(|child| !ADDITIONAL.contains(&child.tag_name().name()));
     let known = ["line", "arc", "spiral", "poly3", "paramPoly3"];
@@ -130,7 +131,7 @@ fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, String> {
         .find(|n| known.contains(&n.tag_name().name()))
         .or(kinds.next())
     else {
-        return Err(format!(
+        return refuse(format!(
             "{place}: it has no kind of geometry inside (line, arc, spiral, poly3, paramPoly3)"
         ));
     };
@@ -153,7 +154,7 @@ fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, String> {
                 Some("arcLength") => length_m,
                 Some("normalized") | None => 1.0,
                 Some(other) => {
-                    return Err(format!(
+                    return refuse(format!(
                         "{place}: pRange=\"{other}\" of <paramPoly3> is neither arcLength nor normalized"
                     ));
                 }
@@ -161,18 +162,18 @@ fn kind(node: Node, length_m: f64, place: &str) -> Result<Kind, String> {
             let (u, v) = (cubic(shape, "U", place)?, cubic(shape, "V", place)?);
             Polynomial::new(u, v, end, length_m, place).map(Kind::Polynomial)
         }
-        unknown => Err(format!(
+        unknown => refuse(format!(
             "{place}: <{unknown}> is not supported; line, arc, spiral, poly3 and paramPoly3 are"
         )),
     }
 }
 
-fn clothoid(curvature_1pm: [f64; 2], length_m: f64, place: &str) -> Result<Kind, String> {
+fn clothoid(curvature_1pm: [f64; 2], length_m: f64, place: &str) -> Result<Kind, RoadError> {
     let [start, end] = curvature_1pm;
     // Short enough for the quadrature: a twentieth of a radian a step.
     let turn = start.abs().max(end.abs()) * length_m;
     if turn > MOST_TURN_RAD {
-        return Err(format!(
+        return refuse(format!(
             "{place}: with a curvature of {start} to {end} 1/m it turns by up to {turn:.0} rad, more than {MOST_TURN_RAD}"
         ));
     }

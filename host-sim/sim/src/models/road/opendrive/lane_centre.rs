@@ -5,6 +5,7 @@
 //! has another heading, curvature and length than the reference line; all three follow from t and its two
 //! derivatives.
 
+use super::error::{RoadError, refuse};
 use super::geometry::Geometry;
 use super::profile::{Cubic, Profile};
 use super::road::{Road, Section};
@@ -65,7 +66,7 @@ struct Point {
 
 /// # Errors
 /// What is broken or missing.
-pub(super) fn stretch(road: &Road, section: &Section, id: i32) -> Result<Stretch, String> {
+pub(super) fn stretch(road: &Road, section: &Section, id: i32) -> Result<Stretch, RoadError> {
     let sign = if id < 0 { -1 } else { 1 };
     let widths = |id: i32| section.need(road.id, id)?.widths(road.id, section);
     let inner: Vec<Profile> = (1..id.abs())
@@ -148,7 +149,7 @@ fn breakpoints<'p>(
 }
 
 impl Interval<'_> {
-    fn at(&self, s_m: f64) -> Result<Point, String> {
+    fn at(&self, s_m: f64) -> Result<Point, RoadError> {
         let reference = self.geometry.at(s_m);
         let own = self.own.at(s_m);
         let mut t = self.lane_offset.at(s_m);
@@ -157,7 +158,7 @@ impl Interval<'_> {
         }
         add(&mut t, 0.5 * self.sign, own);
         if own[0] < -ROUNDING_M {
-            return Err(format!(
+            return refuse(format!(
                 "has a negative width of {:.3} m at s = {s_m:.2} m",
                 own[0]
             ));
@@ -174,7 +175,7 @@ impl Interval<'_> {
         let along = 1.0 - k * plan;
         if along < LEAST_SHARE {
             let radius = 1.0 / k.abs();
-            return Err(format!(
+            return refuse(format!(
                 "lies {:.2} m beside the reference line at s = {s_m:.2} m, where the radius is {radius:.2} m: \
                  its centre folds back",
                 plan.abs()
@@ -204,7 +205,7 @@ impl Interval<'_> {
     }
 
     /// Adds the pieces from one place to another; returns the points there.
-    fn cut(&self, from_m: f64, to_m: f64, pieces: &mut Vec<Piece>) -> Result<[Point; 2], String> {
+    fn cut(&self, from_m: f64, to_m: f64, pieces: &mut Vec<Piece>) -> Result<[Point; 2], RoadError> {
         let first = self.at(from_m)?;
         let blocks = ((to_m - from_m) / BLOCK_M).ceil().max(1.0);
         let block_m = (to_m - from_m) / blocks;
@@ -219,14 +220,14 @@ impl Interval<'_> {
             let longest = points.iter().map(|p| p.speed).fold(0.0, f64::max) * block_m;
             let turns = longest * sharpest / MAX_TURN_RAD;
             if longest * sharpest > MOST_TURN_RAD || longest > MOST_TURN_RAD * BLOCK_M {
-                return Err(format!(
+                return refuse(format!(
                     "cannot be followed at s = {start_m:.2} m: it turns as no road does"
                 ));
             }
             let count = (longest / MAX_PIECE_M).max(turns).ceil().max(1.0);
             let step_m = block_m / count;
             if pieces.len() as f64 + count > MOST_PIECES as f64 {
-                return Err(format!(
+                return refuse(format!(
                     "has more than {MOST_PIECES} pieces at s = {start_m:.2} m"
                 ));
             }
@@ -240,13 +241,13 @@ impl Interval<'_> {
         Ok([first, last])
     }
 
-    fn piece(&self, from_m: f64, step_m: f64, start: &Point, end: &Point) -> Result<Piece, String> {
+    fn piece(&self, from_m: f64, step_m: f64, start: &Point, end: &Point) -> Result<Piece, RoadError> {
         let length_m = quadrature(step_m, |ds| {
             (self.at(from_m + ds).map_or(f64::NAN, |p| p.speed), 0.0)
         })
         .0;
         if length_m.is_nan() {
-            return Err(format!("cannot be followed at s = {from_m:.2} m"));
+            return refuse(format!("cannot be followed at s = {from_m:.2} m"));
         }
         // Half of the arc length lies a little beside half of the step where the speed changes.
         let middle_m = from_m + 0.5 * step_m;

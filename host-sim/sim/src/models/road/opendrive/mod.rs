@@ -13,6 +13,7 @@
 //! surfaces, `<include>`.
 
 mod choice;
+mod error;
 mod geometry;
 mod lane_centre;
 mod network;
@@ -26,6 +27,7 @@ mod xml;
 use roxmltree::{Document, ParsingOptions};
 use serde::Serialize;
 
+use self::error::{RoadError, refuse};
 use self::lane_centre::{MOST_PIECES, Stretch, stretch};
 use self::network::{Leg, Network, Next, listed};
 use self::road::{Lane, Road};
@@ -57,7 +59,7 @@ pub struct RoadUsed {
 ///
 /// # Errors
 /// A sentence without the file's name.
-pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course, String> {
+pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course, RoadError> {
     let options = ParsingOptions {
         allow_dtd: true,
         ..ParsingOptions::default()
@@ -68,7 +70,7 @@ pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course
     let root = document.root_element();
     if root.tag_name().name() != "OpenDRIVE" {
         let found = root.tag_name().name();
-        return Err(format!(
+        return refuse(format!(
             "not an OpenDRIVE file: its root is <{found}>, not <OpenDRIVE>"
         ));
     }
@@ -80,7 +82,7 @@ pub(super) fn read(name: &str, text: &str, choice: &LaneChoice) -> Result<Course
     };
     if let Some(turn) = choice.turns.iter().find(not_taken) {
         let notes = drive.notes.join("; ");
-        return Err(format!(
+        return refuse(format!(
             "turn {turn}: no junction on the way leads there ({notes})"
         ));
     }
@@ -113,7 +115,7 @@ struct Drive<'n, 'a> {
 }
 
 impl<'n, 'a> Drive<'n, 'a> {
-    fn begin(network: &'n Network<'a>, choice: &LaneChoice) -> Result<Self, String> {
+    fn begin(network: &'n Network<'a>, choice: &LaneChoice) -> Result<Self, RoadError> {
         let mut notes = Vec::new();
         let (leg, lane) = choice::start(network, choice, &mut notes)?;
         Ok(Self {
@@ -129,7 +131,7 @@ impl<'n, 'a> Drive<'n, 'a> {
     }
 
     /// Drives on from road to road until the way ends.
-    fn follow(&mut self) -> Result<(), String> {
+    fn follow(&mut self) -> Result<(), RoadError> {
         loop {
             let (index, along) = self.leg;
             let id = self.network.roads[index].id;
@@ -184,7 +186,7 @@ impl<'n, 'a> Drive<'n, 'a> {
     }
 
     /// Drives through the sections of a road; returns the links of its last lane onwards, or nothing if the way ends before.
-    fn through_sections(&mut self, road: &Road, along: bool) -> Result<Option<Vec<i32>>, String> {
+    fn through_sections(&mut self, road: &Road, along: bool) -> Result<Option<Vec<i32>>, RoadError> {
         let mut sections = road.sections(self.lane)?;
         if !along {
             sections.reverse();
@@ -219,7 +221,7 @@ impl<'n, 'a> Drive<'n, 'a> {
         Ok(Some(links))
     }
 
-    fn append(&mut self, mut stretch: Stretch, road: &str, s_m: f64) -> Result<(), String> {
+    fn append(&mut self, mut stretch: Stretch, road: &str, s_m: f64) -> Result<(), RoadError> {
         let mut heading = self.pieces.last().map(|last| last.middle.heading_rad);
         for piece in &mut stretch.pieces {
             // Headings count full turns.
@@ -230,7 +232,7 @@ impl<'n, 'a> Drive<'n, 'a> {
             heading = Some(piece.middle.heading_rad);
         }
         if self.pieces.len() + stretch.pieces.len() > MOST_PIECES {
-            return Err(format!(
+            return refuse(format!(
                 "road {road}: in the section at s = {s_m} m the way has come to more than {MOST_PIECES} pieces; begin \
                  nearer to its end"
             ));
@@ -247,7 +249,7 @@ impl<'n, 'a> Drive<'n, 'a> {
             } = before.to_local(after);
             let (gap_m, lane, degrees) = (x_m.hypot(y_m), self.lane, heading_rad.to_degrees());
             if gap_m > GAP_M || heading_rad.abs() > KINK_RAD {
-                return Err(format!(
+                return refuse(format!(
                     "road {road}: in the section at s = {s_m} m the centre of lane {lane} does not continue the way so \
                      far: it is {gap_m:.2} m beside it and turned by {degrees:.1} degrees"
                 ));

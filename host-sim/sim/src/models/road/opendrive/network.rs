@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use roxmltree::Node;
 
+use super::error::{RoadError, refuse};
 use super::xml::{child, children, text};
 
 /// A road and the direction in which it is driven: along its s or against it.
@@ -66,12 +67,12 @@ pub(super) fn listed(ways: &[Way]) -> String {
 impl<'a> Network<'a> {
     /// # Errors
     /// A road without an identifier, or two with the same one; no road at all.
-    pub(super) fn read(root: Node<'a, 'a>, turns: &[String]) -> Result<Self, String> {
+    pub(super) fn read(root: Node<'a, 'a>, turns: &[String]) -> Result<Self, RoadError> {
         let (mut roads, mut by_id) = (Vec::new(), HashMap::new());
         for node in children(root, "road") {
             let id = text(node, "id").ok_or("a <road> has no `id`")?;
             if by_id.insert(id, roads.len()).is_some() {
-                return Err(format!("two roads have the id {id}"));
+                return refuse(format!("two roads have the id {id}"));
             }
             roads.push(RoadNode {
                 id,
@@ -81,7 +82,7 @@ impl<'a> Network<'a> {
             });
         }
         if roads.is_empty() {
-            return Err("it has no <road>".into());
+            return refuse("it has no <road>");
         }
         let junctions = children(root, "junction").filter_map(|node| Some((text(node, "id")?, node)));
         Ok(Self {
@@ -92,7 +93,7 @@ impl<'a> Network<'a> {
         })
     }
 
-    pub(super) fn road(&self, id: &str) -> Result<usize, String> {
+    pub(super) fn road(&self, id: &str) -> Result<usize, RoadError> {
         let listed = || {
             self.roads
                 .iter()
@@ -102,21 +103,21 @@ impl<'a> Network<'a> {
                 .join(", ")
         };
         let found = self.by_id.get(id).copied();
-        found.ok_or_else(|| format!("it has no road {id}; it has {}", listed()))
+        found.ok_or_else(|| format!("it has no road {id}; it has {}", listed()).into())
     }
 
     /// What comes after a leg, for a lane of it if one is given.
     ///
     /// # Errors
     /// A link that names nothing, or no end of a road.
-    pub(super) fn next(&self, (road, along): Leg, lane: Option<i32>) -> Result<Next<'a>, String> {
+    pub(super) fn next(&self, (road, along): Leg, lane: Option<i32>) -> Result<Next<'a>, RoadError> {
         let RoadNode { id, node, .. } = self.roads[road];
         let side = if along { "successor" } else { "predecessor" };
         let Some(link) = child(node, "link").and_then(|link| child(link, side)) else {
             return Ok(Next::End);
         };
         let Some(target) = text(link, "elementId").filter(|target| !target.is_empty()) else {
-            return Err(format!("road {id}: its {side} has no `elementId`"));
+            return refuse(format!("road {id}: its {side} has no `elementId`"));
         };
         if text(link, "elementType") == Some("junction") {
             return Ok(match self.junctions.get(target) {
@@ -137,7 +138,7 @@ impl<'a> Network<'a> {
             Some("start") => true,
             Some("end") => false,
             Some(other) => {
-                return Err(format!(
+                return refuse(format!(
                     "road {id}: contactPoint=\"{other}\" of its {side} is neither start nor end"
                 ));
             }
@@ -220,7 +221,7 @@ impl<'a> Network<'a> {
     }
 
     /// The legs from one on, for as long as there is one way only; a ring ends where it began.
-    pub(super) fn chain(&self, start: Leg) -> Result<(Vec<Leg>, Option<Next<'a>>), String> {
+    pub(super) fn chain(&self, start: Leg) -> Result<(Vec<Leg>, Option<Next<'a>>), RoadError> {
         let (mut legs, mut seen) = (vec![start], HashSet::from([start.0]));
         loop {
             let next = self.next(legs[legs.len() - 1], None)?;

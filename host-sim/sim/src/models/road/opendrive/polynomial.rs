@@ -3,6 +3,7 @@
 //! A table of arc lengths finds the parameter. Where a polynomial's true length differs from the one that its element
 //! states, arc length is stretched by the small rest, so that both ends are met.
 
+use super::error::{RoadError, refuse};
 use super::geometry::Point;
 use crate::models::road::centreline::quadrature;
 use crate::models::road::piece::Pose;
@@ -34,7 +35,7 @@ fn derivatives([a, b, c, d]: [f64; 4], p: f64) -> [f64; 4] {
 
 impl Polynomial {
     /// `v` over `u` itself, as far as the arc length goes.
-    pub(super) fn of_length(v: [f64; 4], length_m: f64, place: &str) -> Result<Self, String> {
+    pub(super) fn of_length(v: [f64; 4], length_m: f64, place: &str) -> Result<Self, RoadError> {
         let u = [0.0, 1.0, 0.0, 0.0];
         // The arc is at least as long as u.
         let whole = Self::tabulated(u, v, length_m, length_m);
@@ -48,12 +49,12 @@ impl Polynomial {
         end: f64,
         length_m: f64,
         place: &str,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, RoadError> {
         let mut polynomial = Self::tabulated(u, v, end, length_m);
         let true_m = polynomial.arc_m[polynomial.arc_m.len() - 1];
         polynomial.stretch = true_m / length_m;
         if !LENGTH_RATIO.contains(&polynomial.stretch) {
-            return Err(format!(
+            return refuse(format!(
                 "{place}: the polynomial is {true_m:.2} m long over its parameter's range, not {length_m} m; is \
                  pRange right?"
             ));

@@ -2,6 +2,7 @@
 
 use roxmltree::Node;
 
+use super::error::{RoadError, refuse};
 use super::xml::{cubic, number};
 
 /// One cubic polynomial of the distance from `start_m`.
@@ -38,13 +39,13 @@ impl Profile {
         start: &str,
         origin_m: f64,
         place: &str,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, RoadError> {
         let mut cubics: Vec<Cubic> = Vec::new();
         for node in nodes {
             let start_m = origin_m + number(node, start, place)?;
             if cubics.last().is_some_and(|last| start_m < last.start_m) {
                 let element = node.tag_name().name();
-                return Err(format!(
+                return refuse(format!(
                     "{place}: the <{element}> elements are not in ascending order of {start}"
                 ));
             }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use roxmltree::Node;
 
+use super::error::{RoadError, refuse};
 use super::geometry::{self, Geometry};
 use super::profile::{Cubic, Profile};
 use super::xml::{child, children, number, text};
@@ -45,11 +46,11 @@ pub(super) struct Lane<'a> {
 impl<'a> Road<'a> {
     /// # Errors
     /// What is broken or not supported.
-    pub(super) fn read(id: &'a str, node: Node<'a, 'a>) -> Result<Self, String> {
+    pub(super) fn read(id: &'a str, node: Node<'a, 'a>) -> Result<Self, RoadError> {
         let place = format!("road {id}");
         let stated_m = number(node, "length", &place)?;
         if stated_m < 0.0 {
-            return Err(format!("{place}: length = {stated_m} m is negative"));
+            return refuse(format!("{place}: length = {stated_m} m is negative"));
         }
         let need = |parent, name| child(parent, name).ok_or_else(|| format!("{place}: it has no <{name}>"));
         let line = geometry::read(id, need(node, "planView")?)?;
@@ -82,7 +83,7 @@ impl<'a> Road<'a> {
             line,
         };
         if road.sections.is_empty() {
-            return Err(format!("{place}: it has no <laneSection>"));
+            return refuse(format!("{place}: it has no <laneSection>"));
         }
         Ok(road)
     }
@@ -91,7 +92,7 @@ impl<'a> Road<'a> {
     ///
     /// # Errors
     /// A section without a place, sections that do not ascend.
-    pub(super) fn sections(&self, lane: i32) -> Result<Vec<Section<'a>>, String> {
+    pub(super) fn sections(&self, lane: i32) -> Result<Vec<Section<'a>>, RoadError> {
         let place = format!("road {}: laneSection", self.id);
         let side = if lane < 0 { "right" } else { "left" };
         let mut sections: Vec<Section> = Vec::new();
@@ -103,11 +104,11 @@ impl<'a> Road<'a> {
             }
             if let Some(last) = sections.last_mut() {
                 if start_m < last.start_m {
-                    return Err(format!("{place}: the sections are not in ascending order of s"));
+                    return refuse(format!("{place}: the sections are not in ascending order of s"));
                 }
                 last.end_m = start_m.min(self.length_m);
             } else if start_m > 0.01 {
-                return Err(format!(
+                return refuse(format!(
                     "{place}: the first section has to begin at s = 0, not at {start_m} m"
                 ));
             }
@@ -119,7 +120,7 @@ impl<'a> Road<'a> {
         }
         sections.retain(|section| section.end_m - section.start_m > LEAST_SECTION_M);
         if sections.is_empty() {
-            return Err(format!("{place}: no section is longer than nothing"));
+            return refuse(format!("{place}: no section is longer than nothing"));
         }
         Ok(sections)
     }
@@ -146,7 +147,10 @@ impl<'a> Road<'a> {
     }
 }
 
-fn shapes<'a>(nodes: impl Iterator<Item = Node<'a, 'a>>, place: &str) -> Result<Vec<(f64, Profile)>, String> {
+fn shapes<'a>(
+    nodes: impl Iterator<Item = Node<'a, 'a>>,
+    place: &str,
+) -> Result<Vec<(f64, Profile)>, RoadError> {
     let mut shapes: Vec<(f64, Profile)> = Vec::new();
     for node in nodes {
         let s_m = number(node, "s", place)?;
@@ -154,7 +158,7 @@ fn shapes<'a>(nodes: impl Iterator<Item = Node<'a, 'a>>, place: &str) -> Result<
         match shapes.last_mut() {
             Some((last_m, cubics)) if *last_m == s_m => cubics.0.append(&mut cubic),
             Some((last_m, _)) if *last_m > s_m => {
-                return Err(format!(
+                return refuse(format!(
                     "{place}: the <shape> elements are not in ascending order of s"
                 ));
             }
@@ -186,7 +190,7 @@ impl<'a> Section<'a> {
     }
 
     /// The lane, or what is there instead.
-    pub(super) fn need(&self, road: &str, id: i32) -> Result<Lane<'a>, String> {
+    pub(super) fn need(&self, road: &str, id: i32) -> Result<Lane<'a>, RoadError> {
         self.lane(id).ok_or_else(|| {
             let mut there = String::new();
             for lane in self.lanes() {
@@ -196,6 +200,7 @@ impl<'a> Section<'a> {
             let there = if there.is_empty() { "none".into() } else { there };
             let start_m = self.start_m;
             format!("road {road}: the lane section at s = {start_m} m has no lane {id}; it has {there}")
+                .into()
         })
     }
 }
@@ -229,16 +234,16 @@ impl<'a> Lane<'a> {
     ///
     /// # Errors
     /// None given, or one that is broken.
-    pub(super) fn widths(&self, road: &str, section: &Section) -> Result<Profile, String> {
+    pub(super) fn widths(&self, road: &str, section: &Section) -> Result<Profile, RoadError> {
         let (id, start_m) = (self.id, section.start_m);
         let place = format!("road {road}: lane {id} of the section at s = {start_m} m");
         let widths = Profile::read(children(self.node, "width"), "sOffset", start_m, &place)?;
         match widths.0.first() {
             None if child(self.node, "border").is_some() => {
-                Err(format!("{place}: <border> is not supported, only <width>"))
+                refuse(format!("{place}: <border> is not supported, only <width>"))
             }
-            None => Err(format!("{place}: it has no <width>")),
-            Some(Cubic { start_m: first_m, .. }) if *first_m > start_m + 0.01 => Err(format!(
+            None => refuse(format!("{place}: it has no <width>")),
+            Some(Cubic { start_m: first_m, .. }) if *first_m > start_m + 0.01 => refuse(format!(
                 "{place}: its first <width> has sOffset = {} m, not 0",
                 first_m - start_m
             )),

@@ -3,6 +3,8 @@
 
 use roxmltree::Node;
 
+use super::error::{RoadError, refuse};
+
 /// The children of an element that bear a name.
 pub(super) fn children<'a>(node: Node<'a, 'a>, name: &'static str) -> impl Iterator<Item = Node<'a, 'a>> {
     node.children()
@@ -21,17 +23,17 @@ pub(super) fn text<'a>(node: Node<'a, 'a>, name: &str) -> Option<&'a str> {
 }
 
 /// A number that has to be there. `place` says where in the file, for people.
-pub(super) fn number(node: Node, name: &str, place: &str) -> Result<f64, String> {
+pub(super) fn number(node: Node, name: &str, place: &str) -> Result<f64, RoadError> {
     let element = node.tag_name().name();
     let Some(text) = text(node, name) else {
-        return Err(format!("{place}: <{element}> has no `{name}`"));
+        return refuse(format!("{place}: <{element}> has no `{name}`"));
     };
     let value = text.parse().ok().filter(|value: &f64| value.is_finite());
-    value.ok_or_else(|| format!("{place}: {name}=\"{text}\" of <{element}> is not a number"))
+    value.ok_or_else(|| format!("{place}: {name}=\"{text}\" of <{element}> is not a number").into())
 }
 
 /// The coefficients `a` to `d` of a cubic polynomial, the names ending with `suffix`.
-pub(super) fn cubic(node: Node, suffix: &str, place: &str) -> Result<[f64; 4], String> {
+pub(super) fn cubic(node: Node, suffix: &str, place: &str) -> Result<[f64; 4], RoadError> {
     let mut cubic = [0.0; 4];
     for (slot, letter) in cubic.iter_mut().zip(["a", "b", "c", "d"]) {
         *slot = number(node, &format!("{letter}{suffix}"), place)?;

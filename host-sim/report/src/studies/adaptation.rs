@@ -1,0 +1,313 @@
+//! What a study of two adaptations shows: the maps of driver and law, their product, the closed loops over time.
+
+use crate::document::{Block, Cell, Report, Section, Table};
+use crate::plot::{Axis, Band, Figure, Mark, Panel, Series};
+use haptic_batch::adaptation::{AdaptationResults, Pair, SMALL_GAIN, swings};
+use haptic_batch::compare::Mean;
+
+/// How long trust's shares remember (`haptic_sim::drivers`), s.
+const MEMORY_S: f64 = 5.0;
+/// Times of trust and of the estimate in the map, s.
+const TRUST_S: [f64; 6] = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
+const DELAYS_S: [f64; 6] = [5.0, 15.0, 25.0, 35.0, 45.0, 55.0];
+/// With how many further lags, and of what time constant: a law that follows at once, and one that follows slowly, s.
+const LAW_LAGS_S: [f64; 2] = [0.0, 30.0];
+
+/// The document of a study.
+pub fn report(results: &AdaptationResults) -> Report {
+    let maps = "Where K_hg settles at a fixed K_1, begun from a low and from a high K_hg, with 95 % intervals; where K_1 settles under each law \
+                at a K_hg that is held. The loop of both rests where the lines cross.";
+    let over_time = "K_hg under each law; shaded: the torque is lost. The first seed.";
+    let gains = "K_1 of the same drives.";
+    let critical = format!(
+        "The product of slopes, negative, at which a linear loop begins to swing, and how long a swing lasts: the driver's memory of {MEMORY_S} s, \
+         the lag of trust, the delay of the estimate, and a law without and with a lag. Below 1 no such loop swings."
+    );
+    Report {
+        title: format!("Two adaptations: {}", results.name),
+        summary: summary(results),
+        notes: notes(results),
+        sections: vec![
+            Section::new(
+                "Small gain",
+                vec![
+                    Block::figure("maps", maps_figure(results), maps),
+                    Block::Table(products(results)),
+                    Block::Text(judgement(results)),
+                ],
+            ),
+            Section::new(
+                "The closed loop",
+                vec![
+                    Block::figure("k_hg", series_figure(results, Quantity::KHg), over_time),
+                    Block::figure("k_1", series_figure(results, Quantity::K1), gains),
+                    Block::Table(loops(results)),
+                ],
+            ),
+            Section::new(
+                "Where loops swing",
+                vec![
+                    Block::figure("swings", swings_figure(), critical.clone()),
+                    Block::Table(swings_table(critical)),
+                ],
+            ),
+        ],
+        ..Report::default()
+    }
+}
+
+fn summary(results: &AdaptationResults) -> String {
+    let [lost_at_s, lost_for_s, settles_s, averages_s] = results.times_s;
+    let (road, kmh) = &results.place;
+    format!(
+        "{} laws behind the shipping ECU, {} drivers whose K_hg follows trust, {road} at {kmh} km/h, {} seeds. Maps: {settles_s} s to settle, \
+         {averages_s} s averaged. Loops: the torque is lost at {lost_at_s} s for {lost_for_s} s. Intervals are of 95 %, over the seeds.",
+        results.laws.len(),
+        results.drivers.len(),
+        results.seeds,
+    )
+}
+
+fn names<'r>(results: &'r AdaptationResults, pair: &Pair) -> [&'r str; 2] {
+    [&results.laws[pair.law], &results.drivers[pair.driver]]
+}
+
+fn notes(results: &AdaptationResults) -> Vec<String> {
+    let ended = results.pairs.iter().filter(|pair| pair.ended > 0);
+    let ended: Vec<String> = ended
+        .map(|pair| format!("{} ({})", names(results, pair).join(" with "), pair.ended))
+        .collect();
+    if ended.is_empty() {
+        return Vec::new();
+    }
+    let what = "drives that left the road, or in which the ECU ended guidance by itself";
+    vec![format!("{what}: {}", ended.join(", "))]
+}
+
+fn with_interval(value: Option<&Mean>) -> Cell {
+    Cell::Text(value.map_or("\u{2013}".into(), |value| match value.interval_95 {
+        Some([low, high]) => format!("{:.3} \u{b1} {:.3}", value.mean, 0.5 * (high - low)),
+        None => format!("{:.3}", value.mean),
+    }))
+}
+
+fn products(results: &AdaptationResults) -> Table {
+    let row = |pair: &Pair| {
+        let verdict = match pair.product {
+            None => "no: the driver has two equilibria",
+            Some(product) if product <= SMALL_GAIN => "yes",
+            Some(product) if product < 1.0 => "without margin",
+            Some(_) => "no",
+        };
+        let [law, driver] = names(results, pair).map(Cell::text);
+        vec![
+            law,
+            driver,
+            Cell::number(pair.law_slope, 3),
+            Cell::number(pair.driver_slope, 3),
+            Cell::number(pair.product, 3),
+            Cell::text(verdict),
+        ]
+    };
+    let columns = [
+        "Law",
+        "Driver",
+        "dK_1/dK_hg (N.m)",
+        "dK_hg/dK_1 (1/N.m)",
+        "Product",
+        "Small gain",
+    ];
+    Table::new(
+        format!(
+            "The largest slopes of law and driver, in size; small gain holds up to a product of {SMALL_GAIN}"
+        ),
+        columns,
+        results.pairs.iter().map(row),
+    )
+}
+
+/// The laws with which small gain holds for every driver.
+fn judgement(results: &AdaptationResults) -> String {
+    let all = |law: usize| {
+        results
+            .pairs
+            .iter()
+            .filter(|pair| pair.law == law)
+            .all(Pair::holds)
+    };
+    let laws = results.laws.iter().enumerate();
+    let held: Vec<&str> = laws
+        .filter(|(law, _)| all(*law))
+        .map(|(_, name)| name.as_str())
+        .collect();
+    match held[..] {
+        [] => "Small gain holds for every driver with no law.".into(),
+        _ => format!("Small gain holds for every driver with: {}.", held.join(", ")),
+    }
+}
+
+fn loops(results: &AdaptationResults) -> Table {
+    let row = |pair: &Pair| {
+        let [law, driver] = names(results, pair).map(Cell::text);
+        let [before, behind] = &pair.k_hg;
+        vec![
+            law,
+            driver,
+            with_interval(before.as_ref()),
+            with_interval(behind.as_ref()),
+            with_interval(pair.against_first.as_ref()),
+            with_interval(pair.swing_nm.as_ref()),
+            Cell::number(pair.period_s, 0),
+        ]
+    };
+    let first = format!("Behind it, less {}", results.laws[0]);
+    let columns = [
+        "Law",
+        "Driver",
+        "K_hg before the loss",
+        "Behind it",
+        &first,
+        "Deviation of K_1 (N.m)",
+        "Period (s)",
+    ];
+    Table::new(
+        "K_hg before the loss and settled behind it; how K_1 moves before the loss",
+        columns,
+        results.pairs.iter().map(row),
+    )
+}
+
+fn maps_figure(results: &AdaptationResults) -> Figure {
+    let panel = |(number, name): (usize, &String)| {
+        let map = &results.maps[number];
+        let of_driver = |(end, label): (usize, &str)| {
+            let found = || map.iter().filter_map(|point| Some((point.k_1, point.k_hg[end]?)));
+            let ends = found().map(|(_, value)| value.interval_95.unwrap_or([value.mean; 2]));
+            let points = found().map(|(k_1, value)| (k_1, value.mean)).collect();
+            Series::with_mark(label, 6 * end, Mark::Whiskers(ends.collect()), points).joined()
+        };
+        // A gain that does not move is an upright line.
+        let pairs = results.pairs.iter();
+        let pairs = pairs.filter(|pair| pair.driver == number && pair.law_slope > 0.0);
+        let of_law = |pair: &Pair| {
+            let points = pair
+                .map
+                .iter()
+                .filter_map(|point| Some((point.k_1?.mean, point.k_hg)));
+            Series::line(&results.laws[pair.law], pair.law, points.collect())
+        };
+        let both = [(0, "driver, from low K_hg"), (1, "driver, from high K_hg")];
+        Panel {
+            title: name.clone(),
+            y: Axis::of("K_hg", "-").within(0.0, 1.02),
+            series: pairs.map(of_law).chain(both.into_iter().map(of_driver)).collect(),
+        }
+    };
+    Figure {
+        x: Axis::of("K_1", "N.m"),
+        panels: results.drivers.iter().enumerate().map(panel).collect(),
+        ..Figure::default()
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Quantity {
+    KHg,
+    K1,
+}
+
+/// A panel for each driver, a line for each law.
+fn series_figure(results: &AdaptationResults, quantity: Quantity) -> Figure {
+    let [lost_at_s, lost_for_s, ..] = results.times_s;
+    let line = |pair: &Pair| {
+        let values = pair.series.iter().map(|seen| match quantity {
+            Quantity::KHg => seen.k_hg,
+            Quantity::K1 => seen.k_1,
+        });
+        let points = values
+            .enumerate()
+            .map(|(second, value)| (second as f64 + 1.0, value));
+        Series::line(&results.laws[pair.law], pair.law, points.collect())
+    };
+    let panel = |(number, name): (usize, &String)| Panel {
+        title: name.clone(),
+        y: match quantity {
+            Quantity::KHg => Axis::of("K_hg", "-").within(0.0, 1.02),
+            Quantity::K1 => Axis::of("K_1", "N.m"),
+        },
+        series: results
+            .pairs
+            .iter()
+            .filter(|pair| pair.driver == number)
+            .map(line)
+            .collect(),
+    };
+    Figure {
+        x: Axis::of("Time", "s"),
+        panels: results.drivers.iter().enumerate().map(panel).collect(),
+        bands: vec![Band {
+            label: "torque lost".into(),
+            from: lost_at_s,
+            to: lost_at_s + lost_for_s,
+            ..Band::default()
+        }],
+        ..Figure::default()
+    }
+}
+
+fn critical(trust_s: f64, delay_s: f64, law_s: f64) -> String {
+    match swings(&[MEMORY_S, trust_s, law_s], delay_s) {
+        Some([product, period_s]) => format!("{product:.1}, {period_s:.0} s"),
+        None => "never".into(),
+    }
+}
+
+/// A field for each time of trust and of the estimate.
+fn swings_figure() -> Figure {
+    let size = [TRUST_S[1] - TRUST_S[0], DELAYS_S[1] - DELAYS_S[0]];
+    let around = |axis: Axis, all: [f64; 6], size: f64| axis.within(all[0] - 0.5 * size, all[5] + 0.5 * size);
+    let panel = |law_s: f64| {
+        let fields = || {
+            DELAYS_S
+                .into_iter()
+                .flat_map(|delay_s| TRUST_S.map(|trust_s| (trust_s, delay_s)))
+        };
+        // The nearer to 1 the product is, the stronger.
+        let shown = fields().map(|(trust_s, delay_s)| {
+            let found = swings(&[MEMORY_S, trust_s, law_s], delay_s);
+            let strength = found.map_or(0.0, |[product, _]| 1.0 / product);
+            (0.1 + 0.8 * strength, critical(trust_s, delay_s, law_s))
+        });
+        let mark = Mark::Fields {
+            size,
+            shown: shown.collect(),
+        };
+        Panel {
+            title: match law_s {
+                0.0 => "a law that follows at once".into(),
+                lag => format!("a law that follows with a lag of {lag} s"),
+            },
+            y: around(Axis::of("Delay", "s"), DELAYS_S, size[1]),
+            series: vec![Series::with_mark("", 1, mark, fields().collect())],
+        }
+    };
+    Figure {
+        x: around(Axis::of("Lag of trust", "s"), TRUST_S, size[0]),
+        panels: LAW_LAGS_S.map(panel).to_vec(),
+        ..Figure::default()
+    }
+}
+
+fn swings_table(caption: String) -> Table {
+    let rows = LAW_LAGS_S.into_iter().flat_map(|law_s| {
+        DELAYS_S.into_iter().map(move |delay_s| {
+            let cells = TRUST_S.map(|trust_s| Cell::Text(critical(trust_s, delay_s, law_s)));
+            let head = [Cell::number(law_s, 0), Cell::number(delay_s, 0)];
+            head.into_iter().chain(cells).collect()
+        })
+    });
+    let columns = ["Lag of the law (s)".to_owned(), "Delay (s)".to_owned()]
+        .into_iter()
+        .chain(TRUST_S.map(|trust_s| format!("Trust {trust_s} s")));
+    Table::new(caption, columns, rows)
+}
