@@ -135,6 +135,7 @@ impl Fdca {
     };
 
     /// Takes a vehicle frame: the gains at its speed, and its yaw rate.
+    #[expect(clippy::arithmetic_side_effects, reason = "every divisor is at least one")]
     #[inline(never)]
     pub(super) fn drive(&self, car: &mut Car, vehicle: &[u8; 8], is_distrusted: bool) {
         let (speed, other) = (field(vehicle, 12, 16), field(vehicle, 28, 16));
@@ -164,6 +165,7 @@ impl Fdca {
     }
 
     /// Takes a picture, so long after the last.
+    #[expect(clippy::arithmetic_side_effects, reason = "every divisor is at least one")]
     pub(super) fn see(&self, car: &mut Car, from: &Lane, to: &Lane, apart_us: i32) {
         let moved = to.e_theta_urad.saturating_sub(from.e_theta_urad);
         let apart = (apart_us / 100).max(0);
