@@ -90,11 +90,7 @@ fn real(builder: ScenarioBuilder, between: &mut dyn FnMut(f64, f64) -> f64) -> S
         if between(0.0, 1.0) < share { value } else { off }
     };
     let world = WorldParameters {
-        tyres: if some(0.5, 1.0, 1.0, 0.0) == 0.0 {
-            Tyres::Linear
-        } else {
-            Tyres::Saturating
-        },
+        tyres: [Tyres::Linear, Tyres::Saturating][some(0.5, 1.0, 1.0, 0.0) as usize],
         mu: some(0.5, 0.6, 1.0, 1.0),
         castor_share: some(0.5, 0.2, 0.6, 0.4),
         bank_rad: some(0.3, -0.04, 0.04, 0.0),

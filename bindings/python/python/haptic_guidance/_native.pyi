@@ -352,10 +352,10 @@ class Ecu:
     def step(self, t_us: int) -> Step: ...
     def clone(self) -> Ecu: ...
 
-@final
 INPUT_IDS: frozenset[int]
 """Identifiers of what the ECU hears."""
 
+@final
 class Bus:
     def __init__(self) -> None: ...
     def lane_preview(

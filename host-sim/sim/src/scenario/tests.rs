@@ -95,65 +95,6 @@ fn a_file_of_another_kind_is_named() {
     ]);
 }
 
-/// The name, and the number in the unit of today where that was another.
-#[test]
-fn an_old_name_is_refused_with_the_new_one_and_its_unit() {
-    each_is_refused(&[
-        (
-            "speed = 72",
-            "s.toml: speed is called speed_m_per_s: 72 km/h are 20",
-        ),
-        (
-            "[speed]\ntime = [0, 9]\nkmh = [60, 60]",
-            "speed.kmh is called speed_m_per_s: 1 km/h is 0.27777",
-        ),
-        ("driver.t_p = 0.3", "driver.t_p is called t_p_s"),
-        (
-            "[driver]\nmanual_K_d = 4",
-            "driver.manual_K_d is called manual_k_d_nm_per_rad",
-        ),
-        ("[driver]\na_1 = 0.1", "driver.a_1 is called a_1_rad_per_m"),
-        ("[guidance]\na_1 = 2", "guidance.a_1 is called a_1_per_m"),
-        ("[vehicle]\nI = 3000", "vehicle.I is called i_kg_m2"),
-        ("[vehicle]\nK_t = 0.06", "vehicle.K_t is called k_t"),
-        (
-            "[world]\nfriction_give = 1",
-            "world.friction_give is called friction_give_rad: 1 deg are 0.0174532925",
-        ),
-        (
-            "[sensor_errors]\ncamera_yaw = 2",
-            "sensor_errors.camera_yaw is called camera_yaw_rad: 2 mrad are 0.002",
-        ),
-        (
-            "[sensor_errors]\ndropouts = 720",
-            "sensor_errors.dropouts is called dropout_rate_per_s: 720 1/h are 0.2",
-        ),
-        (
-            "[sensor_errors]\ndropout = 1",
-            "sensor_errors.dropout is called dropout_duration_s",
-        ),
-        (
-            "[failure]\nkind = 'torque'\ntime = 40",
-            "failure.time is called time_s",
-        ),
-    ]);
-}
-
-/// One rule for every name: the paper's symbol in small letters or words, and behind it the unit.
-#[test]
-fn every_name_ends_with_its_unit_and_begins_with_its_symbol() {
-    let mut count = 0;
-    for field in TABLES.iter().flat_map(|(_, fields)| fields()) {
-        let unit = crate::fields::suffix(field.unit);
-        assert!(field.name.ends_with(&unit), "{field:?}");
-        let symbol = field.symbol.replace('\'', "").to_lowercase();
-        assert!(field.name.starts_with(&symbol), "{field:?}");
-        assert_eq!(field.name, field.name.to_lowercase());
-        count += 1;
-    }
-    assert!(count > 90, "{count}");
-}
-
 #[test]
 fn every_bad_field_is_named_with_its_value_and_range() {
     let cases = [

@@ -3,19 +3,22 @@
 //! A name is the paper's symbol in small letters, or words where the paper has none, and behind it the SI unit:
 //! `t_p_s`, `k_d_nm_per_rad`, `remnant_sd_nm`. What has no unit has none in its name ([`suffix`]).
 //!
-//! [`fields!`] makes the struct of a table from its list. Reading and writing TOML, the checks, the units of a sweep, the
+//! `fields!` makes the struct of a table from its list. Reading and writing TOML, the checks, the units of a sweep, the
 //! variables of an FMU, the stub for Python and the tables of `docs/files.md` follow from it.
 
-use std::fmt;
-use std::marker::PhantomData;
+mod in_file;
+mod old_names;
 
-/// Why numbers by name are no table: a name that there is not, or one that lacks.
-pub use serde::de::value::Error as NotATable;
-use serde::de::value::MapDeserializer;
-use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, MapAccess, Visitor};
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde::de::{DeserializeOwned, MapAccess};
+use serde::ser::{Serialize, SerializeMap};
 
 use crate::input::{RangeError, in_range};
+
+pub(crate) use in_file::InFile;
+pub use in_file::from_numbers;
+pub(crate) use old_names::old_name;
+/// Why numbers by name are no table: a name that there is not, or one that lacks.
+pub use toml::de::Error as NotATable;
 
 /// What a field may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,14 +100,6 @@ pub fn suffix(unit: &str) -> String {
         Some((over, under)) => format!("{}_per_{}", plain(over), plain(under)),
         None => plain(unit),
     }
-}
-
-/// A name without its unit.
-fn stem<'a>(name: &'a str, unit: &str) -> &'a str {
-    let bare = name
-        .strip_suffix(&suffix(unit))
-        .map(|bare| bare.strip_suffix('_').unwrap_or(bare));
-    bare.filter(|_| !unit.is_empty()).unwrap_or(name)
 }
 
 /// The type of a field.
@@ -271,169 +266,6 @@ impl<A: Fields, B: Fields> Fields for (A, B) {
     }
 }
 
-/// A table as it stands in a file; a field that is not there has its default.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct InFile<T>(pub(crate) T);
-
-impl<T: Fields> Serialize for InFile<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        self.0.write(&mut map)?;
-        map.end()
-    }
-}
-
-impl<'de, T: Fields> Deserialize<'de> for InFile<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Rows<T>(PhantomData<T>);
-
-        impl<'de, T: Fields> Visitor<'de> for Rows<T> {
-            type Value = InFile<T>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "a table [{}]", T::TABLE)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<InFile<T>, A::Error> {
-                let mut table = T::default();
-                let mut given = Vec::new();
-                while let Some(name) = map.next_key::<Name<T>>()? {
-                    table.read(name.0, &mut map)?;
-                    given.push(name.0);
-                }
-                match T::fields()
-                    .iter()
-                    .find(|field| T::COMPLETE && !given.contains(&field.name))
-                {
-                    Some(missing) => Err(de::Error::missing_field(missing.name)),
-                    None => Ok(InFile(table)),
-                }
-            }
-        }
-
-        deserializer.deserialize_map(Rows(PhantomData))
-    }
-}
-
-/// A table of numbers by their names; what is not there has its default.
-///
-/// # Errors
-/// A name that is none.
-pub fn from_numbers<T: Fields>(numbers: impl Iterator<Item = (&'static str, f64)>) -> Result<T, NotATable> {
-    InFile::deserialize(MapDeserializer::new(numbers)).map(|table| table.0)
-}
-
-/// The name of a field that there is.
-struct Name<T>(&'static str, PhantomData<T>);
-
-impl<'de, T: Fields> Deserialize<'de> for Name<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        let fields = T::fields();
-        let known = fields.iter().find(|field| field.name == name);
-        known.map(|field| Name(field.name, PhantomData)).ok_or_else(|| {
-            let names: Vec<_> = fields.iter().map(|field| format!("`{}`", field.name)).collect();
-            de::Error::custom(format!(
-                "unknown field `{name}`, expected one of {}",
-                names.join(", ")
-            ))
-        })
-    }
-}
-
-/// Names that older files have, where they are not the name without its unit or had another unit: table, old name, new name, old unit, and how much of the new unit that is.
-const OLD_NAMES: [(&str, &str, &str, &str, f64); 21] = [
-    ("", "speed", "speed_m_per_s", "km/h", 1.0 / 3.6),
-    ("", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("tuning", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("training", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("held_out", "speeds_kmh", "speeds_m_per_s", "km/h", 1.0 / 3.6),
-    ("speed", "kmh", "speed_m_per_s", "km/h", 1.0 / 3.6),
-    ("speed", "time", "time_s", "", 1.0),
-    ("speed", "place", "place_m", "", 1.0),
-    ("world", "friction_give", "friction_give_rad", "deg", DEG),
-    ("world", "assist_speed", "assist_speed_m_per_s", "km/h", 1.0 / 3.6),
-    ("sensor_errors", "angle_bias", "angle_bias_rad", "deg", DEG),
-    (
-        "sensor_errors",
-        "yaw_rate_bias",
-        "yaw_rate_bias_rad_per_s",
-        "mrad/s",
-        1e-3,
-    ),
-    (
-        "sensor_errors",
-        "yaw_rate_noise",
-        "yaw_rate_noise_rad_per_s",
-        "mrad/s",
-        1e-3,
-    ),
-    (
-        "sensor_errors",
-        "heading_noise",
-        "heading_noise_rad",
-        "mrad",
-        1e-3,
-    ),
-    ("sensor_errors", "camera_yaw", "camera_yaw_rad", "mrad", 1e-3),
-    (
-        "sensor_errors",
-        "dropouts",
-        "dropout_rate_per_s",
-        "1/h",
-        1.0 / 3600.0,
-    ),
-    ("sensor_errors", "dropout", "dropout_duration_s", "", 1.0),
-    (
-        "sensor_errors",
-        "line_jumps",
-        "line_jump_rate_per_s",
-        "1/h",
-        1.0 / 3600.0,
-    ),
-    ("tolerances", "angle_bias", "angle_bias_rad", "deg", DEG),
-    ("tolerances", "camera_yaw", "camera_yaw_rad", "mrad", 1e-3),
-    (
-        "tolerances",
-        "yaw_rate_bias",
-        "yaw_rate_bias_rad_per_s",
-        "mrad/s",
-        1e-3,
-    ),
-];
-const DEG: f64 = std::f64::consts::PI / 180.0;
-
-/// What the first field is called that a text calls by an old name; `known` are the fields of a table.
-pub(crate) fn old_name(text: &str, known: impl Fn(&str) -> Vec<&'static Field>) -> Option<String> {
-    let file: toml::Table = toml::from_str(text).ok()?;
-    let in_table = |table: &str, name: &str, value: &toml::Value| {
-        let full = |name: &str| format!("{table}{}{name}", if table.is_empty() { "" } else { "." });
-        let listed = OLD_NAMES
-            .iter()
-            .find(|old| old.0 == table && old.1 == name && !value.is_table());
-        if let Some((_, _, new, unit, factor)) = listed {
-            let converted = match value.as_float().or(value.as_integer().map(|whole| whole as f64)) {
-                _ if unit.is_empty() => String::new(),
-                Some(value) => format!(": {value} {unit} are {}", value * factor),
-                None => format!(": 1 {unit} is {factor}"),
-            };
-            return Some(format!("{} is called {new}{converted}", full(name)));
-        }
-        let spelt = |name: &str| name.replace('_', "").to_lowercase();
-        let fields = known(table);
-        let same = |field: &&&Field| spelt(stem(field.name, field.unit)) == spelt(name);
-        let field = fields.iter().find(same).filter(|field| field.name != name)?;
-        Some(format!("{} is called {}", full(name), field.name))
-    };
-    file.iter().find_map(|(name, value)| {
-        let own = value.as_table().into_iter().flatten();
-        in_table("", name, value).or_else(|| {
-            own.into_iter()
-                .find_map(|(field, value)| in_table(name, field, value))
-        })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -453,9 +285,20 @@ mod tests {
         ] {
             assert_eq!(suffix(unit), expected, "{unit}");
         }
-        assert_eq!(
-            [stem("t_p_s", "s"), stem("k_hg", ""), stem("tyres", "")],
-            ["t_p", "k_hg", "tyres"]
-        );
+    }
+
+    /// One rule for every name: the paper's symbol in small letters or words, and behind it the unit.
+    #[test]
+    fn every_name_ends_with_its_unit_and_begins_with_its_symbol() {
+        let mut count = 0;
+        for field in crate::scenario::TABLES.iter().flat_map(|(_, fields)| fields()) {
+            let unit = suffix(field.unit);
+            assert!(field.name.ends_with(&unit), "{field:?}");
+            let symbol = field.symbol.replace('\'', "").to_lowercase();
+            assert!(field.name.starts_with(&symbol), "{field:?}");
+            assert_eq!(field.name, field.name.to_lowercase());
+            count += 1;
+        }
+        assert!(count > 90, "{count}");
     }
 }
