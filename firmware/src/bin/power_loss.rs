@@ -25,7 +25,7 @@ mod target {
     /// Starts with a cut behind them.
     const CUTS: u32 = 250;
     /// A write takes fewer operations; so each is cut at, and some writes are not cut.
-    const OPERATIONS: u32 = 83;
+    const OPERATIONS: u32 = 110;
 
     /// How far the campaign is, across resets.
     #[derive(Clone, Copy)]
