@@ -103,21 +103,24 @@ fn fdca_is_within_1_mnm_of_its_equation() {
 fn the_share_of_driver_activity_is_within_1_percent_of_its_equation() {
     let mut rng = SmallRng::seed_from_u64(12);
     let law = Setup::PAPER.config.law;
-    let (tau, weight) = (tau_s(&Params::PAPER), 1.0 - (-2.0_f64 / 500.0).exp());
+    let (tau, weight) = (tau_s(&Params::PAPER), 1.0 - (-1.0_f64 / 500.0).exp());
     for (scale, most) in [(1.0, 0.01), (0.1, 0.01), (0.01, 0.07)] {
         let (mut worst, mut least_seen) = (0.0_f64, 1.0_f64);
         let (mut activity, mut rate, mut sums) = (Activity::NEW, Rate::default(), [0.0_f64; 2]);
         let mut phase = 0.0_f64;
         let least = 0.3;
-        for ms in (0..30_000_u32).step_by(2) {
+        for ms in 0..30_000_u32 {
             let t = f64::from(ms) * 1e-3;
-            phase += rng.random_range(-0.04..0.04);
+            phase += rng.random_range(-0.02..0.02);
             // As the bus carries them.
             let count = |value: f64| (value * 4096.0).round() / 4096.0;
             let driver = count(scale * 2.0 * (1.3 * t + phase).sin());
             let guidance = count(scale * (0.8 * t).sin());
-            let wheel = Radians::from_rad(scale * 0.3 * (0.9 * t).sin());
-            rate.take(t, wheel.rad(), tau);
+            if ms % 2 == 0 {
+                let wheel = Radians::from_rad(scale * 0.3 * (0.9 * t).sin());
+                rate.take(t, wheel.rad(), tau);
+                activity.turn(&law, Instant::from_us(1000 * ms), wheel);
+            }
             let both = driver * guidance * rate.rate * rate.rate;
             sums[0] += weight * (both - sums[0]);
             sums[1] += weight * (both.abs() - sums[1]);
@@ -127,10 +130,13 @@ fn the_share_of_driver_activity_is_within_1_percent_of_its_equation() {
                 0.0
             };
             let expected = 1.0 - (1.0 - least) * against;
-            let torques = [driver, guidance].map(Torque::from_nm);
-            let now = Instant::from_us(1000 * ms);
-            activity.update(&law, Ratio::from_si(least), now, wheel, torques);
-            let share = activity.share().si();
+            let share = activity
+                .share(
+                    Ratio::from_si(least),
+                    Torque::from_nm(driver),
+                    Torque::from_nm(guidance),
+                )
+                .si();
             assert!((least - 1e-6..=1.0).contains(&share), "{share}");
             least_seen = least_seen.min(share);
             // Until something was felt, the first LSB decides.
@@ -149,13 +155,16 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
     let law = Setup::PAPER.config.law;
     for (driver, expected) in [(0.0, 1.0), (1.0, 1.0), (-1.0, 0.25)] {
         let mut activity = Activity::NEW;
+        let mut share = Ratio::ZERO;
         for ms in 0..2000_u32 {
             let wheel = Radians::from_rad(1e-4 * f64::from(ms));
-            let torques = [driver, 0.5].map(Torque::from_nm);
-            let now = Instant::from_us(1000 * ms);
-            activity.update(&law, Ratio::from_si(0.25), now, wheel, torques);
+            activity.turn(&law, Instant::from_us(1000 * ms), wheel);
+            share = activity.share(
+                Ratio::from_si(0.25),
+                Torque::from_nm(driver),
+                Torque::from_nm(0.5),
+            );
         }
-        let share = activity.share();
         assert!((share.si() - expected).abs() < 1e-5, "{driver}: {share:?}");
     }
 }

@@ -31,6 +31,8 @@ words! {
     pub struct Config {
         /// Equation (9), and the filter of the rates.
         pub law: Law,
+        /// FDCA in its place, if it is chosen.
+        pub fdca: Optional<Fdca>,
         /// The least share of (9) that driver activity leaves; one if it is not chosen.
         pub least_share: Ratio,
         /// Torque limits.
@@ -43,8 +45,6 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
-        /// FDCA in its place, if it is chosen.
-        pub fdca: Optional<Fdca>,
     }
 }
 

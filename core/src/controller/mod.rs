@@ -366,6 +366,7 @@ fn seal(memory: &mut Redundant<Memory>, changed: ChangedParts) {
 }
 
 /// The share of the law's torque that driver activity leaves in this step.
+#[inline(never)]
 fn share_of_activity(
     activity: &mut Activity,
     config: &Config,
@@ -373,9 +374,11 @@ fn share_of_activity(
     applied: Torque,
     inputs: &Inputs,
 ) -> Ratio {
+    let Some(column) = inputs.column.value() else {
+        return Ratio::ONE;
+    };
     if let Input::New(column) = inputs.column {
-        let torques = [column.driver_torque, applied];
-        activity.update(&config.law, config.least_share, now, column.wheel_angle, torques);
+        activity.turn(&config.law, now, column.wheel_angle);
     }
-    activity.share()
+    activity.share(config.least_share, column.driver_torque, applied)
 }

@@ -29,7 +29,6 @@ pub struct Activity {
     /// L[P_d*P_h] and L[abs(P_d*P_h)].
     agreement: i64,
     size: i64,
-    share: Ratio,
 }
 
 impl Activity {
@@ -40,33 +39,21 @@ impl Activity {
         rate: I12F20::ZERO,
         agreement: 0,
         size: 0,
-        share: Ratio::ONE,
     };
 
-    /// The share that is left.
-    #[must_use]
-    pub const fn share(&self) -> Ratio {
-        self.share
-    }
-
-    /// Takes a sample of the column beside the guidance torque that was applied; `law` has the filter of the rate, `least` is
-    /// lambda_min.
-    #[inline(never)]
-    pub fn update(
-        &mut self,
-        law: &Law,
-        least: Ratio,
-        now: Instant,
-        wheel: Radians,
-        [driver, guidance]: [Torque; 2],
-    ) {
-        let passed = now.since(self.at).min(GAP);
-        self.rate = if passed == GAP {
+    /// The wheel turned; `law` has the filter.
+    pub fn turn(&mut self, law: &Law, now: Instant, wheel: Radians) {
+        let passed = now.since(self.at);
+        self.rate = if passed > GAP {
             I12F20::ZERO
         } else {
             law.filter(self.rate, self.wheel.fixed(), wheel.fixed(), passed)
         };
         (self.wheel, self.at) = (wheel, now);
+    }
+
+    /// A step of 1 ms with these torques of driver and guidance: the share that is left.
+    pub fn share(&mut self, least: Ratio, driver: Torque, guidance: Torque) -> Ratio {
         let rate = i64::from(self.rate.to_bits());
         // 62 bits, cut to 24 fractional ones: a flipped bit must not make it wrap.
         let square =
@@ -75,12 +62,11 @@ impl Activity {
         let torques = i64::from(torques.to_bits());
         // At most 31 bits times 30.
         let both = torques.wrapping_mul(square);
-        let weight = passed.us().saturating_mul(PER_US);
-        self.agreement = low_pass(self.agreement, both, weight);
-        self.size = low_pass(self.size, both.saturating_abs(), weight);
+        self.agreement = low_pass(self.agreement, both);
+        self.size = low_pass(self.size, both.saturating_abs());
         let against = self.against();
         let taken = share_of(Ratio::ONE.minus(least).fixed(), against);
-        self.share = Ratio::ONE.minus(Ratio::from_fixed(taken));
+        Ratio::ONE.minus(Ratio::from_fixed(taken))
     }
 
     /// `max(0, -c)`.
@@ -96,14 +82,8 @@ impl Activity {
     }
 }
 
-/// What a microsecond weighs in a low-pass of 0.5 s, 2^-32.
-const PER_US: u32 = 8590;
-
-/// A first-order low-pass; both are 62 bits, the weight of what is new at most 0.2 in 2^-32.
-#[expect(clippy::as_conversions, reason = "the lower half")]
-fn low_pass(sum: i64, new: i64, weight: u32) -> i64 {
+/// A first-order low-pass of 0.5 s, a step of 1 ms: 2^-9 + 2^-15 + 2^-16 is 1 - exp(-1/500) to 4e-4 of itself. Both are 62 bits.
+fn low_pass(sum: i64, new: i64) -> i64 {
     let away = new.saturating_sub(sum);
-    let upper = (away >> 32).wrapping_mul(i64::from(weight));
-    let lower = u64::from(away as u32).wrapping_mul(u64::from(weight)) >> 32;
-    sum.saturating_add(upper.wrapping_add(lower.cast_signed()))
+    sum.saturating_add((away >> 9).saturating_add(away >> 15).saturating_add(away >> 16))
 }

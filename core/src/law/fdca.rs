@@ -50,8 +50,8 @@ pub struct Car {
     pub wheel: Radians,
 }
 
-/// Largest gain on an error, more than those of (9), which has four terms; that on the rate of the yaw error ends where its format does.
-/// The wide sum of [`Law`] stays inside 64 bits: three times 2^61. `config` refuses choices that need more at a speed that guides.
+/// Largest gain on the errors; that on the rate of the yaw error is what its format holds: more than those of (9), which has four terms, and the wide sum of
+/// [`Law`] stays inside an `i64`: three times 2^61. `config` refuses choices that need more at a speed that guides.
 const MOST: I40F24 = I40F24::const_from_int(64);
 
 impl Fdca {

@@ -401,20 +401,14 @@ impl MonitorState {
         car.pass(elapsed_us, says_aside(evidence.guidance));
         if let Some(bytes) = evidence.column {
             car.turn_wheel(bytes);
-            // Without authority the wheel angle only stands in for a yaw rate, which comes with the vehicle.
-            if fdca.loha != 0 {
-                car.hear();
-            }
         }
         if let Some(bytes) = evidence.vehicle {
             let is_distrusted = field(evidence.guidance, YAW_RATE_FAULT, 1) != 0;
             fdca.drive(car, bytes, is_distrusted);
-            car.hear();
         }
         if is_new {
             let apart_us = age_us.saturating_add(elapsed_us).saturating_sub(self.step.age_us);
             fdca.see(car, &before, &self.lane_state.lane, apart_us);
-            car.hear();
         }
     }
 

@@ -57,11 +57,6 @@ words! {
         unsettled_us: i32,
         /// What was asked for when they last were, and prompt.
         held_mnm: i32,
-        /// From where to where the torque may be, as long as nothing came.
-        least_mnm: i32,
-        most_mnm: i32,
-        /// 1 where something came since.
-        has_news: i32,
     }
 }
 
@@ -96,9 +91,6 @@ impl Car {
         apart_us: 0,
         unsettled_us: 0,
         held_mnm: 0,
-        least_mnm: 0,
-        most_mnm: 0,
-        has_news: 1,
     };
 
     /// Time passes; `is_aside` says that the law leaves pictures aside.
@@ -108,11 +100,6 @@ impl Car {
         } else {
             self.unsettled_us.saturating_sub(elapsed_us).max(0)
         };
-    }
-
-    /// Something came that moves the torque.
-    pub(super) fn hear(&mut self) {
-        self.has_news = 1;
     }
 
     pub(super) fn turn_wheel(&mut self, column: &[u8; 8]) {
@@ -210,12 +197,6 @@ impl Fdca {
         [late_us, came_us]: [i32; 2],
         is_distrusted: bool,
     ) -> (i32, i32) {
-        let is_usual = late_us <= 0 && car.unsettled_us <= 0;
-        if is_usual && car.has_news == 0 {
-            return (car.least_mnm, car.most_mnm);
-        }
-        // What is unusual changes with time.
-        car.has_news = i32::from(!is_usual);
         let angle = |e_y_mm: i32, e_theta_urad: i32| {
             times(self.k_y, e_y_mm, 8).saturating_add(times(self.k_psi, e_theta_urad, 8))
         };
@@ -239,16 +220,12 @@ impl Fdca {
                 .max(0)
                 .saturating_mul(YAW_ACCELERATION),
         );
-        let unsettled = if car.unsettled_us > 0 {
-            turns(UNSETTLED_URPS)
-        } else {
-            0
-        };
-        let beside = late.saturating_add(unsettled);
+        let unsettled = car.unsettled_us > 0;
+        let beside = late.saturating_add(if unsettled { turns(UNSETTLED_URPS) } else { 0 });
         let low = turns(slowest.saturating_add(right)).saturating_sub(beside);
         let high = turns(fastest.saturating_add(left)).saturating_add(beside);
         let (mut least, mut most) = (now.saturating_add(low), now.saturating_add(high));
-        if is_usual {
+        if late_us <= 0 && !unsettled {
             car.held_mnm = least.saturating_add(most) / 2;
         } else {
             let late_ms = late_us.max(0) / 1000;
@@ -260,8 +237,7 @@ impl Fdca {
             least = least.min(went_on.saturating_add(low)).min(car.held_mnm);
             most = most.max(went_on.saturating_add(high)).max(car.held_mnm);
         }
-        (car.least_mnm, car.most_mnm) = (least.min(0), most.max(0));
-        (car.least_mnm, car.most_mnm)
+        (least.min(0), most.max(0))
     }
 }
 
