@@ -107,7 +107,7 @@ fn the_share_of_driver_activity_is_within_1_percent_of_its_equation() {
     for (scale, most) in [(1.0, 0.01), (0.1, 0.01), (0.01, 0.07)] {
         let (mut worst, mut least_seen) = (0.0_f64, 1.0_f64);
         let (mut activity, mut rate, mut sums) = (Activity::NEW, Rate::default(), [0.0_f64; 2]);
-        let mut phase = 0.0_f64;
+        let (mut wheel, mut phase) = (0.0_f64, 0.0);
         let least = 0.3;
         for ms in 0..30_000_u32 {
             let t = f64::from(ms) * 1e-3;
@@ -117,9 +117,11 @@ fn the_share_of_driver_activity_is_within_1_percent_of_its_equation() {
             let driver = count(scale * 2.0 * (1.3 * t + phase).sin());
             let guidance = count(scale * (0.8 * t).sin());
             if ms % 2 == 0 {
-                let wheel = Radians::from_rad(scale * 0.3 * (0.9 * t).sin());
-                rate.take(t, wheel.rad(), tau);
-                activity.turn(&law, Instant::from_us(1000 * ms), wheel);
+                let turned = scale * 0.3 * (0.9 * t).sin();
+                let [from, to] = [wheel, turned].map(Radians::from_rad);
+                rate.take(t, to.rad(), tau);
+                activity.turn(&law, from, to, Micros::from_ms(2));
+                wheel = turned;
             }
             let both = driver * guidance * rate.rate * rate.rate;
             sums[0] += weight * (both - sums[0]);
@@ -157,8 +159,8 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
         let mut activity = Activity::NEW;
         let mut share = Ratio::ZERO;
         for ms in 0..2000_u32 {
-            let wheel = Radians::from_rad(1e-4 * f64::from(ms));
-            activity.turn(&law, Instant::from_us(1000 * ms), wheel);
+            let angle = |ms: u32| Radians::from_rad(1e-4 * f64::from(ms));
+            activity.turn(&law, angle(ms), angle(ms + 1), Micros::from_ms(1));
             share = activity.share(
                 Ratio::from_si(0.25),
                 Torque::from_nm(driver),

@@ -11,7 +11,7 @@ mod step;
 
 use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
-use crate::controller::inputs::{Input, Inputs};
+use crate::controller::inputs::Inputs;
 use crate::law::LawState;
 use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
@@ -313,19 +313,14 @@ impl Controller {
             activity,
         } = state;
         let memory = kept.value_mut();
-        let config = self.config.value();
         let mut step = Step {
-            config,
+            config: self.config.value(),
             now,
             applied,
             inputs,
             lane: inputs.lane,
             elapsed: now.since(memory.fast.last_step),
-            activity: if config.least_share < Ratio::ONE {
-                share_of_activity(activity, config, now, applied, inputs)
-            } else {
-                Ratio::ONE
-            },
+            activity,
             injection,
         };
         memory.fast.last_step = now;
@@ -363,22 +358,4 @@ fn seal(memory: &mut Redundant<Memory>, changed: ChangedParts) {
     if changed.has(ChangedParts::RAMP) {
         memory.seal_part(|v| &mut v.ramp);
     }
-}
-
-/// The share of the law's torque that driver activity leaves in this step.
-#[inline(never)]
-fn share_of_activity(
-    activity: &mut Activity,
-    config: &Config,
-    now: Instant,
-    applied: Torque,
-    inputs: &Inputs,
-) -> Ratio {
-    let Some(column) = inputs.column.value() else {
-        return Ratio::ONE;
-    };
-    if let Input::New(column) = inputs.column {
-        activity.turn(&config.law, now, column.wheel_angle);
-    }
-    activity.share(config.least_share, column.driver_torque, applied)
 }

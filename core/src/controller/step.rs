@@ -5,6 +5,7 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
+use crate::law::activity::Activity;
 use crate::law::fdca::Car;
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
@@ -58,8 +59,7 @@ pub(super) struct Step<'a, I> {
     /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
-    /// The share of the law's torque that driver activity leaves.
-    pub(super) activity: Ratio,
+    pub(super) activity: &'a mut Activity,
     pub(super) injection: &'a I,
 }
 
@@ -141,10 +141,7 @@ impl<I: Injection> Step<'_, I> {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
-                // FDCA stands on its rates, so they must not stand still while trust comes back.
-                let goes_by_pictures = self.config.fdca.get().is_some() && v.coast.sees();
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
-                    PictureVerdict::Expected if goes_by_pictures => {}
                     PictureVerdict::Expected => v.law.relocate(sample),
                     PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
@@ -181,7 +178,7 @@ impl<I: Injection> Step<'_, I> {
     /// Takes new inputs through the plausibility checks, and forgets what the checks know of lost ones. Returns the faults of
     /// lost inputs.
     fn update_inputs(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut ChangedParts,
         fast_enough: Option<bool>,
@@ -208,6 +205,11 @@ impl<I: Injection> Step<'_, I> {
         }
         match column {
             Input::New(c) => {
+                if self.follows_activity() {
+                    let passed = self.now.since(v.input_times.column);
+                    self.activity
+                        .turn(&self.config.law, v.plausibility.wheel(), c.wheel_angle, passed);
+                }
                 v.input_times.column = self.now;
                 changed.add(ChangedParts::INPUT_TIMES);
                 changed.add(ChangedParts::COLUMN);
@@ -403,6 +405,12 @@ impl<I: Injection> Step<'_, I> {
         }
     }
 
+    /// Whether the law is driver activity.
+    #[inline(always)]
+    fn follows_activity(&self) -> bool {
+        self.config.least_share < Ratio::ONE
+    }
+
     /// Whether both speeds reach the slowest that is guided, if they are known.
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
@@ -454,7 +462,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
-    fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, torque_history: &TorqueHistory) {
+    fn enter(&mut self, v: &mut Memory, mode: Mode, faults: FaultSet, torque_history: &TorqueHistory) {
         v.fast.packed.mode = mode as u8;
         let trust = v.coast.trust;
         v.coast = Coast::NEW;
@@ -464,6 +472,7 @@ impl<I: Injection> Step<'_, I> {
             Mode::Active => {
                 (v.law, v.fast.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
                 v.fast.hands.reset();
+                self.activity.forget();
             }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
@@ -504,7 +513,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// The torque, the part of it that is the probe, and what limited it.
     fn torque(
-        &self,
+        &mut self,
         v: &mut Memory,
         changed: &mut ChangedParts,
         mode: Mode,
@@ -580,7 +589,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
     /// ends guidance then. Without a lane the torque is zero.
-    fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
+    fn guidance(&mut self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.is_latest(&sample) {
                 changed.add(ChangedParts::LAW);
@@ -589,8 +598,10 @@ impl<I: Injection> Step<'_, I> {
             self.law(v, sample)
         });
         let mut demanded = v.coast.limited(demanded);
-        if self.activity < Ratio::ONE {
-            demanded = Torque::from_fixed(share_of(self.activity.fixed(), demanded.fixed()));
+        if let (true, Some(column)) = (self.follows_activity(), self.inputs.column.value()) {
+            let least = self.config.least_share;
+            let share = self.activity.share(least, column.driver_torque, self.applied);
+            demanded = Torque::from_fixed(share_of(share.fixed(), demanded.fixed()));
         }
         let demanded = self.injection.law(demanded);
         // Clamped to 0 to 1: beyond that the host is wrong.

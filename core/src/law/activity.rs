@@ -13,7 +13,7 @@
 use fixed::types::{I8F24, I12F20};
 
 use super::{GAP, Law};
-use crate::quantity::{Instant, Radians, Ratio, Torque, product, quotient, saturate, share_of};
+use crate::quantity::{Micros, Radians, Ratio, Torque, product, quotient, saturate, share_of};
 
 /// The square of a wheel's rate that counts: a hand turns no wheel faster than 8 rad/s.
 const MOST_SQUARE: i64 = (64 << I8F24::FRAC_NBITS) - 1;
@@ -21,9 +21,6 @@ const MOST_SQUARE: i64 = (64 << I8F24::FRAC_NBITS) - 1;
 /// What it remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Activity {
-    /// phi when it came last, and when that was.
-    wheel: Radians,
-    at: Instant,
     /// dphi/dt, filtered as the rates of the errors, rad/s.
     rate: I12F20,
     /// L[P_d*P_h] and L[abs(P_d*P_h)].
@@ -34,22 +31,23 @@ pub struct Activity {
 impl Activity {
     /// Nothing felt yet.
     pub const NEW: Self = Self {
-        wheel: Radians::ZERO,
-        at: Instant::from_us(0),
         rate: I12F20::ZERO,
         agreement: 0,
         size: 0,
     };
 
     /// The wheel turned; `law` has the filter.
-    pub fn turn(&mut self, law: &Law, now: Instant, wheel: Radians) {
-        let passed = now.since(self.at);
+    pub fn turn(&mut self, law: &Law, from: Radians, to: Radians, passed: Micros) {
         self.rate = if passed > GAP {
             I12F20::ZERO
         } else {
-            law.filter(self.rate, self.wheel.fixed(), wheel.fixed(), passed)
+            law.filter(self.rate, from.fixed(), to.fixed(), passed)
         };
-        (self.wheel, self.at) = (wheel, now);
+    }
+
+    /// What came before does not count.
+    pub fn forget(&mut self) {
+        (self.agreement, self.size) = (0, 0);
     }
 
     /// A step of 1 ms with these torques of driver and guidance: the share that is left.

@@ -80,11 +80,6 @@ impl Coast {
         sight: SEES,
     };
 
-    /// Whether pictures are in use.
-    pub(crate) const fn sees(&self) -> bool {
-        self.sight == SEES
-    }
-
     /// Whether there is nothing to make up for.
     #[inline(always)]
     pub(crate) fn is_idle(&self) -> bool {

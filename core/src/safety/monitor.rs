@@ -11,7 +11,7 @@
 //! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
 //! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
 //! an honest change about. While the host asks for the probe, and for a second after, the band is wider by the probe's
-//! amplitude. Where the parameters choose FDCA, it is computed here a second time, and its band has reasons of its own (`monitor/fdca.rs`). Driver
+//! amplitude. Where the parameters choose FDCA, it is computed here a second time, and its band has reasons of its own ([`fdca`]). Driver
 //! activity leaves a share of (9), which lies between it and zero: its band is that of (9).
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
@@ -393,7 +393,6 @@ impl MonitorState {
     }
 
     /// [`Self::observe`], and what FDCA takes of the frames.
-    #[inline(never)]
     fn drive(&mut self, fdca: &Fdca, evidence: &Evidence<'_>, elapsed_us: i32) {
         let (before, age_us) = (self.lane_state.lane, self.step.age_us);
         let is_new = self.observe(evidence, elapsed_us);
@@ -413,7 +412,6 @@ impl MonitorState {
     }
 
     /// From where to where FDCA asks for a torque.
-    #[inline(never)]
     fn range(&mut self, fdca: &Fdca, late_us: i32, is_distrusted: bool) -> (i32, i32) {
         let (e_y_mmps, _) = if late_us > 0 { self.rates() } else { (0, 0) };
         let picture = &self.lane_state;
