@@ -57,7 +57,6 @@ impl Bench {
         let evidence = Evidence {
             lane: lane.as_ref(),
             column: column.as_ref(),
-            vehicle: None,
             request: None,
             guidance: &frame,
             elapsed_us: us,

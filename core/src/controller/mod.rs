@@ -13,7 +13,6 @@ use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
 use crate::controller::inputs::Inputs;
 use crate::law::LawState;
-use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
@@ -208,7 +207,6 @@ pub struct ControllerState {
     torque_history: TorqueHistory,
     motion_history: MotionHistory,
     pending: PendingChecks,
-    activity: Activity,
 }
 
 impl ControllerState {
@@ -230,7 +228,6 @@ impl ControllerState {
             torque_history: TorqueHistory::new(),
             motion_history: MotionHistory::new(),
             pending: PendingChecks::default(),
-            activity: Activity::NEW,
         }
     }
 
@@ -305,14 +302,7 @@ impl Controller {
         if !is_known_intact && !are_intact(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
-        let ControllerState {
-            memory: kept,
-            torque_history,
-            motion_history,
-            pending,
-            activity,
-        } = state;
-        let memory = kept.value_mut();
+        let memory = state.memory.value_mut();
         let mut step = Step {
             config: self.config.value(),
             now,
@@ -320,14 +310,22 @@ impl Controller {
             inputs,
             lane: inputs.lane,
             elapsed: now.since(memory.fast.last_step),
-            activity,
             injection,
         };
         memory.fast.last_step = now;
         let mut changed = ChangedParts::NOTHING;
-        let command = step.run(memory, &mut changed, torque_history, motion_history, pending);
-        seal(kept, changed);
-        torque_history.push(now, subtract_probe(command.torque, command.probe));
+        let (torque_history, motion_history) = (&mut state.torque_history, &mut state.motion_history);
+        let command = step.run(
+            memory,
+            &mut changed,
+            torque_history,
+            motion_history,
+            &mut state.pending,
+        );
+        seal(&mut state.memory, changed);
+        state
+            .torque_history
+            .push(now, subtract_probe(command.torque, command.probe));
         command
     }
 }

@@ -5,8 +5,6 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
-use crate::law::activity::Activity;
-use crate::law::fdca::Car;
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
@@ -59,7 +57,6 @@ pub(super) struct Step<'a, I> {
     /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
-    pub(super) activity: &'a mut Activity,
     pub(super) injection: &'a I,
 }
 
@@ -136,7 +133,8 @@ impl<I: Injection> Step<'_, I> {
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let demanded = self.law(v, last);
+        let ego = self.ego_motion(v, last);
+        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
@@ -178,7 +176,7 @@ impl<I: Injection> Step<'_, I> {
     /// Takes new inputs through the plausibility checks, and forgets what the checks know of lost ones. Returns the faults of
     /// lost inputs.
     fn update_inputs(
-        &mut self,
+        &self,
         v: &mut Memory,
         changed: &mut ChangedParts,
         fast_enough: Option<bool>,
@@ -205,11 +203,6 @@ impl<I: Injection> Step<'_, I> {
         }
         match column {
             Input::New(c) => {
-                if self.follows_activity() {
-                    let passed = self.now.since(v.input_times.column);
-                    self.activity
-                        .turn(&self.config.law, v.plausibility.wheel(), c.wheel_angle, passed);
-                }
                 v.input_times.column = self.now;
                 changed.add(ChangedParts::INPUT_TIMES);
                 changed.add(ChangedParts::COLUMN);
@@ -387,30 +380,6 @@ impl<I: Injection> Step<'_, I> {
         ))
     }
 
-    /// What the law demands by the sample taken last.
-    #[inline(always)]
-    fn law(&self, v: &Memory, sample: LaneSample) -> Torque {
-        let (law, ego) = (&self.config.law, self.ego_motion(v, sample));
-        match self.config.fdca.get() {
-            None => law.demanded(&v.law, self.now, ego.as_ref()),
-            Some(fdca) => {
-                let car = Car {
-                    speed: v.plausibility.speed(),
-                    turning_gain: v.plausibility.turning_gain(),
-                    turning: v.plausibility.turning(),
-                    wheel: v.plausibility.wheel(),
-                };
-                fdca.demanded(law, &v.law, self.now, ego.as_ref(), &car)
-            }
-        }
-    }
-
-    /// Whether the law is driver activity.
-    #[inline(always)]
-    fn follows_activity(&self) -> bool {
-        self.config.least_share < Ratio::ONE
-    }
-
     /// Whether both speeds reach the slowest that is guided, if they are known.
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
@@ -462,7 +431,7 @@ impl<I: Injection> Step<'_, I> {
     }
 
     #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
-    fn enter(&mut self, v: &mut Memory, mode: Mode, faults: FaultSet, torque_history: &TorqueHistory) {
+    fn enter(&self, v: &mut Memory, mode: Mode, faults: FaultSet, torque_history: &TorqueHistory) {
         v.fast.packed.mode = mode as u8;
         let trust = v.coast.trust;
         v.coast = Coast::NEW;
@@ -472,7 +441,6 @@ impl<I: Injection> Step<'_, I> {
             Mode::Active => {
                 (v.law, v.fast.envelope) = (LawState::NEW, EnvelopeState::new(self.now));
                 v.fast.hands.reset();
-                self.activity.forget();
             }
             Mode::Fade => v.ramp = Ramp::at_rate(self.applied, FADE_RATE),
             Mode::Handover => {
@@ -513,7 +481,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// The torque, the part of it that is the probe, and what limited it.
     fn torque(
-        &mut self,
+        &self,
         v: &mut Memory,
         changed: &mut ChangedParts,
         mode: Mode,
@@ -589,21 +557,17 @@ impl<I: Injection> Step<'_, I> {
 
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
     /// ends guidance then. Without a lane the torque is zero.
-    fn guidance(&mut self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
+    fn guidance(&self, v: &mut Memory, changed: &mut ChangedParts) -> Torque {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.is_latest(&sample) {
                 changed.add(ChangedParts::LAW);
                 self.config.law.update(&mut v.law, sample);
             }
-            self.law(v, sample)
+            self.config
+                .law
+                .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
         });
-        let mut demanded = v.coast.limited(demanded);
-        if let (true, Some(column)) = (self.follows_activity(), self.inputs.column.value()) {
-            let least = self.config.least_share;
-            let share = self.activity.share(least, column.driver_torque, self.applied);
-            demanded = Torque::from_fixed(share_of(share.fixed(), demanded.fixed()));
-        }
-        let demanded = self.injection.law(demanded);
+        let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);

@@ -241,7 +241,6 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
     pub(super) column: Option<[u8; 8]>,
-    pub(super) vehicle: Option<[u8; 8]>,
     pub(super) request: Option<[u8; 8]>,
 }
 
@@ -249,7 +248,6 @@ impl Accepted {
     pub(super) const NONE: Self = Self {
         lane: None,
         column: None,
-        vehicle: None,
         request: None,
     };
 }
@@ -388,7 +386,6 @@ impl Receivers {
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
-                    accepted.vehicle = Some(*frame.bytes());
                     Ok(())
                 });
                 if heard != Some(Ok(())) {

@@ -1,8 +1,5 @@
 //! The closed loop through its public interface.
 
 mod changing_speed;
-mod driver_limit;
-mod fdca;
 mod own_law;
-mod shipped_laws;
 mod unguided;
