@@ -437,7 +437,7 @@ mod tests {
 
     #[test]
     fn evidence_is_what_ran_and_passed() {
-        let log = "test ecu::a ... ok\ntest ecu::b ... FAILED\ntest hands::tests::c ... ok\ntest d ... ok\n";
+        let log = "test ecu::a ... ok\ntest ecu::b ... FAILED\ntest safety::hands::tests::c ... ok\ntest d ... ok\n";
         let tests = outcomes(log);
         let stage = |name: &str| match name {
             "gate" => Some("well\nprocessor time: 3 s\n".to_owned()),

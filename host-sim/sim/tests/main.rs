@@ -1,5 +1,7 @@
 //! The closed loop through its public interface.
 
 mod changing_speed;
+mod driver_limit;
+mod fdca;
 mod own_law;
 mod unguided;

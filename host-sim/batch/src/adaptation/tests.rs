@@ -255,7 +255,7 @@ const WRONG: [(&str, &str, &str); 10] = [
     (
         "speed_m_per_s = 16.666666666666668",
         "speed_m_per_s = 83",
-        "speed = 300 km/h is outside 20 to 250 km/h",
+        "speed_m_per_s = 83 m/s is outside 5.5 to 70 m/s",
     ),
     ("road = 'road.toml'", "road = 'lost.toml'", "lost.toml"),
 ];

@@ -130,9 +130,11 @@ fn an_honest_recording_ends_nothing_and_what_is_wrong_in_it_is_named() {
         named.iter().all(|end| *end == of("ColumnImplausible", false)),
         "{named:?}"
     );
-    // No hand while the guidance acts, which it does for 60 to 90 s of the 100: two ends after 30 s each.
+    // No hand while the guidance acts, which it does for 60 to 90 s of the 100: two ends after 30 s each. The sensor is alive.
     let mut free = recorded();
-    free.driver_nm[..1000].fill(0.0);
+    for (row, torque) in free.driver_nm[..1000].iter_mut().enumerate() {
+        *torque = 0.002 * (row % 2) as f64;
+    }
     let acts = free
         .guidance_nm
         .iter()

@@ -1,5 +1,5 @@
 //! Each law against figures that were worked out apart: a program in Python, float64, from the equations of the documents. Behind
-//! the ECU they are in `tests/own_law.rs`.
+//! the ECU they are in `tests/own_law.rs`; the driver limit against opendbc's C in `tests/driver_limit.rs`.
 
 use super::*;
 use crate::scenario::Scenario;
@@ -147,38 +147,6 @@ fn a_gain_over_k_hg_compensates_or_follows_a_line_within_its_bounds() {
         assert!((asked - expected).abs() < 1e-9, "{name} at {k_hg}: {asked}");
         assert_eq!(law.k_1(), Some(asked));
     }
-}
-
-/// What opendbc's C says of the same ten million cases: compiled with gcc 12, how many it allows, and all answers in one number.
-#[test]
-fn the_driver_limit_is_opendbc_s_rule() {
-    let mut state = 1_u64;
-    let mut draw = |low: i64, high: i64| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + ((state >> 33) % (high - low + 1) as u64) as i64
-    };
-    let (mut allowed, mut hash) = (0_u32, 0xCBF2_9CE4_8422_2325_u64);
-    for _ in 0..10_000_000 {
-        let [max, up, down, allowance, factor] =
-            [(1, 400), (0, 20), (0, 40), (0, 120), (0, 5)].map(|(a, b)| draw(a, b));
-        let (last, one, other) = (draw(-max, max), draw(-500, 500), draw(-500, 500));
-        let value = last + draw(-45, 45);
-        let [max, up, down, allowance, factor] = [max, up, down, allowance, factor].map(|v| v as f64);
-        let limits = Limits {
-            max,
-            up,
-            down,
-            allowance,
-            factor,
-        };
-        let [low, high] = limits.allowed(last as f64, [one.min(other), one.max(other)].map(|v| v as f64));
-        let is_allowed = (low..=high).contains(&(value as f64));
-        allowed += u32::from(is_allowed);
-        hash = (hash ^ u64::from(is_allowed)).wrapping_mul(1_099_511_628_211);
-    }
-    assert_eq!((allowed, hash), (4_957_746, 1_224_648_373_446_199_849));
 }
 
 /// By hand, with the defaults: 0.04 N.m more each 20 ms from the first step on, until 0.5 N.m; with 1.5 N.m against it the bound is
