@@ -206,7 +206,7 @@ impl<I: Injection> Step<'_, I> {
                 v.input_times.column = self.now;
                 changed.add(ChangedParts::INPUT_TIMES);
                 changed.add(ChangedParts::COLUMN);
-                // The rim of a free wheel answers the probe too: driver torques are compared at the same place of its wave.
+                // The rim of a free wheel answers the probe too: driver torques are compared where it passes zero.
                 if v.fast.probe.is_passing_zero() {
                     v.fast.hands.update(c.driver_torque);
                 }

@@ -42,16 +42,19 @@ impl ProbeState {
     /// Silent.
     pub const SILENT: Self = Self { phase: 0, gain: 0 };
 
-    /// Whether it is silent, or a sixteenth of a turn about its rise through zero: where what the wheel answers to it by its inertia
-    /// is the same every time, and little.
+    /// Whether it is silent, or a sixteenth of a turn about its way through zero. What a free wheel answers by its inertia is little
+    /// there; what a hand answers comes late, and so lies on one side where the probe rises and on the other where it falls.
     #[must_use]
     pub(crate) const fn is_passing_zero(&self) -> bool {
-        self.gain == 0 || self.phase.wrapping_add(SIXTEENTH >> 1) < SIXTEENTH
+        self.gain == 0 || (self.phase.wrapping_add(SIXTEENTH >> 1) & (HALF - 1)) < SIXTEENTH
     }
 }
 
 /// Of a turn: 25 ms at 2.5 Hz, so that the slowest sender of a driver torque has a message in it.
 pub const SIXTEENTH: u32 = 1 << 28;
+
+/// Of a turn.
+const HALF: u32 = 1 << 31;
 
 /// As the envelope's rate limits count it: two ticks.
 const MAX_ELAPSED_US: u32 = 2_000;
