@@ -9,7 +9,8 @@ use haptic_sim::scenario::{GuidanceParameters, Scenario, Sensors};
 use haptic_sim::simulation;
 use rayon::prelude::*;
 
-/// One guided drive with a probe, without remnant, logged exactly.
+/// One guided drive with a probe, without remnant, logged exactly. Nobody moves the wheel for the ECU, which feels no hand at times:
+/// equation (8) has no such torque.
 fn identified_without_noise(driver: &PublishedDriver) -> Identification {
     let mut guidance = GuidanceParameters {
         probe: true,
@@ -17,7 +18,10 @@ fn identified_without_noise(driver: &PublishedDriver) -> Identification {
     };
     guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
-        .driver(driver.parameters())
+        .driver(DriverParameters {
+            answers_hands_off_after_s: f64::INFINITY,
+            ..driver.parameters()
+        })
         .gains(driver.gains())
         .sensors(Sensors::Exact)
         .guidance(guidance);
