@@ -9,6 +9,8 @@ use haptic_sim::{Action, Simulation};
 
 use super::*;
 use crate::compare::{on_threads, seed_of};
+use crate::files::Source;
+use crate::files::tests::check_refusals;
 
 /// Equal lags share the phase: three of T swing at a product of 8 with a period of 2*pi*T/sqrt(3), four at 4 with 2*pi*T. One lag never
 /// swings; a delay D alone does at 1 with 2*D.
@@ -135,7 +137,7 @@ around = [{ kind = 'trust', tau_s = 5 }]
 fn study<'k>(text: &str, kinds: &'k Kinds) -> Result<Adaptation<'k>, InputError> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("road.toml"), ROAD).unwrap();
-    file::from_text("study.toml", text, folder.path(), kinds)
+    file::from_text(&Source::new("study.toml", folder.path()), text, kinds)
 }
 
 /// The loop under the first law, driven by itself by other means: K_hg before the loss and behind it, and at the first step of the loss,
@@ -263,10 +265,5 @@ const WRONG: [(&str, &str, &str); 10] = [
 #[test]
 fn a_wrong_file_is_refused_by_field_value_and_range() {
     let kinds = Kinds::default();
-    for (from, to, says) in WRONG {
-        let text = FILE.replacen(from, to, 1);
-        assert_ne!(text, FILE, "{from}");
-        let error = study(&text, &kinds).err().unwrap().to_string();
-        assert!(error.contains(says), "{to}: {error}");
-    }
+    check_refusals(FILE, &WRONG, |text| study(text, &kinds).err());
 }

@@ -30,7 +30,7 @@ use rayon::prelude::*;
 pub use drive::{Driven, METRICS, Metric};
 pub(crate) use drive::{failures, measured};
 pub(crate) use file::drives;
-pub(crate) use parts::{Source, parts, unknown};
+pub(crate) use parts::{parts, unknown};
 pub use results::{Cell, CompareResults, DriveRow, LawResult, Mean, Ratio};
 
 /// The laws, drivers and habits that a file may name.
