@@ -12,7 +12,7 @@ use haptic_sim::unguided::{Cause, Circumstances, Watch};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{Kind, Role, Variable, input, limits, variable};
+use crate::variable::{DRIVER_TORQUE, Kind, Role, Variable, WHEEL_ANGLE, input, limits, variable};
 
 /// The model.
 pub static ABOUT: About = About {
@@ -43,18 +43,8 @@ pub static VARIABLES: [Variable; OWN + PARAMETERS.len()] = {
             limits::YAW_RAD,
             "Yaw error at the far point",
         ),
-        input(
-            "driver_torque_nm",
-            "N.m",
-            limits::TORQUE_NM,
-            "Torque of the driver on the column",
-        ),
-        input(
-            "wheel_angle_rad",
-            "rad",
-            limits::WHEEL_RAD,
-            "Angle of the steering wheel",
-        ),
+        DRIVER_TORQUE,
+        WHEEL_ANGLE,
         input(
             "motor_torque_nm",
             "N.m",

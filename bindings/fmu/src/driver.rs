@@ -6,7 +6,9 @@ use haptic_sim::models::driver::{ArmGains, ArmInFile, DriverParameters, Vision};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{Kind, Role, Variable, input, limits, of_field, variable};
+use crate::variable::{
+    GUIDANCE_TORQUE, Kind, Role, Variable, WHEEL_ANGLE, input, limits, of_field, variable,
+};
 use Kind::Real;
 use Role::Output;
 
@@ -72,18 +74,8 @@ const OWN: [Variable; FIRST] = [
         limits::YAW_RAD,
         "Yaw error at the driver's far point",
     ),
-    input(
-        "wheel_angle_rad",
-        "rad",
-        limits::WHEEL_RAD,
-        "Angle of the steering wheel",
-    ),
-    input(
-        "guidance_torque_nm",
-        "N.m",
-        limits::TORQUE_NM,
-        "Guidance torque on the column",
-    ),
+    WHEEL_ANGLE,
+    GUIDANCE_TORQUE,
     variable(
         "driver_torque_nm",
         Real,

@@ -100,6 +100,28 @@ pub mod limits {
     pub const YAW_RATE_RAD_PER_S: [f64; 2] = [-10.0, 10.0];
 }
 
+/// T_d, where others say what it is.
+pub const DRIVER_TORQUE: Variable = input(
+    "driver_torque_nm",
+    "N.m",
+    limits::TORQUE_NM,
+    "Torque of the driver on the column",
+);
+/// T_h, where others say what it is.
+pub const GUIDANCE_TORQUE: Variable = input(
+    "guidance_torque_nm",
+    "N.m",
+    limits::TORQUE_NM,
+    "Torque of the guidance on the column",
+);
+/// phi, where others say what it is.
+pub const WHEEL_ANGLE: Variable = input(
+    "wheel_angle_rad",
+    "rad",
+    limits::WHEEL_RAD,
+    "Angle of the steering wheel",
+);
+
 /// A parameter with its start and range.
 #[must_use]
 pub const fn parameter(

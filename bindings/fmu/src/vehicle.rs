@@ -13,7 +13,7 @@ use haptic_sim::{Action, Scenario, Simulation};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{Kind, Role, Variable, input, limits, of_field, parameter, variable};
+use crate::variable::{DRIVER_TORQUE, GUIDANCE_TORQUE, Kind, Role, Variable, of_field, parameter, variable};
 use Kind::{Real, Text};
 use Role::{Output, Parameter};
 
@@ -64,18 +64,8 @@ const ROAD: Variable = Variable {
 };
 
 const OWN: [Variable; FIRST] = [
-    input(
-        "driver_torque_nm",
-        "N.m",
-        limits::TORQUE_NM,
-        "Torque of the driver on the column",
-    ),
-    input(
-        "guidance_torque_nm",
-        "N.m",
-        limits::TORQUE_NM,
-        "Torque of the guidance on the column",
-    ),
+    DRIVER_TORQUE,
+    GUIDANCE_TORQUE,
     variable(
         "e_y_m",
         Real,
