@@ -60,10 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         None => (None, Vec::new()),
         Some(path) => {
             let (checkpoint, legs) = Checkpoint::open::<Leg>(path, &heading(plan.seed)?)?;
-            output::keeps(format!(
-                "{} keeps every drive that was done; the same command goes on from there.",
-                path.display()
-            ))?;
+            output::keeps(path, "drive")?;
             (Some(checkpoint), legs)
         }
     };

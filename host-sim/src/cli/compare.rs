@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use haptic_batch::compare::{Compare, Kinds, on_threads};
+use haptic_batch::compare::{Compare, Kinds};
 use haptic_report::document::write_file;
 use haptic_report::studies::compare::report;
 
+use super::progress::Threads;
 use super::results::ResultArguments;
 use super::{BadInput, Outcome, progress};
 
@@ -15,9 +16,8 @@ pub(super) struct Arguments {
     /// Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)
     #[arg(value_name = "FILE.toml")]
     file: PathBuf,
-    /// Threads; default: one a core
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    threads: Threads,
     #[command(flatten)]
     results: ResultArguments,
 }
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let compare = Compare::load(&arguments.file, &kinds)?;
     let output = arguments.results.begin("compare")?;
     let results = progress::over(compare.drives(), "drives", |done| {
-        on_threads(arguments.threads, || compare.run(done))
+        arguments.threads.run(|| compare.run(done))
     })??;
     if let Some(place) = output.place() {
         let table = results.to_csv();
