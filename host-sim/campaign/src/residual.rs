@@ -9,7 +9,7 @@
 
 use std::collections::VecDeque;
 
-use haptic_sim::models::vehicle::VehicleParameters;
+use haptic_sim::models::vehicle::{SteadyCornering, VehicleParameters};
 
 /// Share of a margin from which on sensors cannot hide it: a wheel angle of 0.1 deg is worth up to 1.2 %.
 const SURELY_SEEN: f64 = 1.02;
@@ -107,9 +107,7 @@ impl Seen {
 /// The checks' sums and last values.
 #[derive(Debug, Clone)]
 pub(super) struct Residual {
-    aligning_gain_nm_s2_per_m: f64,
-    curvature_gain_per_m: f64,
-    stability_factor_s2_per_m2: f64,
+    vehicle: SteadyCornering,
     damping_nm_s: f64,
     speeds_m_per_s: [f64; 2],
     yaw_rate_rad_per_s: f64,
@@ -140,22 +138,9 @@ pub(super) struct Residual {
 impl Residual {
     /// At rest, for a vehicle at a speed.
     pub(super) fn new(vehicle: &VehicleParameters, v_m_per_s: f64) -> Self {
-        let VehicleParameters {
-            m,
-            l_f,
-            l_r,
-            k_f,
-            k_r,
-            k_t,
-            b_s,
-            ..
-        } = *vehicle;
-        let l = l_f + l_r;
         Self {
-            aligning_gain_nm_s2_per_m: vehicle.aligning_stiffness() * m * l_r / (2.0 * l * k_f),
-            curvature_gain_per_m: k_t / l,
-            stability_factor_s2_per_m2: m * (l_r * k_r - l_f * k_f) / (2.0 * l * l * k_f * k_r),
-            damping_nm_s: b_s,
+            vehicle: vehicle.steady_cornering(),
+            damping_nm_s: vehicle.b_s,
             speeds_m_per_s: [v_m_per_s; 2],
             yaw_rate_rad_per_s: 0.0,
             wheel_rad: 0.0,
@@ -208,12 +193,12 @@ impl Residual {
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
             let v = self.speeds_m_per_s[0];
-            let aligning_at = |turning: f64| self.aligning_gain_nm_s2_per_m * v * turning;
+            let aligning_at = |turning: f64| self.vehicle.aligning_gain_nm_s2_per_m * v * turning;
             let aligning = aligning_at(self.yaw_rate_rad_per_s);
             // As the wheel angle would let the vehicle turn if nothing pushed it.
             let by_wheel = aligning_at(
-                v * self.curvature_gain_per_m * self.wheel_rad
-                    / (1.0 + self.stability_factor_s2_per_m2 * v * v),
+                v * self.vehicle.curvature_gain_per_m * self.wheel_rad
+                    / (1.0 + self.vehicle.stability_factor_s2_per_m2 * v * v),
             );
             let by_wheel = by_wheel.clamp(aligning - PUSHED_NM, aligning + PUSHED_NM);
             self.wheel_rate_rad_per_s = (wheel_rad - self.wheel_rad) / dt;

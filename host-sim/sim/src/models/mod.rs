@@ -27,6 +27,17 @@ pub fn step_of(time_s: f64) -> u32 {
     (time_s / STEP_S).round() as u32
 }
 
+/// A step of Runge and Kutta's: the oracle of plants. `rates` has the states and the share of the step that has passed.
+#[cfg(test)]
+fn runge_kutta(x: &[f64; 8], step_s: f64, rates: impl Fn(&[f64; 8], f64) -> [f64; 8]) -> [f64; 8] {
+    let plus = |k: &[f64; 8], h: f64| std::array::from_fn(|j| x[j] + h * k[j]);
+    let k1 = rates(x, 0.0);
+    let k2 = rates(&plus(&k1, step_s / 2.0), 0.5);
+    let k3 = rates(&plus(&k2, step_s / 2.0), 0.5);
+    let k4 = rates(&plus(&k3, step_s), 1.0);
+    std::array::from_fn(|j| x[j] + step_s / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]))
+}
+
 /// An angle in (-pi, pi].
 #[inline]
 pub fn wrapped(angle: f64) -> f64 {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::models::plant::Transition;
+use crate::models::runge_kutta;
 
 const V: f64 = 60.0 / 3.6;
 
@@ -277,22 +278,11 @@ fn under_braking_a_step_is_as_exact_as_a_fine_runge_kutta() {
         real.step(&mut plant, [speed(from), speed(to)], gains, &input, 0.0);
         let h = STEP_S / 10.0;
         for i in 0..10_u32 {
-            let at = |x: &[f64; 8], part: f64| {
+            x = runge_kutta(&x, h, |x, part| {
                 let share = (f64::from(i) + part) / 10.0;
-                derivatives(
-                    x,
-                    speed(from + share * STEP_S),
-                    now + (next - now) * share,
-                    t_h,
-                    gains,
-                )
-            };
-            let plus = |k: &[f64; 8], h: f64| std::array::from_fn(|j| x[j] + h * k[j]);
-            let k1 = at(&x, 0.0);
-            let k2 = at(&plus(&k1, h / 2.0), 0.5);
-            let k3 = at(&plus(&k2, h / 2.0), 0.5);
-            let k4 = at(&plus(&k3, h), 1.0);
-            x = std::array::from_fn(|j| x[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]));
+                let (v, target) = (speed(from + share * STEP_S), now + (next - now) * share);
+                derivatives(x, v, target, t_h, gains)
+            });
         }
         let (state, v) = (plant.state(), speed(to));
         let found = [
