@@ -5,18 +5,13 @@ use haptic_analysis::identify::{DriveLog, Identification, Options, Parameter, id
 use haptic_batch::experiment::{Plan, Recorder, experiment, repeat};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::{PublishedDriver, participants};
-use haptic_sim::scenario::{GuidanceParameters, Scenario, Sensors};
+use haptic_sim::scenario::{Scenario, Sensors};
 use haptic_sim::simulation;
 use rayon::prelude::*;
 
 /// One guided drive with a probe, without remnant, logged exactly. Nobody moves the wheel for the ECU, which feels no hand at times:
 /// equation (8) has no such torque.
 fn identified_without_noise(driver: &PublishedDriver) -> Identification {
-    let mut guidance = GuidanceParameters {
-        probe: true,
-        ..Default::default()
-    };
-    guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
         .driver(DriverParameters {
             answers_hands_off_after_s: f64::INFINITY,
@@ -24,7 +19,7 @@ fn identified_without_noise(driver: &PublishedDriver) -> Identification {
         })
         .gains(driver.gains())
         .sensors(Sensors::Exact)
-        .guidance(guidance);
+        .guidance(crate::probing());
     let mut recorder = Recorder::new(false);
     simulation::observe(&scenario.build().unwrap(), |outcome| recorder.observe(outcome));
     identify_with_noise_model(&recorder.into_log(), &Options::default())
@@ -149,18 +144,13 @@ fn without_a_probe_k_hg_is_not_identified() {
 #[test]
 fn a_drive_with_uneven_stamps_is_resampled_and_identified() {
     let driver = participants()[1].guided;
-    let mut guidance = GuidanceParameters {
-        probe: true,
-        ..Default::default()
-    };
-    guidance.controller.probe_amplitude_nm = 0.2;
     let scenario = Scenario::builder()
         .driver(DriverParameters {
             remnant_sd_nm: 0.07,
             ..driver.parameters()
         })
         .gains(driver.gains())
-        .guidance(guidance)
+        .guidance(crate::probing())
         .seed(4)
         .build()
         .unwrap();

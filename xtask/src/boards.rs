@@ -109,6 +109,16 @@ pub(crate) enum Scope {
     All,
 }
 
+/// The images with these features without a warning.
+pub(crate) fn lint(features: &str) -> Result<()> {
+    let package = "--profile firmware -p haptic-firmware --bins --lib";
+    run(cargo()
+        .arg("clippy")
+        .args(package.split(' '))
+        .args(["--target", M4F, "--features", features])
+        .args(["--", "-D", "warnings"]))
+}
+
 /// Boards without a warning; the torque path of the images without panic and float, and their figures as the golden file
 /// has them.
 pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
@@ -117,20 +127,7 @@ pub(crate) fn check(scope: Scope, built: Built, bless: bool) -> Result<()> {
     let wanted = |board: &&Board| scope == Scope::All || board.chip().is_none();
     for board in Board::value_variants().iter().filter(wanted) {
         let name = board.feature();
-        let package = [
-            "clippy",
-            "--profile",
-            "firmware",
-            "-p",
-            "haptic-firmware",
-            "--bins",
-            "--lib",
-        ];
-        run(cargo()
-            .args(package)
-            .args(["--target", M4F, "--features", name])
-            .args(["--", "-D", "warnings"]))
-        .with_context(|| name.to_owned())?;
+        lint(name).with_context(|| name.to_owned())?;
         for (image, roots) in [(Image::Lockstep, CONTROLLER), (Image::SteeringEcu, PRODUCT)] {
             let built =
                 of_image(&board.build(image)?, roots).with_context(|| format!("{name}, {}", image.bin()))?;

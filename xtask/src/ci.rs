@@ -473,19 +473,7 @@ fn clippy() -> Result<()> {
     let lints = ["clippy", "--release", "--workspace", "--all-targets"];
     run(cargo().args(lints).args(["--", "-D", "warnings"]))?;
     // The reference board's images, those that break themselves too.
-    let features = format!("{BOARD},gate,broken,bench");
-    run(cargo()
-        .args([
-            "clippy",
-            "--profile",
-            "firmware",
-            "-p",
-            "haptic-firmware",
-            "--bins",
-            "--lib",
-        ])
-        .args(["--target", M4F, "--features", &features])
-        .args(["--", "-D", "warnings"]))
+    boards::lint(&format!("{BOARD},gate,broken,bench"))
 }
 
 /// A link that leads nowhere is an error.

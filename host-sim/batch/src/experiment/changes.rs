@@ -51,12 +51,9 @@ pub struct ChangesLine {
 /// The whole population.
 #[derive(Debug, Clone, Serialize)]
 pub struct Changes {
-    /// Numbers of the participants.
-    pub participants: Vec<u32>,
-    /// Amplitude of the probe, N.m.
-    pub probe_nm: f64,
-    /// Seed of the first drive of each participant; the others count on from it.
-    pub seed: u64,
+    /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
+    #[serde(flatten)]
+    pub plan: Plan,
     /// Drives of each participant.
     pub drives: u32,
     /// By kind.
@@ -84,10 +81,7 @@ pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> 
         .map(|(number, published, drive)| {
             let place = (drive as usize + number as usize) % kinds.len();
             let (name, kind) = kinds[place];
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(drive),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(drive);
             let seed = plan.seed.wrapping_mul(100).wrapping_add(u64::from(number));
             let drawn = kind.drawn(&published, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
             let log = drawn.log(&plan, number)?;
@@ -220,9 +214,7 @@ impl Changes {
             ));
         }
         Self {
-            participants: plan.participants.clone(),
-            probe_nm: plan.probe_nm,
-            seed: plan.seed,
+            plan: plan.clone(),
             drives,
             lines,
             all,

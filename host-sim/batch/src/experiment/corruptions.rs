@@ -84,12 +84,9 @@ pub struct CorruptionLine {
 /// The whole population.
 #[derive(Debug, Clone, Serialize)]
 pub struct Corruptions {
-    /// Numbers of the participants.
-    pub participants: Vec<u32>,
-    /// Amplitude of the probe, N.m.
-    pub probe_nm: f64,
-    /// Seed of the first drive of each participant; the others count on from it.
-    pub seed: u64,
+    /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
+    #[serde(flatten)]
+    pub plan: Plan,
     /// Drives of each participant and way.
     pub seeds: u32,
     /// By corruption.
@@ -130,10 +127,7 @@ pub fn corruptions(
     let found = jobs
         .into_par_iter()
         .map(|(number, truth, seed)| {
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(seed),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(seed);
             let mut clean: Vec<(f64, DriveLog)> = Vec::new();
             let mut fits = Vec::with_capacity(ways.len());
             for (_, ways) in &ways {
@@ -310,9 +304,7 @@ impl Corruptions {
             }
         }
         Self {
-            participants: plan.participants.clone(),
-            probe_nm: plan.probe_nm,
-            seed: plan.seed,
+            plan: plan.clone(),
             seeds,
             lines,
             identified,

@@ -63,7 +63,7 @@ pub const REMNANT_GUIDED_NM: f64 = 0.072;
 pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
 
 /// What to do.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plan {
     /// Numbers of the participants, 1 to 14.
     pub participants: Vec<u32>,
@@ -71,6 +71,16 @@ pub struct Plan {
     pub probe_nm: f64,
     /// Seed of the remnants.
     pub seed: u64,
+}
+
+impl Plan {
+    /// The drives of a repetition, from 0: other remnants.
+    fn repetition(&self, number: u64) -> Self {
+        Self {
+            seed: self.seed.wrapping_add(number),
+            ..self.clone()
+        }
+    }
 }
 
 /// What a study of drivers with a known truth found.

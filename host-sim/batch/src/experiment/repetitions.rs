@@ -68,10 +68,7 @@ pub fn repeat(plan: &Plan, repetitions: u32, done: impl Fn() + Sync) -> Result<R
         &jobs,
         plan.seed,
         |(number, truth, repetition)| {
-            let plan = Plan {
-                seed: plan.seed.wrapping_add(*repetition),
-                ..plan.clone()
-            };
+            let plan = plan.repetition(*repetition);
             scenario_of_drive(&plan, *number, truth, truth.parameters())
         },
         |driven, (_, truth, _)| {
