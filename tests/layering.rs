@@ -405,7 +405,6 @@ const LONGER: &[(&str, &str)] = &[
     ("host-sim/campaign/src/invariants.rs", "every rule of a cycle beside the others"),
     ("host-sim/campaign/src/residual.rs", "the checks a second time, beside each other"),
     ("host-sim/campaign/src/trial.rs", "one run: what is drawn, driven and judged"),
-    ("host-sim/campaign/src/table/inputs.rs", "a table, one row after the other"),
     ("host-sim/report/src/studies/identify.rs", "one report, section by section"),
     ("host-sim/vectorised/src/runs.rs", "one block of all runs, read from top to bottom"),
     ("host-sim/vectorised/src/ecu.rs", "one step of the lean ECU, read from top to bottom"),

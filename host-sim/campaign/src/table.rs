@@ -18,6 +18,13 @@ use super::bytes::{FAULT, HANDOVER};
 use super::injection::{Hand, Injection, Motor, Start};
 use super::residual::Seen;
 
+/// Rows, one line each: name, what is injected, the injections, and what is other than in a row that goes on ([`build`]).
+macro_rules! rows {
+    ($($name:literal $injected:literal $injections:tt $(.$method:ident($($argument:expr),*))*;)*) => {
+        &[$($crate::table::row($name, $injected, &$injections)$(.$method($($argument),*))*),*]
+    };
+}
+
 mod attacks;
 mod build;
 mod bus;
