@@ -98,6 +98,14 @@ pub struct Panel {
 }
 
 impl Panel {
+    /// A plot of these series.
+    pub fn new(title: impl Into<String>, y: Axis, series: Vec<Series>) -> Self {
+        let title = title.into();
+        Self { title, y, series }
+    }
+}
+
+impl Panel {
     /// Width and height of its fields, if it is a map.
     fn fields(&self) -> Option<[f64; 2]> {
         self.series.iter().find_map(|series| match series.mark {

@@ -6,11 +6,11 @@ use super::*;
 
 /// One blue series over 0 to 100, values -1 to 1.
 fn alone(mark: Mark, points: Vec<(f64, f64)>) -> Figure {
-    let panel = Panel {
-        title: String::new(),
-        y: Axis::of("y", "-").within(-1.0, 1.0),
-        series: vec![Series::with_mark("", 1, mark, points)],
-    };
+    let panel = Panel::new(
+        "",
+        Axis::of("y", "-").within(-1.0, 1.0),
+        vec![Series::with_mark("", 1, mark, points)],
+    );
     Figure {
         x: Axis::of("x", "-").within(0.0, 100.0),
         panels: vec![panel],

@@ -75,11 +75,11 @@ impl Load {
         let y = Axis::of("Worst-case share of the bus", "%").within(0.0, 108.0 * most);
         Figure {
             rows: self.messages.iter().map(|row| row.message.into()).collect(),
-            panels: vec![Panel {
-                title: String::new(),
+            panels: vec![Panel::new(
+                "",
                 y,
-                series: vec![Series::with_mark("", 1, crate::plot::Mark::Stems, points)],
-            }],
+                vec![Series::with_mark("", 1, crate::plot::Mark::Stems, points)],
+            )],
             ..Figure::default()
         }
     }

@@ -161,11 +161,11 @@ fn figure(answer: &Answer) -> Figure {
             Some(s) => format!(", {:.1} min without a probe", s / 60.0),
             None => ", no drive is long enough without a probe".into(),
         });
-        Panel {
-            title: format!("{course}{}", without.unwrap_or_default()),
-            y: Axis::of("Drive needed", "min"),
-            series: series.collect(),
-        }
+        Panel::new(
+            format!("{course}{}", without.unwrap_or_default()),
+            Axis::of("Drive needed", "min"),
+            series.collect(),
+        )
     });
     Figure {
         x: Axis::of("Frequency of the probe", "Hz"),

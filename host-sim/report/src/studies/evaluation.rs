@@ -142,16 +142,15 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
                     .map(|s| (s.s_m, s.lateral_error_m))
                     .collect()
             };
-            panels.push(Panel {
-                title: format!("Driver {} (t_p {t_p} s){ending}", number + 1),
-                y: Axis::of("Lateral error", "m"),
-                series: runs
-                    .flat_map(|(s, run)| {
-                        let line = Series::line(label(s.condition()), style(s.condition()), path(run));
-                        ended(line, run.diverged().then_some(LEFT_THE_ROAD))
-                    })
-                    .collect(),
-            });
+            panels.push(Panel::new(
+                format!("Driver {} (t_p {t_p} s){ending}", number + 1),
+                Axis::of("Lateral error", "m"),
+                runs.flat_map(|(s, run)| {
+                    let line = Series::line(label(s.condition()), style(s.condition()), path(run));
+                    ended(line, run.diverged().then_some(LEFT_THE_ROAD))
+                })
+                .collect(),
+            ));
         }
     }
     let [from, to] = evaluation.results.window_m;

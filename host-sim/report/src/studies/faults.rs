@@ -117,35 +117,20 @@ fn shares(campaign: &Campaign) -> Table {
     let row = |row: &CaseResult| {
         let time = |ms: Option<u32>| Cell::number(ms.map(f64::from), 0);
         let [median, most] = row.noticed_after_ms;
-        vec![
-            Cell::text(row.name),
-            Cell::number(row.runs as f64, 0),
-            percent(row.noticed, row.runs),
-            interval(row.noticed_interval),
-            time(median),
-            time(most),
-            Cell::number(row.deviation_95_m, 2),
-            Cell::number(row.deviation_m, 2),
-            percent(row.left_lane, row.runs),
-            interval(row.left_lane_interval),
+        [
+            ("Fault", Cell::text(row.name)),
+            ("Runs", Cell::number(row.runs as f64, 0)),
+            ("Noticed (%)", percent(row.noticed, row.runs)),
+            ("of (%)", interval(row.noticed_interval)),
+            ("Median (ms)", time(median)),
+            ("95 % (ms)", time(most)),
+            ("Dev. 95 % (m)", Cell::number(row.deviation_95_m, 2)),
+            ("Worst (m)", Cell::number(row.deviation_m, 2)),
+            ("Left lane (%)", percent(row.left_lane, row.runs)),
+            ("of it (%)", interval(row.left_lane_interval)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Fault",
-            "Runs",
-            "Noticed (%)",
-            "of (%)",
-            "Median (ms)",
-            "95 % (ms)",
-            "Dev. 95 % (m)",
-            "Worst (m)",
-            "Left lane (%)",
-            "of it (%)",
-        ],
-        campaign.rows.iter().map(row),
-    )
+    Table::of_rows("", campaign.rows.iter().map(row))
 }
 
 /// A run that failed, and how to run it again.
@@ -167,49 +152,30 @@ fn table(campaign: &Campaign) -> Table {
             0 => "pass".into(),
             n => format!("FAIL in {n}"),
         };
-        vec![
-            Cell::text(row.name),
-            Cell::Text(row.class.to_string()),
-            Cell::Text(verdict),
-            count(row.runs),
-            count(row.seen),
-            count(row.cycles),
-            time(row.deadline_ms.and(row.worst_reaction_ms)),
-            time(row.deadline_ms),
-            Cell::number(row.peak_torque_nm, 3),
-            Cell::number(row.torque_bound_nm, 1),
-            count(row.left),
-            Cell::number(row.left_after_ms.map(|[median, _]| f64::from(median)), 0),
-            Cell::number(row.deviation_m, 2),
-            metres(row.dropped_m),
-            metres(row.excess_m),
-            count(row.left_lane),
-            count(row.off_road),
+        [
+            ("Fault", Cell::text(row.name)),
+            ("Class", Cell::Text(row.class.to_string())),
+            ("Verdict", Cell::Text(verdict)),
+            ("Runs", count(row.runs)),
+            ("Seen", count(row.seen)),
+            ("Cycles", count(row.cycles)),
+            ("Reaction (ms)", time(row.deadline_ms.and(row.worst_reaction_ms))),
+            ("Deadline (ms)", time(row.deadline_ms)),
+            ("Peak torque (N.m)", Cell::number(row.peak_torque_nm, 3)),
+            ("Bound (N.m)", Cell::number(row.torque_bound_nm, 1)),
+            ("ECU left", count(row.left)),
+            (
+                "After (ms)",
+                Cell::number(row.left_after_ms.map(|[median, _]| f64::from(median)), 0),
+            ),
+            ("Deviation (m)", Cell::number(row.deviation_m, 2)),
+            ("Dropped (m)", metres(row.dropped_m)),
+            ("Excess (m)", metres(row.excess_m)),
+            ("Left lane", count(row.left_lane)),
+            ("Off road", count(row.off_road)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Fault",
-            "Class",
-            "Verdict",
-            "Runs",
-            "Seen",
-            "Cycles",
-            "Reaction (ms)",
-            "Deadline (ms)",
-            "Peak torque (N.m)",
-            "Bound (N.m)",
-            "ECU left",
-            "After (ms)",
-            "Deviation (m)",
-            "Dropped (m)",
-            "Excess (m)",
-            "Left lane",
-            "Off road",
-        ],
-        campaign.rows.iter().map(row),
-    )
+    Table::of_rows("", campaign.rows.iter().map(row))
 }
 
 /// Reaction beside deadline, torque beside bound. Deadlines span 1 ms to seconds, so the reaction is a share of its
@@ -226,11 +192,7 @@ fn figure(campaign: &Campaign) -> Figure {
     });
     let names = 1.0..=campaign.rows.len() as f64;
     let bound = vec![(names.start() - 0.5, 100.0), (names.end() + 0.5, 100.0)];
-    let panel = |title: &str, y: Axis, series: Vec<Series>| Panel {
-        title: title.into(),
-        y,
-        series,
-    };
+    let panel = |title: &str, y: Axis, series: Vec<Series>| Panel::new(title, y, series);
     Figure {
         rows: campaign.rows.iter().map(|row| row.name.into()).collect(),
         panels: vec![

@@ -18,11 +18,7 @@ fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
 }
 
 fn panel(quantity: &str, unit: &str, series: Vec<Series>) -> Panel {
-    Panel {
-        title: String::new(),
-        y: Axis::of(quantity, unit),
-        series,
-    }
+    Panel::new("", Axis::of(quantity, unit), series)
 }
 
 /// What a line or an area breaks at: a place between rows that are no neighbours, from whose values nothing is drawn.
@@ -447,6 +443,17 @@ fn parameters(found: &Identification) -> Table {
         let at = found.at_t_nms.as_ref().filter(|_| found.refuted.is_empty())?;
         at.intervals_95.iter().find(|i| i.0 == name).map(|i| i.1)
     };
+    let (caption, from) = if is_published(found) {
+        (
+            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not.",
+            "As published: from",
+        )
+    } else {
+        (
+            "An estimate is given only where the data identify the parameter.",
+            "95 % from",
+        )
+    };
     let unit_of = |name: &str| if name == "k_nms" { "N.m/rad" } else { "s" };
     let beyond = found.beyond.iter().map(|(name, p)| (*name, unit_of(name), p));
     let rows = found
@@ -469,44 +476,19 @@ fn parameters(found: &Identification) -> Table {
             } else {
                 p.estimate
             };
-            vec![
-                Cell::text(name),
-                Cell::text(unit),
-                Cell::text(verdict),
-                number(estimate),
-                number(p.standard_error),
-                number(low),
-                number(high),
-                number(narrow(name).map(|i| i[0])),
-                number(narrow(name).map(|i| i[1])),
+            [
+                ("", Cell::text(name)),
+                ("Unit", Cell::text(unit)),
+                ("Verdict", Cell::text(verdict)),
+                ("Estimate", number(estimate)),
+                ("Standard error", number(p.standard_error)),
+                (from, number(low)),
+                ("to", number(high)),
+                ("t_nms known: from", number(narrow(name).map(|i| i[0]))),
+                ("to", number(narrow(name).map(|i| i[1]))),
             ]
         });
-    let (caption, from) = if is_published(found) {
-        (
-            "The values, errors and intervals of the published method as it prints them, whether the record holds them or not.",
-            "As published: from",
-        )
-    } else {
-        (
-            "An estimate is given only where the data identify the parameter.",
-            "95 % from",
-        )
-    };
-    Table::new(
-        caption,
-        [
-            "",
-            "Unit",
-            "Verdict",
-            "Estimate",
-            "Standard error",
-            from,
-            "to",
-            "t_nms known: from",
-            "to",
-        ],
-        rows,
-    )
+    Table::of_rows(caption, rows)
 }
 
 /// What the data determine where they do not determine each parameter.

@@ -73,11 +73,11 @@ fn figure(single: &SingleRun) -> Figure {
     let diverged = single.run.diverged().then_some(LEFT_THE_ROAD);
     let panel = |quantity: &str, unit: &str, value: fn(&Sample) -> f64| {
         let points = samples.iter().map(|s| (s.s_m, value(s))).collect();
-        Panel {
-            title: String::new(),
-            y: Axis::of(quantity, unit),
-            series: ended(Series::line("", 1, points), diverged).collect(),
-        }
+        Panel::new(
+            "",
+            Axis::of(quantity, unit),
+            ended(Series::line("", 1, points), diverged).collect(),
+        )
     };
     let failed = single
         .scenario

@@ -361,35 +361,22 @@ fn methods_table(lines: &[MethodLine]) -> Table {
 fn repetitions_table(result: &Repetitions) -> Table {
     let row = |line: &Repeated| {
         let number = |value, decimals| Cell::number(value, decimals);
-        vec![
-            Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
-            Cell::text(line.parameter),
-            Cell::number(line.drives as f64, 0),
-            number(Some(line.identified), 3),
-            number(Some(line.coverage), 3),
-            number(Some(line.coverage_at_t_nms), 3),
-            number(line.bias, 4),
-            number(line.rms, 4),
-            number(line.largest, 4),
-            number(line.standard_error, 4),
-            number(Some(line.bound), 4),
+        [
+            (
+                "Participant",
+                Cell::Text(line.participant.map_or("all".into(), |n| n.to_string())),
+            ),
+            ("Parameter", Cell::text(line.parameter)),
+            ("Drives", Cell::number(line.drives as f64, 0)),
+            ("Identified", number(Some(line.identified), 3)),
+            ("Coverage of 95 %", number(Some(line.coverage), 3)),
+            ("same, t_nms known", number(Some(line.coverage_at_t_nms), 3)),
+            ("Bias", number(line.bias, 4)),
+            ("RMS error", number(line.rms, 4)),
+            ("Largest error", number(line.largest, 4)),
+            ("Mean standard error", number(line.standard_error, 4)),
+            ("Information bound", number(Some(line.bound), 4)),
         ]
     };
-    Table::new(
-        "",
-        [
-            "Participant",
-            "Parameter",
-            "Drives",
-            "Identified",
-            "Coverage of 95 %",
-            "same, t_nms known",
-            "Bias",
-            "RMS error",
-            "Largest error",
-            "Mean standard error",
-            "Information bound",
-        ],
-        result.participants.iter().chain(&result.pooled).map(row),
-    )
+    Table::of_rows("", result.participants.iter().chain(&result.pooled).map(row))
 }
