@@ -13,7 +13,10 @@ const ROAD: &str = "
 [scenario.course]
 name = \"one curve\"
 lane_width = 3.6
-segment = [{ length = 100.0 }, { length = 200.0, curvature = 0.003 }]
+segment = [
+    { length = 100.0, curvature_start = 0.0, curvature_end = 0.0 },
+    { length = 200.0, curvature_start = 0.003, curvature_end = 0.003 },
+]
 ";
 
 fn sweep(text: &str) -> Result<Sweep, String> {

@@ -11,7 +11,7 @@ use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
 use crate::models::real::WorldParameters;
-use crate::models::road::{Course, LaneChoice, PAPER_COURSE, Segment};
+use crate::models::road::{Course, LaneChoice, PAPER_COURSE, SegmentFile};
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
 
@@ -193,32 +193,10 @@ struct InlineCourse {
     #[serde(default)]
     lane_width: f64,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    segment: Vec<InlineSegment>,
+    segment: Vec<SegmentFile>,
     /// The text of an OpenDRIVE file in the place of the other two: a lane that is not made of segments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     opendrive: Option<String>,
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct InlineSegment {
-    length: f64,
-    curvature_start: f64,
-    curvature_end: f64,
-    #[serde(default)]
-    bank_start: f64,
-    #[serde(default)]
-    bank_end: f64,
-    #[serde(default)]
-    grade_start: f64,
-    #[serde(default)]
-    grade_end: f64,
-}
-
-#[derive(Serialize)]
-struct CourseText<'a> {
-    lane_width: f64,
-    segment: &'a [InlineSegment],
 }
 
 impl CourseField {
@@ -233,15 +211,6 @@ impl CourseField {
 
 impl InlineCourse {
     fn of(course: &Course) -> Self {
-        let segment = |s: &Segment| InlineSegment {
-            length: s.length_m,
-            curvature_start: s.curvature_start_1pm,
-            curvature_end: s.curvature_end_1pm,
-            bank_start: s.bank_rad[0],
-            bank_end: s.bank_rad[1],
-            grade_start: s.grade[0],
-            grade_end: s.grade[1],
-        };
         if !course.is_of_segments() {
             return Self {
                 name: course.name().into(),
@@ -253,7 +222,7 @@ impl InlineCourse {
         Self {
             name: course.name().into(),
             lane_width: course.lane_width_m(),
-            segment: course.segments().iter().map(segment).collect(),
+            segment: course.segments().iter().map(SegmentFile::from).collect(),
             opendrive: None,
         }
     }
@@ -264,12 +233,8 @@ impl InlineCourse {
             return Course::from_opendrive(&self.name, text, &LaneChoice::default())
                 .map_err(|e| InputError::new(file, format!("course: {e}")));
         }
-        let text = CourseText {
-            lane_width: self.lane_width,
-            segment: &self.segment,
-        };
-        let text = toml::to_string(&text).map_err(|e| InputError::new(file, e))?;
-        Course::from_toml(&self.name, &text).map_err(|e| InputError::new(file, format!("course: {e}")))
+        Course::of_file(&self.name, self.lane_width, &self.segment)
+            .map_err(|e| InputError::new(file, format!("course: {e}")))
     }
 }
 

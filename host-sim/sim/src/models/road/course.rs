@@ -8,7 +8,7 @@
 
 use std::sync::{Arc, LazyLock, OnceLock};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::Centreline;
 use super::opendrive::{self, LaneChoice, RoadUsed};
@@ -100,9 +100,10 @@ struct CourseFile {
     segment: Vec<SegmentFile>,
 }
 
-#[derive(Deserialize)]
+/// A segment as a person writes it, in a course file or in a scenario.
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct SegmentFile {
+pub(crate) struct SegmentFile {
     length: f64,
     curvature: Option<f64>,
     curvature_start: Option<f64>,
@@ -237,12 +238,20 @@ impl Course {
     /// and range).
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
         let file: CourseFile = parse_toml(name, text)?;
-        let segments = file.segment.iter().enumerate().map(|(i, segment)| {
+        Self::of_file(name, file.lane_width, &file.segment)
+    }
+
+    pub(crate) fn of_file(
+        name: &str,
+        lane_width_m: f64,
+        segments: &[SegmentFile],
+    ) -> Result<Self, InputError> {
+        let segments = segments.iter().enumerate().map(|(i, segment)| {
             let parsed = segment.parsed();
             parsed.map_err(|e| CourseError::Segment(i + 1, Box::new(e)))
         });
         let course = segments.collect::<Result<_, _>>();
-        let course = course.and_then(|segments| Self::new(name, file.lane_width, segments));
+        let course = course.and_then(|segments| Self::new(name, lane_width_m, segments));
         course.map_err(|e| InputError::new(name, e))
     }
 
@@ -358,6 +367,21 @@ impl Segment {
             in_range(&name("end"), end, range, unit)?;
         }
         Ok(())
+    }
+}
+
+impl From<&Segment> for SegmentFile {
+    fn from(segment: &Segment) -> Self {
+        Self {
+            length: segment.length_m,
+            curvature_start: Some(segment.curvature_start_1pm),
+            curvature_end: Some(segment.curvature_end_1pm),
+            bank_start: Some(segment.bank_rad[0]),
+            bank_end: Some(segment.bank_rad[1]),
+            grade_start: Some(segment.grade[0]),
+            grade_end: Some(segment.grade[1]),
+            ..Self::default()
+        }
     }
 }
 
