@@ -13,7 +13,9 @@ use haptic_sim::{Action, Scenario, Simulation};
 
 use crate::error::FmuError;
 use crate::model::{About, Model, Texts};
-use crate::variable::{DRIVER_TORQUE, GUIDANCE_TORQUE, Kind, Role, Variable, of_field, parameter, variable};
+use crate::variable::{
+    Kind, Role, Variable, driver_torque, guidance_torque, of_field, parameter, variable, variables,
+};
 use Kind::{Real, Text};
 use Role::{Output, Parameter};
 
@@ -63,81 +65,22 @@ const ROAD: Variable = Variable {
     )
 };
 
-const OWN: [Variable; FIRST] = [
-    DRIVER_TORQUE,
-    GUIDANCE_TORQUE,
-    variable(
-        "e_y_m",
-        Real,
-        Output,
-        "m",
-        "Lateral error at the driver's near point",
-    ),
-    variable(
-        "e_theta_rad",
-        Real,
-        Output,
-        "rad",
-        "Yaw error at the driver's far point",
-    ),
-    variable(
-        "guidance_e_y_m",
-        Real,
-        Output,
-        "m",
-        "Lateral error at the guidance's near point",
-    ),
-    variable(
-        "guidance_e_theta_rad",
-        Real,
-        Output,
-        "rad",
-        "Yaw error at the guidance's far point",
-    ),
-    variable(
-        "wheel_angle_rad",
-        Real,
-        Output,
-        "rad",
-        "Angle of the steering wheel",
-    ),
-    variable(
-        "column_torque_nm",
-        Real,
-        Output,
-        "N.m",
-        "Driver torque as the column's sensor sees it",
-    ),
-    variable(
-        "motor_torque_nm",
-        Real,
-        Output,
-        "N.m",
-        "Guidance torque that acted in the last step",
-    ),
-    variable(
-        "lateral_error_m",
-        Real,
-        Output,
-        "m",
-        "Offset from the centreline, left positive; 200 values a second",
-    ),
-    variable(
-        "s_m",
-        Real,
-        Output,
-        "m",
-        "Arc length along the centreline; 200 values a second",
-    ),
-    variable("speed_m_per_s", Real, Output, "m/s", "Speed"),
-    parameter(
-        "v_m_per_s",
-        "m/s",
-        60.0 / 3.6,
-        [*SPEED_M_PER_S.start(), *SPEED_M_PER_S.end()],
-        "Speed",
-    ),
-];
+const OWN: [Variable; FIRST] = variables! {
+    driver_torque;
+    guidance_torque;
+    variable "e_y_m", Real, Output, "m", "Lateral error at the driver's near point";
+    variable "e_theta_rad", Real, Output, "rad", "Yaw error at the driver's far point";
+    variable "guidance_e_y_m", Real, Output, "m", "Lateral error at the guidance's near point";
+    variable "guidance_e_theta_rad", Real, Output, "rad", "Yaw error at the guidance's far point";
+    variable "wheel_angle_rad", Real, Output, "rad", "Angle of the steering wheel";
+    variable "column_torque_nm", Real, Output, "N.m", "Driver torque as the column's sensor sees it";
+    variable "motor_torque_nm", Real, Output, "N.m", "Guidance torque that acted in the last step";
+    variable "lateral_error_m", Real, Output, "m",
+        "Offset from the centreline, left positive; 200 values a second";
+    variable "s_m", Real, Output, "m", "Arc length along the centreline; 200 values a second";
+    variable "speed_m_per_s", Real, Output, "m/s", "Speed";
+    parameter "v_m_per_s", "m/s", 60.0 / 3.6, [*SPEED_M_PER_S.start(), *SPEED_M_PER_S.end()], "Speed";
+};
 
 /// The road that was asked for.
 fn course(texts: &Texts) -> Result<Course, FmuError> {
