@@ -1,33 +1,29 @@
 //! `host-sim compare FILE.toml`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use haptic_batch::compare::{Compare, Kinds};
 use haptic_report::document::write_file;
 use haptic_report::studies::compare::report;
 
-use super::progress::Threads;
-use super::results::ResultArguments;
+use super::results::StudyFile;
 use super::{BadInput, Outcome, progress};
 
+const FILE: &str =
+    "Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)";
+
 #[derive(Debug, Args)]
+#[command(mut_arg("file", |file| file.help(FILE)))]
 pub(super) struct Arguments {
-    /// Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)
-    #[arg(value_name = "FILE.toml")]
-    file: PathBuf,
     #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    results: ResultArguments,
+    study: StudyFile,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
-    let compare = Compare::load(&arguments.file, &kinds)?;
-    let output = arguments.results.begin("compare")?;
+    let compare = Compare::load(&arguments.study.file, &kinds)?;
+    let output = arguments.study.results.begin("compare")?;
     let results = progress::over(compare.drives(), "drives", |done| {
-        arguments.threads.run(|| compare.run(done))
+        arguments.study.threads.run(|| compare.run(done))
     })??;
     if let Some(place) = output.place() {
         let table = results.to_csv();

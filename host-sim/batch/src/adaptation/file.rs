@@ -1,7 +1,5 @@
 //! The file of a study of two adaptations, checked before anything is driven.
 
-use std::path::Path;
-
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::laws::Law as _;
 use haptic_sim::models::road::Course;
@@ -45,11 +43,6 @@ struct MapFile {
 struct LossFile {
     at_s: f64,
     lasts_s: f64,
-}
-
-pub(super) fn load<'k>(path: &Path, kinds: &'k Kinds) -> Result<Adaptation<'k>, InputError> {
-    let (source, text) = Source::open(path)?;
-    from_text(&source, &text, kinds)
 }
 
 pub(super) fn from_text<'k>(

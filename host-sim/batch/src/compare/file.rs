@@ -1,7 +1,6 @@
 //! The file of a comparison, checked before anything is driven.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use haptic_sim::input::{InputError, parse_toml};
 use haptic_sim::scenario::{Condition, FailureKind, Scenario, Speed};
@@ -70,11 +69,6 @@ const WEIGHTS: [&str; 3] = [
 const MOST_DRIVES: f64 = 1e6;
 /// How long a failed drive goes on if a file says nothing, s.
 const LASTS_S: f64 = 15.0;
-
-pub(super) fn load<'k>(path: &Path, kinds: &'k Kinds) -> Result<Compare<'k>, InputError> {
-    let (source, text) = Source::open(path)?;
-    from_text(&source, &text, kinds)
-}
 
 pub(super) fn from_text<'k>(
     source: &Source,

@@ -1,7 +1,6 @@
 //! A study file, checked: every session's scenario is built before anything is driven.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use haptic_sim::input::{InputError, RangeError, parse_toml};
 use haptic_sim::participants::participant;
@@ -53,11 +52,6 @@ struct ParticipantFile {
 const MOST_REPETITIONS: f64 = 100.0;
 /// Longest name: it becomes the name of a directory.
 const LONGEST_NAME: usize = 40;
-
-pub(super) fn load(path: &Path) -> Result<Study, InputError> {
-    let (source, text) = Source::open(path)?;
-    from_text(&source, &text)
-}
 
 pub(super) fn from_text(source: &Source, text: &str) -> Result<Study, InputError> {
     let file: StudyFile = parse_toml(&source.name, text)?;

@@ -29,6 +29,7 @@ pub(crate) use paired::interval_of_mean;
 pub use paired::{Difference, of_participants};
 
 use crate::error::{StudyError, refuse};
+use crate::files;
 use crate::left_by_themselves;
 use crate::record::RunRecord;
 use crate::vectorised::run_all;
@@ -156,7 +157,8 @@ impl Study {
     /// # Errors
     /// The file, the participant and the condition, the field, its value and its range.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        file::load(path)
+        let (source, text) = files::Source::open(path)?;
+        file::from_text(&source, &text)
     }
 
     /// Keeps a person's recording. `what` is `PARTICIPANT/CONDITION`, with `/2` and so on from the second repetition on.
