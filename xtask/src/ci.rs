@@ -364,14 +364,7 @@ fn fuzz() -> Result<()> {
         .args(["test", "--release", "-p", "haptic-core", "fuzz::"])
         .env("HAPTIC_FUZZ_BYTES", "1000000000"))?;
     run(cargo()
-        .args([
-            "test",
-            "--release",
-            "-p",
-            "haptic-guidance",
-            "--test",
-            "fuzz_readers",
-        ])
+        .args("test --release -p haptic-guidance --test fuzz_readers".split(' '))
         .env("HAPTIC_FUZZ_INPUTS", "1000000"))
 }
 
@@ -392,16 +385,7 @@ fn campaign() -> Result<()> {
 fn sanitised() -> Result<()> {
     let target = "x86_64-unknown-linux-gnu";
     run(cargo()
-        .args([
-            "test",
-            "--release",
-            "-p",
-            "haptic-core",
-            "-p",
-            "haptic-log",
-            "--lib",
-            "--tests",
-        ])
+        .args("test --release -p haptic-core -p haptic-log --lib --tests".split(' '))
         .args(["--target", target])
         .env("RUSTC_BOOTSTRAP", "1")
         .env("RUSTFLAGS", "-Zsanitizer=address")

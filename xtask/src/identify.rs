@@ -17,16 +17,7 @@ pub(crate) fn run() -> Result<()> {
     let python = speed::python()?;
     tool::output(
         tool::cargo()
-            .args([
-                "run",
-                "--profile",
-                "dist",
-                "-q",
-                "-p",
-                "host-sim",
-                "--",
-                "experiment",
-            ])
+            .args("run --profile dist -q -p host-sim -- experiment".split(' '))
             .args([
                 "--participant",
                 "5",

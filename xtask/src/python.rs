@@ -12,13 +12,8 @@ use crate::wheel;
 /// The package's tests but those of the wheel that is handed on, and what it may not link.
 pub(crate) fn check(built: Built) -> Result<()> {
     wheel::look_at_crates()?;
-    run(with_package(built)?.args([
-        "-m",
-        "pytest",
-        "bindings/python",
-        "--ignore",
-        "bindings/python/tests/test_wheel.py",
-    ]))
+    run(with_package(built)?
+        .args("-m pytest bindings/python --ignore bindings/python/tests/test_wheel.py".split(' ')))
 }
 
 /// Copies a file so that another stage, which imports the package meanwhile, finds the old one or the new one, whole.

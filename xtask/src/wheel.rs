@@ -87,14 +87,7 @@ fn make() -> Result<PathBuf> {
     }
     let maturin = tools.join("bin/maturin");
     run(command(&maturin.to_string_lossy())
-        .args([
-            "build",
-            "--profile",
-            "dist",
-            "-m",
-            "bindings/python/Cargo.toml",
-            "--out",
-        ])
+        .args("build --profile dist -m bindings/python/Cargo.toml --out".split(' '))
         .arg(&dist))?;
     wheels().next().context("maturin left no wheel")
 }
