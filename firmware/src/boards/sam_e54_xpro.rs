@@ -124,14 +124,6 @@ impl Board for SamE54Xpro {
         }
     }
 
-    fn can(&mut self) -> &mut Self::Can {
-        &mut self.can
-    }
-
-    fn status(&mut self) -> &mut Self::Status {
-        &mut self.led
-    }
-
     /// No blocks at the end of the flash given to the chip's own emulation of an EEPROM, and all of 1 MiB there.
     fn has_expected_options(&self) -> bool {
         // SAFETY: a look at what the HAL's driver owns.
@@ -149,6 +141,14 @@ impl Board for SamE54Xpro {
         ];
         // SAFETY: always readable, and never written.
         image::number_of(&SERIAL.map(|word| unsafe { word.read_volatile() }))
+    }
+
+    fn can(&mut self) -> &mut Self::Can {
+        &mut self.can
+    }
+
+    fn status(&mut self) -> &mut Self::Status {
+        &mut self.led
     }
 
     fn flash(&mut self) -> &mut Self::Flash {
