@@ -1,6 +1,5 @@
 //! `host-sim adaptation FILE.toml`.
 
-use clap::Args;
 use haptic_batch::adaptation::Adaptation;
 use haptic_batch::compare::Kinds;
 use haptic_report::document::write_file;
@@ -9,21 +8,15 @@ use haptic_report::studies::adaptation::report;
 use super::results::StudyFile;
 use super::{BadInput, Outcome, progress};
 
-const FILE: &str = "Study file (TOML): laws, drivers whose K_hg follows trust, a road, a loss (docs/explanation/two-adaptations.md)";
+/// Help of the file.
+pub(super) const FILE: &str = "Study file (TOML): laws, drivers whose K_hg follows trust, a road, a loss (docs/explanation/two-adaptations.md)";
 
-#[derive(Debug, Args)]
-#[command(mut_arg("file", |file| file.help(FILE)))]
-pub(super) struct Arguments {
-    #[command(flatten)]
-    study: StudyFile,
-}
-
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
-    let study = Adaptation::load(&arguments.study.file, &kinds)?;
-    let output = arguments.study.results.begin("adaptation")?;
+    let study = Adaptation::load(&arguments.file, &kinds)?;
+    let output = arguments.results.begin("adaptation")?;
     let results = progress::over(study.drives(), "drives", |done| {
-        arguments.study.threads.run(|| study.run(done))
+        arguments.threads.run(|| study.run(done))
     })??;
     if let Some(place) = output.place() {
         let series = results.to_csv();

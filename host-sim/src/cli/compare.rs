@@ -1,6 +1,5 @@
 //! `host-sim compare FILE.toml`.
 
-use clap::Args;
 use haptic_batch::compare::{Compare, Kinds};
 use haptic_report::document::write_file;
 use haptic_report::studies::compare::report;
@@ -8,22 +7,16 @@ use haptic_report::studies::compare::report;
 use super::results::StudyFile;
 use super::{BadInput, Outcome, progress};
 
-const FILE: &str =
+/// Help of the file.
+pub(super) const FILE: &str =
     "Comparison file (TOML): laws, drivers, roads, speeds, seeds, failures, tuning (docs/how-to/compare.md)";
 
-#[derive(Debug, Args)]
-#[command(mut_arg("file", |file| file.help(FILE)))]
-pub(super) struct Arguments {
-    #[command(flatten)]
-    study: StudyFile,
-}
-
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
+pub(super) fn run(arguments: &StudyFile) -> Result<Outcome, BadInput> {
     let kinds = Kinds::default();
-    let compare = Compare::load(&arguments.study.file, &kinds)?;
-    let output = arguments.study.results.begin("compare")?;
+    let compare = Compare::load(&arguments.file, &kinds)?;
+    let output = arguments.results.begin("compare")?;
     let results = progress::over(compare.drives(), "drives", |done| {
-        arguments.study.threads.run(|| compare.run(done))
+        arguments.threads.run(|| compare.run(done))
     })??;
     if let Some(place) = output.place() {
         let table = results.to_csv();

@@ -1,7 +1,9 @@
-//! Blocks of rows, and sums over long records.
+//! Blocks of rows, and sums over long records, for the widest registers that the processor has.
 //!
 //! The order of summation is the same on every processor, and products and sums are rounded apart, so that the result
 //! is too.
+
+use multiversion::multiversion;
 
 /// Partial sums: enough to keep an adder busy that takes four cycles.
 const PARTS: usize = 16;
@@ -24,12 +26,16 @@ pub(crate) fn window<'a>(u: &'a [f64], from: usize, spare: &'a mut [f64; BLOCK])
     }
 }
 
+// What is compiled for several processors has plain loops: iterators and closures would stay calls there.
+
 /// Sum of the products of `a` and `b`, over the shorter of the two.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let ((a, rest_a), (b, rest_b)) = (a[..n].as_chunks::<PARTS>(), b[..n].as_chunks::<PARTS>());
     let mut parts = [0.0; PARTS];
-    for (a, b) in a.iter().zip(b) {
+    for k in 0..a.len().min(b.len()) {
+        let (a, b) = (&a[k], &b[k]);
         for i in 0..PARTS {
             parts[i] += a[i] * b[i];
         }
@@ -39,9 +45,10 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Adds `factor` times `more` to `sum`, over the shorter of the two.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn add_times(sum: &mut [f64], factor: f64, more: &[f64]) {
-    for (s, x) in sum.iter_mut().zip(more) {
-        *s += factor * x;
+    for k in 0..sum.len().min(more.len()) {
+        sum[k] += factor * more[k];
     }
 }
 

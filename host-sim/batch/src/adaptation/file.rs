@@ -16,11 +16,11 @@ use crate::study::check_names;
 #[serde(deny_unknown_fields)]
 struct File {
     name: String,
-    #[serde(default = "one")]
-    seed: u64,
-    seeds: u64,
     road: String,
     speed_m_per_s: f64,
+    seeds: u64,
+    #[serde(default = "one")]
+    seed: u64,
     #[serde(default)]
     scenario: Table,
     map: MapFile,
@@ -52,10 +52,10 @@ pub(super) fn from_text<'k>(
 ) -> Result<Adaptation<'k>, InputError> {
     let file: File = parse_toml(&source.name, text)?;
     check_names("study", [&file.name]).map_err(|e| source.bad(e))?;
-    let laws = parts(source, "law", &file.law, &kinds.laws)?;
-    let drivers = parts(source, "driver", &file.driver, &kinds.drivers)?;
     rising(source, "map.k_1", &file.map.k_1, [0.0, 4.0])?;
     rising(source, "map.k_hg", &file.map.k_hg, [0.0, 1.0])?;
+    let laws = parts(source, "law", &file.law, &kinds.laws)?;
+    let drivers = parts(source, "driver", &file.driver, &kinds.drivers)?;
     let times = Times {
         lost_at_s: file.loss.at_s,
         lost_for_s: file.loss.lasts_s,
