@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::delays::filter;
 use super::evidence::Alternative;
-use super::filter;
 use super::sums::Rows;
 use super::{COUNT, D_LATE, Problem, RHO, T_NMS, T_P, THETA};
 use crate::identify::lane::LaneDoubt;

@@ -3,9 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::delays::Delays;
 use super::sums::Rows;
 use super::{COUNT, D_LATE, H_LATE, K_HG, K_NMS, LONGEST_DELAY_S, Problem, T_NMS, T_P};
-use crate::identify::search::{Quadratic, covariance};
+use crate::identify::search::{Quadratic, covariance, step};
 
 /// Steps of the delay's profile over the whole range.
 const PROFILE_STEPS: usize = 20;
@@ -48,8 +49,16 @@ impl Problem<'_> {
         delays.extend((-4..=4).map(|i| (p[T_P] + 0.5 * f64::from(i) * error).clamp(0.0, LONGEST_DELAY_S)));
         delays.sort_by(f64::total_cmp);
         delays.dedup();
-        let deviance = |t_p: f64| [t_p, 2.0 * (self.loss_at(p, t_p) - loss) / variance];
-        delays.into_iter().map(deviance).collect()
+        let along = Delays::new(self, p).at(&delays);
+        delays
+            .into_iter()
+            .zip(along)
+            .map(|(t_p, linear)| {
+                let d = step(p, &self.bounds, &linear, 0.0);
+                let gain = -linear.gradient.dot(&d) - 0.5 * d.dot(&(&linear.hessian * &d));
+                [t_p, 2.0 * (linear.loss - gain - loss) / variance]
+            })
+            .collect()
     }
 
     /// Covariance of the estimate from the scatter of the scores over blocks of neighbouring rows, which holds

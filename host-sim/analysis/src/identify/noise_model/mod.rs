@@ -21,6 +21,7 @@
 
 mod change_score;
 mod constancy;
+mod delays;
 mod doubts;
 mod evidence;
 mod finite;
@@ -34,6 +35,7 @@ mod sums;
 
 use std::ops::Range;
 
+use delays::Delays;
 pub use information::{INFORMED, Information, Truth, information};
 
 use super::log::DriveLog;
@@ -274,16 +276,6 @@ impl<'a> Problem<'a> {
         quadratic
     }
 
-    /// The least loss at `p` with another delay, over all that is linear.
-    fn loss_at(&self, p: &[f64], t_p_s: f64) -> f64 {
-        let mut point = p.to_vec();
-        point[T_P] = t_p_s;
-        let linear = self.light_sums(&point, false);
-        let solution = step(&point, &self.bounds, &linear, 0.0);
-        let gain = -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));
-        linear.loss - gain
-    }
-
     /// Solves for everything that is linear at each starting delay and corner, then follows the best delay of
     /// each corner to its end.
     fn search(&mut self) -> (Optimum, Vec<Start>) {
@@ -325,8 +317,17 @@ impl<'a> Problem<'a> {
         self.assume_muscle(&point);
         let Bounds { low, high } = self.bounds[T_P];
         let delays = START_DELAYS_S.map(|t_p| t_p.clamp(low, high));
-        let losses = delays.map(|t_p| (self.loss_at(&point, t_p), t_p));
-        let best = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let best = Delays::new(self, &point)
+            .at(&delays)
+            .into_iter()
+            .map(|linear| {
+                let solution = step(&point, &self.bounds, &linear, 0.0);
+                let gain =
+                    -linear.gradient.dot(&solution) - 0.5 * solution.dot(&(&linear.hessian * &solution));
+                linear.loss - gain
+            })
+            .zip(delays)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         point[T_P] = best.map_or(low, |(_, t_p)| t_p);
         point
     }
@@ -337,15 +338,4 @@ fn at(u: &[f64], k: usize, shift: f64) -> f64 {
     let place = (k as f64 + shift).clamp(0.0, (u.len() - 1) as f64);
     let (whole, share) = (place as usize, place.fract());
     u[whole] + share * (u[(whole + 1).min(u.len() - 1)] - u[whole])
-}
-
-/// `(1 - rho/q)/(1 - theta/q)` applied to `u`, as if its first value had gone on for ever.
-pub(super) fn filter(u: &mut [f64], rho: f64, theta: f64) {
-    let Some(&first) = u.first() else { return };
-    let mut last = first;
-    let mut out = (1.0 - rho) / (1.0 - theta) * first;
-    for x in u {
-        out = theta * out + (*x - rho * last);
-        last = std::mem::replace(x, out);
-    }
 }

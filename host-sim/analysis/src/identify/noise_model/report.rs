@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter;
+use super::delays::filter;
 use super::sums::Rows;
 use super::{
     COUNT, D_LATE, H_LATE, K_HG, K_NMS, NAMES, Problem, RHO, SMALLEST_ERROR_NM, T_NMS, T_P, THETA,
