@@ -37,7 +37,7 @@ fn design(folder: &Path, arguments: &[&str]) -> Output {
 fn a_design_leaves_the_same_bytes_on_any_threads_and_behind_an_interrupt() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let road = "[[segment]]\nlength = 100\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+    let road = "[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
     fs::write(folder.join("road.toml"), road).unwrap();
     fs::write(folder.join("design.toml"), FILE).unwrap();
     let sets = |place: &str| fs::read_to_string(folder.join(place).join("sets.jsonl")).unwrap();

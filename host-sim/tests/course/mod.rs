@@ -153,7 +153,7 @@ fn what_is_broken_or_not_supported_is_refused_in_one_sentence() {
             first,
             r#"length="1e12"><line/>"#,
             &[],
-            "road 1: geometry at s = 0 m: length = 1000000000000 m makes the road longer than 200000 m",
+            "road 1: geometry at s = 0 m: length_m = 1000000000000 m makes the road longer than 200000 m",
         ),
         (
             width,
@@ -165,7 +165,7 @@ fn what_is_broken_or_not_supported_is_refused_in_one_sentence() {
             first,
             r#"length="-100"><line/>"#,
             &[],
-            "road 1: geometry at s = 0 m: length = -100 m is negative",
+            "road 1: geometry at s = 0 m: length_m = -100 m is negative",
         ),
         (
             "<line/>",
@@ -285,9 +285,9 @@ fn courses_of_our_own_are_saved_and_read_back() {
     let saved = directory.path().join("saved.xodr");
     let saved = saved.to_str().unwrap();
     let banked = directory.path().join("banked.toml");
-    let text = "lane_width = 3.25\n[[segment]]\nlength = 40\nbank = -0.02\n[[segment]]\nlength = 50\ncurvature_start = 0\n\
-                curvature_end = 0.01\nbank_start = -0.02\nbank_end = -0.06\ngrade_start = 0\ngrade_end = 0.05\n\
-                [[segment]]\nlength = 33.3\ncurvature = 0.01\nbank = -0.06\ngrade = 0.05\n";
+    let text = "lane_width_m = 3.25\n[[segment]]\nlength_m = 40\nbank_rad = -0.02\n[[segment]]\nlength_m = 50\ncurvature_start_per_m = 0\n\
+                curvature_end_per_m = 0.01\nbank_start_rad = -0.02\nbank_end_rad = -0.06\ngrade_start = 0\ngrade_end = 0.05\n\
+                [[segment]]\nlength_m = 33.3\ncurvature_per_m = 0.01\nbank_rad = -0.06\ngrade = 0.05\n";
     std::fs::write(&banked, text).unwrap();
     let of_test = |name: &str| format!("tests/data/xodr/{name}.xodr");
     let files = [

@@ -49,17 +49,17 @@ fn compare(scenarios: &[Scenario], width: Width) -> usize {
 }
 
 fn short_course() -> Course {
-    let text = "[[segment]]\nlength = 120\n[[segment]]\nlength = 60\ncurvature_start = 0\ncurvature_end = 0.004\n\
-        [[segment]]\nlength = 150\ncurvature = 0.004\n[[segment]]\nlength = 60\ncurvature_start = 0.004\n\
-        curvature_end = -0.003\n[[segment]]\nlength = 200\ncurvature = -0.003\n[[segment]]\nlength = 150";
+    let text = "[[segment]]\nlength_m = 120\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0\ncurvature_end_per_m = 0.004\n\
+        [[segment]]\nlength_m = 150\ncurvature_per_m = 0.004\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0.004\n\
+        curvature_end_per_m = -0.003\n[[segment]]\nlength_m = 200\ncurvature_per_m = -0.003\n[[segment]]\nlength_m = 150";
     Course::from_toml("short.toml", text).unwrap()
 }
 
 fn banked_course() -> Course {
-    let text = "[[segment]]\nlength = 120\nbank = -0.025\n[[segment]]\nlength = 60\ncurvature_start = 0\n\
-        curvature_end = 0.004\nbank_start = -0.025\nbank_end = -0.06\n[[segment]]\nlength = 150\ncurvature = 0.004\n\
-        bank = -0.06\n[[segment]]\nlength = 60\ncurvature_start = 0.004\ncurvature_end = -0.003\nbank_start = -0.06\n\
-        bank_end = 0.04\n[[segment]]\nlength = 200\ncurvature = -0.003\nbank = 0.04\n[[segment]]\nlength = 150";
+    let text = "[[segment]]\nlength_m = 120\nbank_rad = -0.025\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0\n\
+        curvature_end_per_m = 0.004\nbank_start_rad = -0.025\nbank_end_rad = -0.06\n[[segment]]\nlength_m = 150\ncurvature_per_m = 0.004\n\
+        bank_rad = -0.06\n[[segment]]\nlength_m = 60\ncurvature_start_per_m = 0.004\ncurvature_end_per_m = -0.003\nbank_start_rad = -0.06\n\
+        bank_end_rad = 0.04\n[[segment]]\nlength_m = 200\ncurvature_per_m = -0.003\nbank_rad = 0.04\n[[segment]]\nlength_m = 150";
     Course::from_toml("banked.toml", text).unwrap()
 }
 

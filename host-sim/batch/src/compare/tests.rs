@@ -9,7 +9,7 @@ use haptic_sim::{Scenario, Simulation};
 use super::*;
 
 const ROAD: &str =
-    "lane_width = 3.6\n[[segment]]\nlength = 200\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 200\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 const FILE: &str = "
 name = 'short'
 seeds = 2

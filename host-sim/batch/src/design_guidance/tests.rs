@@ -10,7 +10,7 @@ use super::*;
 use crate::compare::seed_of;
 
 const ROAD: &str =
-    "lane_width = 3.6\n[[segment]]\nlength = 150\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 const FILE: &str = "
 name = 'short'
 law = 'paper'

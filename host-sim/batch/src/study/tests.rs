@@ -12,15 +12,15 @@ seed = 7
 speed_m_per_s = 16.666666666666668
 [scenario.course]
 name = "one curve"
-lane_width = 3.6
+lane_width_m = 3.6
 [[scenario.course.segment]]
-length = 100.0
-curvature_start = 0.0
-curvature_end = 0.0
+length_m = 100.0
+curvature_start_per_m = 0.0
+curvature_end_per_m = 0.0
 [[scenario.course.segment]]
-length = 200.0
-curvature_start = 0.003
-curvature_end = 0.003
+length_m = 200.0
+curvature_start_per_m = 0.003
+curvature_end_per_m = 0.003
 [[condition]]
 name = "manual"
 scenario = { condition = "manual" }

@@ -32,8 +32,8 @@ mod tests {
             ("driver.t_p_s", Some("s")),
             ("driver.k_hg", Some("-")),
             ("vehicle.b_s_nms_per_rad", Some("N.m.s/rad")),
-            ("course.segment.2.curvature_end", Some("1/m")),
-            ("course.lane_width", Some("m")),
+            ("course.segment.2.curvature_end_per_m", Some("1/m")),
+            ("course.lane_width_m", Some("m")),
             ("no.such", None),
         ] {
             assert_eq!(of(&column(&[path], 1.0)).as_deref(), unit, "{path}");

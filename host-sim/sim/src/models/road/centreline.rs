@@ -431,7 +431,7 @@ mod tests {
     #[test]
     fn a_circle_is_a_circle() {
         let radius = 50.0;
-        let line = centreline("[[segment]]\nlength = 300\ncurvature = 0.02");
+        let line = centreline("[[segment]]\nlength_m = 300\ncurvature_per_m = 0.02");
         for (s, offset) in [(0.0, 0.0), (10.0, 3.0), (77.7, -4.0), (299.0, 0.5), (150.0, 20.0)] {
             let angle: f64 = s / radius;
             let (x, y) = (
@@ -453,8 +453,8 @@ mod tests {
         let a = 100.0;
         let end_curvature = std::f64::consts::PI / a;
         let line = centreline(&format!(
-            "[[segment]]\nlength = 100\ncurvature_start = 0\ncurvature_end = {end_curvature}\n\
-             [[segment]]\nlength = 10"
+            "[[segment]]\nlength_m = 100\ncurvature_start_per_m = 0\ncurvature_end_per_m = {end_curvature}\n\
+             [[segment]]\nlength_m = 10"
         ));
         let found = foot(&line, a * c1, a * s1, 99.0).unwrap();
         assert!((found.s_m - 100.0).abs() < 1e-8, "{found:?}");
@@ -470,8 +470,8 @@ mod tests {
     #[test]
     fn a_point_beside_any_clothoid_projects_back() {
         let line = centreline(
-            "[[segment]]\nlength = 8\ncurvature_start = -0.1\ncurvature_end = 0.1\n\
-             [[segment]]\nlength = 12\ncurvature = 0.1",
+            "[[segment]]\nlength_m = 8\ncurvature_start_per_m = -0.1\ncurvature_end_per_m = 0.1\n\
+             [[segment]]\nlength_m = 12\ncurvature_per_m = 0.1",
         );
         let curvature = |s: f64| if s < 8.0 { -0.1 + 0.2 * s / 8.0 } else { 0.1 };
         let ds = 1e-5;
@@ -496,10 +496,10 @@ mod tests {
 
     #[test]
     fn a_point_without_a_foot_is_refused() {
-        let line = centreline("[[segment]]\nlength = 30\ncurvature = 0.1");
+        let line = centreline("[[segment]]\nlength_m = 30\ncurvature_per_m = 0.1");
         // The centre of the circle is (0, 10): every point of the arc is equally near.
         assert_eq!(foot(&line, 0.0, 10.0, 5.0), None);
-        let straight = centreline("[[segment]]\nlength = 30");
+        let straight = centreline("[[segment]]\nlength_m = 30");
         assert_eq!(foot(&straight, 33.0, 0.0, 29.0), None, "3 m beyond the end");
         assert_eq!(foot(&straight, -3.0, 0.0, 1.0), None, "3 m before the start");
         assert_eq!(foot(&straight, f64::NAN, 0.0, 1.0), None);
