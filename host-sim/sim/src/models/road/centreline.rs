@@ -1,10 +1,10 @@
 //! The centreline as a curve to project onto.
 //!
-//! The course is cut into cells, each with its exact position, heading and curvature at its middle. Inside a
-//! cell the clothoid is its Taylor expansion about the middle, so a projection needs no trigonometry: cells
-//! are short enough (`MAX_CELL_M`, `MAX_CELL_TURN_RAD`) that the terms left out stay below 1e-9 m. The foot
-//! of the perpendicular is found by Newton's method, starting from where the same point was last seen: a
-//! `Tracker` walks forward with its point, so a course may cross itself.
+//! The course is divided into cells; each stores the exact position, heading and curvature at its middle. Inside a
+//! cell the clothoid is replaced by its Taylor expansion about the middle, so a projection needs no trigonometry.
+//! Cells are so short (`MAX_CELL_M`, `MAX_CELL_TURN_RAD`) that the neglected terms stay below 1e-9 m. The foot of the
+//! perpendicular from a point is found by Newton's method, starting at the foot that the same point had in the step
+//! before. A `Tracker` holds that start and moves along with its point, so a course may cross itself.
 
 use super::piece::{Piece, Pose, Surface};
 use super::{Course, Segment};
@@ -24,8 +24,9 @@ const MAX_NEWTON_STEPS: usize = 20;
 pub const MIN_DETERMINANT: f64 = 0.1;
 /// How far beyond its ends the centreline is continued, m: enough for the step that finds the end.
 pub const OVERRUN_M: f64 = 2.0;
-/// A lane of a file may have kinks, where a perpendicular has no foot on one side and two on the other: the search
-/// goes to and fro across the kink in steps of this length at most, m, and the kink itself is the answer.
+/// The centre of a lane from a file may have kinks. There a point has no foot on one side and two on the other, and
+/// the search jumps to and fro across the kink. Its steps are then limited to this length, m, and the kink is taken
+/// as the foot.
 const KINK_M: f64 = 0.5;
 
 /// A piece of the centreline, expanded about its middle.
@@ -38,7 +39,6 @@ pub struct Cell {
     /// Position of the middle, m.
     pub x_m: f64,
     /// See `x_m`.
-    /// See `x_m`.
     pub y_m: f64,
     /// Unit tangent.
     pub tangent: [f64; 2],
@@ -48,7 +48,7 @@ pub struct Cell {
     pub curvature_1pm: f64,
     /// Change of curvature with arc length, 1/m^2.
     pub curvature_slope_1pm2: f64,
-    /// Square of the curvature over six, and its third power: a division less in each projection.
+    /// A sixth of the curvature's square, and its third power, which each projection needs.
     pub curvature_powers: [f64; 2],
 }
 
