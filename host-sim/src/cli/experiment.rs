@@ -1,7 +1,7 @@
 //! `host-sim experiment`.
 
 use clap::Args;
-use haptic_batch::experiment::{Plan, experiment};
+use haptic_batch::experiment::{ExperimentPlan, experiment};
 use haptic_report::studies::experiment::{report, write_logs};
 
 use super::participants::{Participants, check_probe};
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     check_probe("--probe", arguments.probe)?;
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: arguments.participants.numbers(),
         probe_nm: arguments.probe,
         seed: arguments.seed,

@@ -3,7 +3,7 @@
 use clap::{ArgGroup, Args};
 use haptic_batch::StudyError;
 use haptic_batch::experiment::{
-    CHANNELS, POPULATION, Plan, changes, corruptions, methods, recordings, repeat,
+    CHANNELS, ExperimentPlan, POPULATION, changes, corruptions, methods, recordings, repeat,
 };
 use haptic_report::studies::validation::Validation;
 
@@ -53,7 +53,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     check_probe("--probe", arguments.probe)?;
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: arguments.participants.numbers(),
         probe_nm: arguments.probe,
         seed: arguments.seed,

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::drives::driven;
 use super::repetitions::{COMPARED, bound_of, compared};
-use super::{Plan, chosen};
+use super::{ExperimentPlan, chosen};
 use crate::error::StudyError;
 
 /// The ways.
@@ -53,7 +53,7 @@ pub struct Methods {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
+pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
     let drivers = chosen(&plan.participants)?;
     let jobs: Vec<_> = drivers
         .iter()
@@ -67,7 +67,7 @@ pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Method
     let found = jobs
         .into_par_iter()
         .map(|(number, truth, seed)| {
-            let plan = Plan {
+            let plan = ExperimentPlan {
                 seed: plan.seed.wrapping_add(seed),
                 ..plan.clone()
             };

@@ -64,7 +64,7 @@ pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
 
 /// What to do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct ExperimentPlan {
     /// Numbers of the participants, 1 to 14.
     pub participants: Vec<u32>,
     /// Amplitude of the probe in the guided drives, N.m; zero for none.
@@ -134,7 +134,7 @@ pub struct Finding {
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
+pub fn experiment(plan: &ExperimentPlan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])

@@ -11,7 +11,7 @@ use haptic_sim::seeds::named;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{Order, Session, Study, Who};
+use super::{Order, Session, Study, Subject};
 use crate::error::{StudyError, refuse};
 use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 
@@ -155,7 +155,7 @@ fn session(
     }
     let manual = fields.get("condition").and_then(Value::as_str) == Some("manual");
     let who = match (participant.published, &participant.driver, participant.person) {
-        (None, None, true) => Who::Person,
+        (None, None, true) => Subject::Person,
         (Some(number), None, false) => {
             let mut driver = Table::new();
             driver.insert(
@@ -163,13 +163,13 @@ fn session(
                 Value::Table(of_published(number, manual).map_err(|e| bad(e.to_string()))?),
             );
             merge(&mut fields, &driver);
-            Who::Simulated
+            Subject::Simulated
         }
         (None, Some(given), false) => {
             let mut driver = Table::new();
             driver.insert("driver".into(), Value::Table(given.clone()));
             merge(&mut fields, &driver);
-            Who::Simulated
+            Subject::Simulated
         }
         _ => return Err(bad("one of published, driver and person = true is wanted".into())),
     };
@@ -187,7 +187,7 @@ fn session(
         Course::from_text(course, &String::from_utf8_lossy(&bytes), lane)
     })?;
     scenario.check_times().map_err(|e| bad(e.to_string()))?;
-    if who == Who::Person && scenario.failure().kind != FailureKind::None {
+    if who == Subject::Person && scenario.failure().kind != FailureKind::None {
         return Err(bad(
             "failure: a person's recording does not say when it came; only simulated \
                         participants can have one"

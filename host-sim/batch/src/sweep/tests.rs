@@ -47,8 +47,8 @@ fn lists_and_ranges_meet_each_other_and_every_sample() {
         sweep.columns().collect::<Vec<_>>(),
         ["driver.t_n_s", "speed_m_per_s", "driver.k_hg"]
     );
-    let points: Vec<Point> = (0..sweep.drives()).map(|drive| sweep.point(drive)).collect();
-    let of = |point: &Point| [0, 1].map(|i| value::text(&point.values[i]));
+    let points: Vec<DesignPoint> = (0..sweep.drives()).map(|drive| sweep.point(drive)).collect();
+    let of = |point: &DesignPoint| [0, 1].map(|i| value::text(&point.values[i]));
     let grid: BTreeSet<[String; 2]> = points.iter().map(of).collect();
     assert_eq!(grid.len(), 6);
     assert!(grid.contains(&["0.2".to_string(), "17".into()]), "{grid:?}");

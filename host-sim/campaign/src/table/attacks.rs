@@ -5,8 +5,8 @@ use super::{FaultCase, STALE_MS, row};
 use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Change, Hand, Injection, Signal, Wire};
 
-const fn lie(to_m: f64, hides_hand: bool) -> Injection {
-    Injection::Lie {
+const fn false_lane(to_m: f64, hides_hand: bool) -> Injection {
+    Injection::FalseLane {
         to_m,
         ms: 160,
         hides_hand,
@@ -27,14 +27,14 @@ pub(super) const ROWS: &[FaultCase] = &[
     row(
         "attack-lane-4",
         "lane lie to 4 m in 160 ms, e_theta' matched to the yaw rate",
-        &[lie(4.0, false)],
+        &[false_lane(4.0, false)],
     )
     .may_hand_over()
     .torque(5.0),
     row(
         "attack-lane-and-column",
         "the same, and the driver torque made to fit the column",
-        &[lie(4.0, true)],
+        &[false_lane(4.0, true)],
     )
     .only_rules()
     .torque(5.0),
@@ -42,7 +42,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         "attack-lane-and-column-opposed",
         "the same while the driver pulls back with 10 N.m",
         &[
-            lie(4.0, true),
+            false_lane(4.0, true),
             Injection::Hand(Hand::Opposes {
                 torque_nm: 10.0,
                 ms: 1000,

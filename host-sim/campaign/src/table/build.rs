@@ -3,8 +3,8 @@
 use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place, PlaceOnRoad};
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
 use crate::injection::Start;
-use crate::residual::Seen;
-use haptic_sim::models::real::WorldParameters;
+use crate::residual::Detectability;
+use haptic_sim::models::nonlinear::WorldParameters;
 
 const fn reaches(mode: u64) -> Expect {
     Expect::Reaches { mode, fading: false }
@@ -48,7 +48,7 @@ impl FaultCase {
     /// Once what arrives contradicts itself.
     pub(super) const fn contradicts(self) -> Self {
         Self {
-            seen: Seen::Contradiction,
+            seen: Detectability::Contradiction,
             ..self.hands_over(CONTRADICTION_MS)
         }
     }
@@ -57,7 +57,7 @@ impl FaultCase {
         Self {
             expect: Expect::MayHandOver,
             deadline_ms: CONTRADICTION_MS,
-            seen: Seen::Contradiction,
+            seen: Detectability::Contradiction,
             ..self
         }
     }
@@ -154,7 +154,7 @@ impl FaultCase {
         }
     }
 
-    pub(super) const fn seen(self, seen: Seen) -> Self {
+    pub(super) const fn seen(self, seen: Detectability) -> Self {
         Self { seen, ..self }
     }
 

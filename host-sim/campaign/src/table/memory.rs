@@ -4,7 +4,7 @@ use haptic_core::ecu::injection::Region;
 
 use super::{FaultCase, MOTOR_MS, PlaceOnRoad, WEAK_MS, row};
 use crate::injection::{Hand, Injection, Inside, Motor, RequestFault, Start};
-use crate::residual::Seen;
+use crate::residual::Detectability;
 
 const fn inside(inside: Inside) -> Injection {
     Injection::Inside(inside)
@@ -105,7 +105,7 @@ pub(super) const ROWS: &[FaultCase] = &[
         ],
     )
     .stops(MOTOR_MS)
-    .seen(Seen::MotorAstray)
+    .seen(Detectability::MotorAstray)
     .after_fade(),
     row(
         "motor-half",
@@ -113,14 +113,14 @@ pub(super) const ROWS: &[FaultCase] = &[
         &[Injection::Motor(Motor::Times(0.5))],
     )
     .hands_over(WEAK_MS)
-    .seen(Seen::MotorWeak),
+    .seen(Detectability::MotorWeak),
     row(
         "motor-dead",
         "the motor delivers nothing, as a limiter that zeroes in silence",
         &[Injection::Motor(Motor::Times(0.0))],
     )
     .hands_over(WEAK_MS)
-    .seen(Seen::MotorWeak),
+    .seen(Detectability::MotorWeak),
     row(
         "motor-reversed",
         "the motor turns the wrong way",
@@ -129,7 +129,7 @@ pub(super) const ROWS: &[FaultCase] = &[
     // Below its own error of 0.1 N.m, as on a straight, it passes for a weak one.
     .place(PlaceOnRoad::In)
     .stops(MOTOR_MS)
-    .seen(Seen::MotorAstray),
+    .seen(Detectability::MotorAstray),
     row(
         "brown-out",
         "the supply breaks down in the curve",

@@ -5,7 +5,7 @@ use super::*;
 fn panel(title: &str, series: Vec<Series>) -> Panel {
     Panel {
         title: title.into(),
-        y: Axis::of("Lateral error", "m"),
+        y: Axis::new("Lateral error", "m"),
         series,
     }
 }
@@ -14,7 +14,7 @@ fn two_panels() -> Figure {
     let first = vec![(0.0, 0.0), (50.0, 0.13), (100.0, 0.0), (150.0, 9.0)];
     Figure {
         title: "Two drivers".into(),
-        x: Axis::of("Distance", "m").within(0.0, 100.0),
+        x: Axis::new("Distance", "m").within(0.0, 100.0),
         same_y: true,
         panels: vec![
             panel("A", vec![Series::line("manual", 0, first)]),
@@ -234,10 +234,10 @@ fn a_map_has_a_word_in_each_field_and_a_tick_at_each() {
         field(40.0, 0.1, "unstable", 3),
     ];
     let figure = Figure {
-        x: Axis::of("Speed", "km/h").within(15.0, 45.0),
+        x: Axis::new("Speed", "km/h").within(15.0, 45.0),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("t_p", "s").within(0.05, 0.15),
+            y: Axis::new("t_p", "s").within(0.05, 0.15),
             series,
         }],
         ..Figure::default()

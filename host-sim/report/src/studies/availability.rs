@@ -2,7 +2,7 @@
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::availability::{Availability, Cell as Row, Ended, Leg, Rate};
+use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_campaign::campaign::CaseResult;
 use haptic_sim::worlds::{WORLDS, WorldKind};
 use serde::Serialize;
@@ -87,12 +87,12 @@ fn detection_figure(faults: &Detection) -> Figure {
         panels: vec![
             Panel {
                 title: "The ECU left".into(),
-                y: Axis::of("Share of the runs", "%").within(0.0, 105.0),
+                y: Axis::new("Share of the runs", "%").within(0.0, 105.0),
                 series: vec![Series::with_mark("", 2, Mark::Stems, left)],
             },
             Panel {
                 title: "How soon".into(),
-                y: Axis::of("Time from the onset", "s"),
+                y: Axis::new("Time from the onset", "s"),
                 series: vec![
                     Series::with_mark("longest", 3, Mark::Stems, after(1)),
                     Series::dots("median", 1, after(0)),
@@ -170,7 +170,7 @@ fn table(results: &Availability) -> Table {
             Cell::number(100.0 * (1.0 - row.available), 2),
             Cell::number(row.latched as f64, 0),
             Cell::number(row.diverged as f64, 0),
-            Cell::number(row.lost_by_hand.legs as f64, 0),
+            Cell::number(row.lost_by_hand.segments as f64, 0),
             Cell::number(row.sdlp_m, 2),
         ]
     };
@@ -222,23 +222,23 @@ fn drives(results: &Availability) -> Table {
         Ended::Latched => "latched",
         Ended::Diverged => "off the road",
     };
-    let row = |leg: &Leg| {
-        let declared = leg.declarations.iter().map(|declaration| {
+    let row = |segment: &DriveSegment| {
+        let declared = segment.declarations.iter().map(|declaration| {
             format!(
                 "{} at {:.1} s, {:.2} m/s2",
                 declaration.faults, declaration.time_s, declaration.lateral_m_per_s2
             )
         });
         vec![
-            Cell::Text(leg.world.clone()),
-            Cell::Text(leg.road.clone()),
-            Cell::number(f64::from(leg.number), 0),
-            Cell::Text(leg.car.to_string()),
-            Cell::number(leg.speed_kmh, 1),
+            Cell::Text(segment.world.clone()),
+            Cell::Text(segment.road.clone()),
+            Cell::number(f64::from(segment.number), 0),
+            Cell::Text(segment.car.to_string()),
+            Cell::number(segment.speed_kmh, 1),
             Cell::Text(declared.collect::<Vec<_>>().join("; ")),
-            Cell::Text(off(leg.ended).into()),
-            Cell::Text(off(leg.by_hand.ended).into()),
-            Cell::number(leg.by_hand.largest_error_m, 2),
+            Cell::Text(off(segment.ended).into()),
+            Cell::Text(off(segment.by_hand.ended).into()),
+            Cell::number(segment.by_hand.largest_error_m, 2),
         ]
     };
     Table::new(
@@ -254,16 +254,16 @@ fn drives(results: &Availability) -> Table {
             "By hand",
             "Largest error by hand (m)",
         ],
-        results.legs.iter().map(row),
+        results.segments.iter().map(row),
     )
 }
 
-/// What is real in each world.
+/// What each world has beyond the paper's.
 pub fn worlds() -> Table {
     let row = |c: &WorldKind| vec![Cell::text(c.name), Cell::text(c.what)];
     Table::new(
-        "What is real in each world",
-        ["World", "What is real"],
+        "What each world adds to the paper's",
+        ["World", "What it adds"],
         WORLDS.iter().map(row),
     )
 }
@@ -302,7 +302,7 @@ fn figure(results: &Availability) -> Figure {
         panels: vec![
             Panel {
                 title: "False declarations".into(),
-                y: Axis::of("Rate", "1/h").within(0.0, most_rate),
+                y: Axis::new("Rate", "1/h").within(0.0, most_rate),
                 series: vec![
                     Series::with_mark(
                         "seen, with the 95 % interval",
@@ -315,7 +315,7 @@ fn figure(results: &Availability) -> Figure {
             },
             Panel {
                 title: "Without guidance".into(),
-                y: Axis::of("Share of the time", "%").within(
+                y: Axis::new("Share of the time", "%").within(
                     0.0,
                     most(&mut results.cells.iter().map(|row| 100.0 * (1.0 - row.available))),
                 ),
@@ -338,14 +338,14 @@ mod tests {
             judged: true,
             hours,
             available: 1.0,
-            declarations: Rate::of(count, hours),
+            declarations: Rate::new(count, hours),
             causes: Vec::new(),
             cars: 1,
             cars_with: 0,
             latched: 0,
             diverged: 0,
             lost_by_hand: Lost {
-                legs: 0,
+                segments: 0,
                 hours: 0.0,
                 declarations: 0,
             },
@@ -362,7 +362,7 @@ mod tests {
             hours: 0.1,
             cells: vec![cell(0, 1.0 / 12.0), cell(3, 2.0), cell(0, 0.0)],
             together: Vec::new(),
-            legs: Vec::new(),
+            segments: Vec::new(),
         };
         let figure = figure(&results);
         let [seen, none] = &figure.panels[0].series[..] else {

@@ -227,7 +227,7 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
             .collect();
         Panel {
             title: name.clone(),
-            y: Axis::of(metric.label, metric.unit),
+            y: Axis::new(metric.label, metric.unit),
             series: vec![Series::with_mark("", 0, Mark::Whiskers(ends), points)],
         }
     };

@@ -43,10 +43,10 @@ fn paths(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Distance along the road", "m"),
+        x: Axis::new("Distance along the road", "m"),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("Lateral error", "m"),
+            y: Axis::new("Lateral error", "m"),
             series: [Series::line("measured", 0, drive.path.clone())]
                 .into_iter()
                 .chain(again("identified driver", 1, &drive.noise_model))
@@ -68,10 +68,10 @@ fn torque(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("Driver torque", "N.m"),
+            y: Axis::new("Driver torque", "N.m"),
             series: vec![
                 line("measured", 0, &t.measured_nm),
                 line("simulated", 3, &t.simulated_nm),
@@ -111,7 +111,7 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         series.push(dots("published method", 3, ASIDE, guided, |d| &d.paper));
         Panel {
             title: title.into(),
-            y: Axis::of("Trajectory error", "m"),
+            y: Axis::new("Trajectory error", "m"),
             series,
         }
     });
@@ -140,7 +140,7 @@ fn estimates(experiment: &Experiment) -> Figure {
         x: Axis::counting("Participant"),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("K_hg", "-"),
+            y: Axis::new("K_hg", "-"),
             series: vec![
                 Series::dots("truth", 0, truth.collect()),
                 Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),
@@ -223,8 +223,8 @@ fn means(experiment: &Experiment) -> String {
 /// Truth beside estimates, of the guided or the manual drives.
 fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     let sum = |d: &Drive| d.truth.k_d + haptic_analysis::identify::Muscle::default().k_nms;
-    type Column = (&'static str, fn(&Parameters) -> &Parameter, usize);
-    let columns: [Column; 5] = [
+    type ParameterColumn = (&'static str, fn(&Parameters) -> &Parameter, usize);
+    let columns: [ParameterColumn; 5] = [
         ("gain_1", |p| &p.gain_1, 3),
         ("gain_2", |p| &p.gain_2, 3),
         ("gain_3", |p| &p.gain_3, 2),

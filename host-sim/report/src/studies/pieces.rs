@@ -110,7 +110,7 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
         let points = x.iter().copied().zip(middles).collect();
         Panel {
             title: String::new(),
-            y: Axis::of(name, unit),
+            y: Axis::new(name, unit),
             series: vec![
                 Series::interval("95 % interval of a piece", 5, &x, &ends),
                 Series::line("followed", 4, followed.collect()),
@@ -129,7 +129,7 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
         }
     };
     Some(Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: histories.into_iter().map(panel).collect(),
         bands: pieces.changes.iter().map(band).collect(),
         ..Figure::default()

@@ -202,7 +202,7 @@ fn predictions(found: &RealDrives) -> Figure {
             title: if by_hand { "by hand" } else { "shared" }.into(),
             y: Axis {
                 limits: Some((-1.05, 1.0)),
-                ..Axis::of("variance accounted for", "-")
+                ..Axis::new("variance accounted for", "-")
             },
             series: vec![
                 sorted("ours", 1, |h| h.ours),
@@ -212,7 +212,7 @@ fn predictions(found: &RealDrives) -> Figure {
         }
     };
     Figure {
-        x: Axis::of("halves, best first", "%"),
+        x: Axis::new("halves, best first", "%"),
         same_y: true,
         panels: [true, false].map(panel).into(),
         ..Figure::default()

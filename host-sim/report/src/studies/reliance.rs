@@ -26,7 +26,7 @@ pub(super) fn panel(
     let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
     Panel {
         title,
-        y: Axis::of("K_hg", "-").within(-0.5, 1.5),
+        y: Axis::new("K_hg", "-").within(-0.5, 1.5),
         series: vec![
             Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
             Series::line("truth", 0, truth.to_vec()),
@@ -110,7 +110,7 @@ fn figure(results: &RelianceResults) -> Figure {
     let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
     let examples = results.examples.iter().step_by(stride);
     Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         same_y: true,
         panels: examples.map(example_panel).collect(),
         ..Figure::default()

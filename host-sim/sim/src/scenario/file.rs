@@ -10,7 +10,7 @@ use crate::fields::{Field, Fields, InFile, Range};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
-use crate::models::real::WorldParameters;
+use crate::models::nonlinear::WorldParameters;
 use crate::models::road::{COURSE_FIELDS, Course, LaneChoice, PAPER_COURSE, SEGMENT_FIELDS, Segment};
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
@@ -100,7 +100,7 @@ pub(super) fn write(scenario: &Scenario) -> Result<String, toml::ser::Error> {
         course: if built_in {
             CourseField::Named(PAPER_COURSE.into())
         } else {
-            CourseField::Whole(InlineCourse::of(course))
+            CourseField::Whole(InlineCourse::new(course))
         },
         road: None,
         lane: None,
@@ -230,7 +230,7 @@ impl CourseField {
 }
 
 impl InlineCourse {
-    fn of(course: &Course) -> Self {
+    fn new(course: &Course) -> Self {
         let segment = |s: &Segment| InlineSegment {
             length_m: s.length_m,
             curvature_start_per_m: s.curvature_start_1pm,

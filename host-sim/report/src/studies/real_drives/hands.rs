@@ -41,10 +41,10 @@ fn curve(hands: &Hands) -> Figure {
         .chain([(0.0, 0.0)])
         .collect();
     Figure {
-        x: Axis::of("felt in shared driving", "%").within(0.0, 100.0),
+        x: Axis::new("felt in shared driving", "%").within(0.0, 100.0),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("felt by hand", "%").within(0.0, 102.0),
+            y: Axis::new("felt by hand", "%").within(0.0, 102.0),
             series: vec![
                 Series::line("no difference", 0, vec![(0.0, 0.0), (100.0, 100.0)]),
                 Series::line("by threshold", 1, all),

@@ -20,10 +20,10 @@ pub(super) fn distribution(summary: &Summary) -> Named {
         x,
     });
     let figure = Figure {
-        x: Axis::of(&name, unit),
+        x: Axis::new(&name, unit),
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("Share of the drives", "-").within(0.0, 1.0),
+            y: Axis::new("Share of the drives", "-").within(0.0, 1.0),
             series: vec![Series::line("", 0, points)],
         }],
         markers: markers.into_iter().collect(),
@@ -92,7 +92,7 @@ pub(super) fn influence(summary: &Summary) -> Option<Named> {
     let figure = Figure {
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("Share of the variance", "-").within(-0.03, 1.03),
+            y: Axis::new("Share of the variance", "-").within(-0.03, 1.03),
             series,
         }],
         rows,
@@ -136,7 +136,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
     let (name, unit) = metric(summary.judge);
     let mut panels = vec![Panel {
         title: String::new(),
-        y: Axis::of(&format!("Mean {}", lower(&name)), unit),
+        y: Axis::new(&format!("Mean {}", lower(&name)), unit),
         series: series(summary, effect, &places, numbers, |drives| {
             (drives.mean, drives.interval)
         }),
@@ -144,7 +144,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
     if summary.limit.is_some() {
         panels.push(Panel {
             title: String::new(),
-            y: Axis::of("Bad drives", "%"),
+            y: Axis::new("Bad drives", "%"),
             series: series(summary, effect, &places, numbers, |drives| {
                 let ends = drives.beyond_interval.map(|ends| ends.map(|share| 100.0 * share));
                 (drives.beyond.map(|share| 100.0 * share), ends)
@@ -161,7 +161,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
         x: *x,
     });
     Figure {
-        x: Axis::of(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
+        x: Axis::new(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
         rows: if numbers {
             Vec::new()
         } else {
