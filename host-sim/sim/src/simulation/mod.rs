@@ -124,7 +124,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
     pub fn view(&self) -> Option<DriverView> {
         let motion = self.driver_vehicle.motion();
         let mut points = self.driver_points.clone();
-        let (lane, points_m) = points.observe(&self.road, &self.driver_vehicle, &motion)?;
+        let (lane, points_m) = points.see(&self.road, &self.driver_vehicle, &motion)?;
         let goes_on = self.ending.is_none() && points_m[1] < self.end_m;
         goes_on.then(|| self.perceived(lane, points_m, &motion, self.plan.faults(self.step)))
     }
@@ -159,9 +159,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
             return None;
         }
         let motion = self.driver_vehicle.motion();
-        let looked = self
-            .driver_points
-            .observe(&self.road, &self.driver_vehicle, &motion);
+        let looked = self.driver_points.see(&self.road, &self.driver_vehicle, &motion);
         let Some((mut preview, points_m)) = looked else {
             return self.diverge();
         };
@@ -173,7 +171,7 @@ impl<G: Guidance, S: DriverVehicle> Simulation<G, S> {
         let is_sample = self.step.is_multiple_of(STEPS_PER_SAMPLE);
         let looks = self.guidance.looks_at_road(self.step);
         let lane = if looks || is_sample {
-            let seen = self.camera.observe(&self.road, &self.driver_vehicle, &motion);
+            let seen = self.camera.see(&self.road, &self.driver_vehicle, &motion);
             let Some((errors, _)) = seen else {
                 return self.diverge();
             };
