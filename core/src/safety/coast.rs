@@ -69,6 +69,8 @@ words! {
 pub(crate) enum PictureVerdict {
     /// The line is where it was extrapolated to.
     Expected,
+    /// The line is where it was extrapolated to, in the first picture after some without it.
+    Returned,
     /// Another line, which is adopted in its place.
     Adopted,
     /// A line elsewhere.
@@ -133,8 +135,13 @@ impl Coast {
         demanded: Torque,
     ) -> PictureVerdict {
         if agrees && self.lost <= MOST_BLIND {
+            let is_first = self.sight != SEES;
             self.sight = SEES;
-            return PictureVerdict::Expected;
+            return if is_first {
+                PictureVerdict::Returned
+            } else {
+                PictureVerdict::Expected
+            };
         }
         let is_near = sample.e_y.abs() <= NEAR && sample.e_theta.abs() <= ALONG;
         if self.trust == Ratio::ZERO && is_near {
