@@ -218,7 +218,7 @@ mod tests {
         put(&mut table, "course.segment.0.length_m", Value::Float(2.0)).unwrap();
         put(&mut table, "world.mu", Value::Float(0.5)).unwrap();
         put(&mut table, "speed_m_per_s", Value::Integer(50)).unwrap();
-        assert_eq!(table["course"]["segment"][0]["length"].as_float(), Some(2.0));
+        assert_eq!(table["course"]["segment"][0]["length_m"].as_float(), Some(2.0));
         assert_eq!(table["world"]["mu"].as_float(), Some(0.5));
         let error = put(&mut table, "course.segment.3.length_m", Value::Float(2.0))
             .unwrap_err()
