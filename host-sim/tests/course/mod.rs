@@ -153,7 +153,7 @@ fn what_is_broken_or_not_supported_is_refused_in_one_sentence() {
             first,
             r#"length="1e12"><line/>"#,
             &[],
-            "road 1: geometry at s = 0 m: length_m = 1000000000000 m makes the road longer than 200000 m",
+            "road 1: geometry at s = 0 m: length = 1000000000000 m makes the road longer than 200000 m",
         ),
         (
             width,
@@ -165,7 +165,7 @@ fn what_is_broken_or_not_supported_is_refused_in_one_sentence() {
             first,
             r#"length="-100"><line/>"#,
             &[],
-            "road 1: geometry at s = 0 m: length_m = -100 m is negative",
+            "road 1: geometry at s = 0 m: length = -100 m is negative",
         ),
         (
             "<line/>",
