@@ -2,7 +2,7 @@
 //! refuse, and whether its standard errors are right.
 
 use haptic_analysis::identify::{DriveLog, Identification, Options, Parameter, identify_with_noise_model};
-use haptic_batch::experiment::{Plan, Recorder, experiment, repeat};
+use haptic_batch::experiment::{ExperimentPlan, Recorder, experiment, repeat};
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::participants::{PublishedDriver, participants};
 use haptic_sim::scenario::{Scenario, Sensors};
@@ -86,7 +86,7 @@ fn drivers_at_either_end_of_k_hg_are_identified() {
 /// all parameters hold the truth as often as they promise.
 #[test]
 fn with_a_probe_k_hg_is_read_and_the_intervals_hold_what_they_promise() {
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: (1..=14).collect(),
         probe_nm: 0.2,
         seed: 1,
@@ -104,7 +104,7 @@ fn with_a_probe_k_hg_is_read_and_the_intervals_hold_what_they_promise() {
 /// participant; the published way names a number and puts it on its bound for most. Its mean fit is the paper's.
 #[test]
 fn without_a_probe_k_hg_is_not_identified() {
-    let plan = Plan {
+    let plan = ExperimentPlan {
         participants: (1..=14).collect(),
         probe_nm: 0.0,
         seed: 1,

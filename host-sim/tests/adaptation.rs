@@ -30,7 +30,7 @@ around = [{ kind = 'trust', tau_s = 5 }]
 fn two_adaptations_leave_the_same_bytes_on_any_threads_and_nothing_of_a_wrong_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    fs::write(folder.join("road.toml"), "[[segment]]\nlength = 200\n").unwrap();
+    fs::write(folder.join("road.toml"), "[[segment]]\nlength_m = 200\n").unwrap();
     fs::write(folder.join("study.toml"), FILE).unwrap();
     let run = |file, threads, place| {
         host_sim(

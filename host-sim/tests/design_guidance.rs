@@ -8,7 +8,7 @@ use crate::host_sim;
 
 const FILE: &str = include_str!("../batch/src/design_guidance/short.toml");
 
-const ROAD: &str = "[[segment]]\nlength = 100\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+const ROAD: &str = "[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 
 fn design(folder: &Path, arguments: &[&str]) -> Output {
     host_sim(folder, &[&["design-guidance", "design.toml"], arguments].concat())

@@ -168,7 +168,7 @@ impl Model for Controller {
             ..,
         ] = *values
         else {
-            return Err(FmuError::Other("variables are missing"));
+            return Err(FmuError::MissingValues(values.len()));
         };
         let step = self.steps;
         // The ECU's clock wraps.

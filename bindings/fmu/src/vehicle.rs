@@ -122,9 +122,9 @@ struct Vehicle {
 
 impl Vehicle {
     /// What there is to be seen now: a copy looks, and is thrown away.
-    fn look(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
+    fn observe(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &self.simulation else {
-            return Err(FmuError::Other("the vehicle was not started"));
+            return Err(FmuError::NotStarted);
         };
         let action = Action {
             hand_torque_nm: values[0],
@@ -159,7 +159,7 @@ impl Vehicle {
 fn ended(simulation: &Simulation<GivenTorque>) -> FmuError {
     match simulation.ending() {
         Some(Ending::Diverged { s_m }) => FmuError::LeftRoad(s_m),
-        _ => FmuError::Other("the course has ended"),
+        _ => FmuError::Ended,
     }
 }
 
@@ -173,18 +173,18 @@ impl Model for Vehicle {
             .speed(Speed::Constant(values[SPEED]))
             .vehicle(vehicle)
             .build()?;
-        self.simulation = Some(Simulation::of(
+        self.simulation = Some(Simulation::with_driver_vehicle(
             &scenario,
             PaperPair::without_driver(&scenario),
             GivenTorque::default(),
         ));
         (self.lateral_error_m, self.s_m) = (0.0, 0.0);
-        self.look(values)
+        self.observe(values)
     }
 
     fn step(&mut self, values: &mut [f64]) -> Result<(), FmuError> {
         let Some(simulation) = &mut self.simulation else {
-            return Err(FmuError::Other("the vehicle was not started"));
+            return Err(FmuError::NotStarted);
         };
         simulation.guidance_mut().torque_nm = values[1];
         let action = Action {
@@ -194,7 +194,7 @@ impl Model for Vehicle {
         if simulation.step(&action).is_none() {
             return Err(ended(simulation));
         }
-        self.look(values)
+        self.observe(values)
     }
 
     fn copy(&self) -> Box<dyn Model> {

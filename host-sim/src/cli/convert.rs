@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
         )
         .into());
     }
-    let target = arguments.output.as_deref().map(Format::of).transpose()?;
+    let target = arguments.output.as_deref().map(Format::from_path).transpose()?;
     let contents = formats::read(&arguments.input, time.as_ref())?;
     if let (Contents::Frames(frames), Some(output), Some(format)) = (&contents, &arguments.output, target)
         && format.holds_frames()

@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let heading = json!({
         "study": "design-guidance",
         "design": format!("{:016x}", design.identity()),
-        "provenance": Provenance::of(None),
+        "provenance": Provenance::new(None),
     });
     let (checkpoint, known) =
         Checkpoint::open::<Evaluated>(&out.join(SETS), &serde_json::to_string(&heading)?)?;

@@ -5,7 +5,7 @@ use std::fmt;
 use haptic_core::controller::params::{Params, VehicleParams};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::{ArmGains, DriverParameters};
-use haptic_sim::models::real::WorldParameters;
+use haptic_sim::models::nonlinear::WorldParameters;
 use haptic_sim::models::tolerances::Car;
 use haptic_sim::models::vehicle::VehicleParameters;
 use haptic_sim::scenario::{

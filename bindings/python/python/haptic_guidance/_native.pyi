@@ -13,20 +13,20 @@ class SpeedTable(TypedDict, total=False):
     speed_m_per_s: Required[Sequence[float]]
 
 class SegmentTable(TypedDict, total=False):
-    length: Required[float]
-    curvature: float
-    curvature_start: float
-    curvature_end: float
-    bank: float
-    bank_start: float
-    bank_end: float
+    length_m: Required[float]
+    curvature_per_m: float
+    curvature_start_per_m: float
+    curvature_end_per_m: float
+    bank_rad: float
+    bank_start_rad: float
+    bank_end_rad: float
     grade: float
     grade_start: float
     grade_end: float
 
 class CourseTable(TypedDict, total=False):
     name: str
-    lane_width: float
+    lane_width_m: float
     segment: Sequence[SegmentTable]
     opendrive: str
 

@@ -108,7 +108,7 @@ fn a_driver_with_two_equilibria_has_no_slope_there() {
     assert_eq!(driver_slope(&map, [0.2, 0.45]), None);
 }
 
-const ROAD: &str = "[[segment]]\nlength = 100\n[[segment]]\nlength = 150\ncurvature = 0.002\n[[segment]]\nlength = 150\ncurvature = -0.002\n";
+const ROAD: &str = "[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 150\ncurvature_per_m = 0.002\n[[segment]]\nlength_m = 150\ncurvature_per_m = -0.002\n";
 const FILE: &str = "
 name = 'short'
 seeds = 2

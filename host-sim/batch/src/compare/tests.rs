@@ -11,7 +11,7 @@ use crate::files::Source;
 use crate::files::tests::check_refusals;
 
 const ROAD: &str =
-    "lane_width = 3.6\n[[segment]]\nlength = 200\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 200\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 const FILE: &str = "
 name = 'short'
 seeds = 2

@@ -13,7 +13,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::changing::{Changed, driver_at};
 use super::corruptions::{Held, tolerance};
 use super::drives::guided;
@@ -69,7 +69,12 @@ pub struct Changes {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn changes(plan: &Plan, drives: u32, only: &str, done: impl Fn() + Sync) -> Result<Changes, StudyError> {
+pub fn changes(
+    plan: &ExperimentPlan,
+    drives: u32,
+    only: &str,
+    done: impl Fn() + Sync,
+) -> Result<Changes, StudyError> {
     let kinds: Vec<_> = KINDS.iter().filter(|(name, _)| name.contains(only)).collect();
     if kinds.is_empty() {
         let names = KINDS.map(|k| k.0).join("; ");
@@ -160,7 +165,7 @@ impl ChangesLine {
             self.identified[place] += named;
             self.false_identifications[place] += named * usize::from(far.count() * 2 > truths.len());
             let middle = truths[truths.len() / 2][i];
-            self.intervals[place] = self.intervals[place] + Held::of(std::iter::once(&middle));
+            self.intervals[place] = self.intervals[place] + Held::new(std::iter::once(&middle));
         }
     }
 
@@ -186,7 +191,7 @@ fn nearest(changes: &[Change], at_s: f64) -> Option<&Change> {
 }
 
 impl Changes {
-    fn new(plan: &Plan, drives: u32, lines: Vec<ChangesLine>) -> Self {
+    fn new(plan: &ExperimentPlan, drives: u32, lines: Vec<ChangesLine>) -> Self {
         let promised = lines.iter().filter(|l| l.kind != ASSUMED_NOT_TO);
         let all = promised.cloned().reduce(ChangesLine::and).unwrap_or_default();
         let all = ChangesLine { kind: "all", ..all };

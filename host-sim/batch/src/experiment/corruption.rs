@@ -5,7 +5,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::PublishedDriver;
 use super::kinds::{Drawn, Kind};
 
@@ -101,7 +101,7 @@ pub const POPULATION: [(&str, &[Corruption]); 34] = population! {
 pub(super) fn changing(
     ways: &[Corruption],
     truth: &PublishedDriver,
-    plan: &Plan,
+    plan: &ExperimentPlan,
     number: u32,
 ) -> Option<Drawn> {
     let mut random = random_of(plan, number);
@@ -111,12 +111,17 @@ pub(super) fn changing(
     })
 }
 
-fn random_of(plan: &Plan, number: u32) -> Xoshiro256PlusPlus {
+fn random_of(plan: &ExperimentPlan, number: u32) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(plan.seed.wrapping_mul(100).wrapping_add(u64::from(number)))
 }
 
 /// `log` as these ways leave it; the same for the same plan and participant.
-pub(super) fn corrupted_log(log: &DriveLog, ways: &[Corruption], plan: &Plan, number: u32) -> DriveLog {
+pub(super) fn corrupted_log(
+    log: &DriveLog,
+    ways: &[Corruption],
+    plan: &ExperimentPlan,
+    number: u32,
+) -> DriveLog {
     let mut random = random_of(plan, number);
     let mut log = log.clone();
     for way in ways {

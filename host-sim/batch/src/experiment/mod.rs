@@ -144,7 +144,7 @@ pub struct Finding {
 ///
 /// # Errors
 /// An unknown participant; a probe that the controller refuses; a drive that differs from the shipping ECU's.
-pub fn experiment(plan: &Plan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
+pub fn experiment(plan: &ExperimentPlan, done: impl Fn() + Sync) -> Result<Experiment, StudyError> {
     let drives: Vec<_> = chosen(&plan.participants)?
         .into_iter()
         .flat_map(|p| [(p.number, p.manual), (p.number, p.guided)])

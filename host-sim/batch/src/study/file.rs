@@ -9,7 +9,7 @@ use haptic_sim::seeds::named;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{Order, Session, Study, Who};
+use super::{Order, Session, Study, Subject};
 use crate::error::{StudyError, refuse};
 use crate::experiment::{REMNANT_GUIDED_NM, REMNANT_MANUAL_NM};
 use crate::files::{Source, one};
@@ -141,7 +141,7 @@ fn session(
         merge(&mut fields, &driver);
     };
     let who = match (participant.published, &participant.driver, participant.person) {
-        (None, None, true) => Who::Person,
+        (None, None, true) => Subject::Person,
         (Some(number), None, false) => {
             put_driver(of_published(number, manual).map_err(|e| bad(e.to_string()))?);
             Who::Simulated
@@ -163,7 +163,7 @@ fn session(
         source.course(course, lane)
     })?;
     scenario.check_times().map_err(|e| bad(e.to_string()))?;
-    if who == Who::Person && scenario.failure().kind != FailureKind::None {
+    if who == Subject::Person && scenario.failure().kind != FailureKind::None {
         return Err(bad(
             "failure: a person's recording does not say when it came; only simulated \
                         participants can have one"

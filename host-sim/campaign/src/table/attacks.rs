@@ -5,8 +5,8 @@ use super::{FaultCase, STALE_MS};
 use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Change, Hand, Injection, Signal, Wire};
 
-const fn lie(to_m: f64, hides_hand: bool) -> Injection {
-    Injection::Lie {
+const fn false_lane(to_m: f64, hides_hand: bool) -> Injection {
+    Injection::FalseLane {
         to_m,
         ms: 160,
         hides_hand,

@@ -3,8 +3,8 @@
 use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place, PlaceOnRoad};
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
 use crate::injection::Start;
-use crate::residual::Seen;
-use haptic_sim::models::real::WorldParameters;
+use crate::residual::Detectability;
+use haptic_sim::models::nonlinear::WorldParameters;
 
 const fn reaches(mode: u64) -> Expect {
     Expect::Reaches { mode, fading: false }

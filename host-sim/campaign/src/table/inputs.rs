@@ -6,7 +6,7 @@
 use super::{BLIND_MS, ELSEWHERE_MS, FaultCase, SLIP_MS, STALE_MS};
 use crate::bytes::{COLUMN, LANE, REQUEST, VEHICLE};
 use crate::injection::{Change, Hand, Injection, RequestFault, Signal, Start, Wire};
-use crate::residual::Seen;
+use crate::residual::Detectability;
 
 use Change::{Approaching, Drifting, Frozen, Growing, Jumping, Mirrored, Noisy, Plus, StuckAt, Times};
 use Injection::{Invalid, Sensor};

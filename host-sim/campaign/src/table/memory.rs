@@ -4,7 +4,7 @@ use haptic_core::ecu::injection::Region;
 
 use super::{FaultCase, MOTOR_MS, PlaceOnRoad, WEAK_MS};
 use crate::injection::{Hand, Injection, Inside, Motor, RequestFault, Start};
-use crate::residual::Seen;
+use crate::residual::Detectability;
 
 const fn inside(inside: Inside) -> Injection {
     Injection::Inside(inside)

@@ -1,7 +1,7 @@
 //! Faults whose harm is where the vehicle goes, and cars that are honest but not ideal: those are no faults, and guidance
 //! has to go on.
 
-use haptic_sim::models::real::Tyres;
+use haptic_sim::models::nonlinear::Tyres;
 
 use super::{FaultCase, PlaceOnRoad};
 use crate::injection::{Change, Hand, Injection, Signal};

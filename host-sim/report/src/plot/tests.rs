@@ -10,7 +10,7 @@ fn two_panels() -> Figure {
     let first = vec![(0.0, 0.0), (50.0, 0.13), (100.0, 0.0), (150.0, 9.0)];
     Figure {
         title: "Two drivers".into(),
-        x: Axis::of("Distance", "m").within(0.0, 100.0),
+        x: Axis::new("Distance", "m").within(0.0, 100.0),
         same_y: true,
         panels: vec![
             panel("A", vec![Series::line("manual", 0, first)]),

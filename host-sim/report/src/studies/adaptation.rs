@@ -176,12 +176,12 @@ fn maps_figure(results: &AdaptationResults) -> Figure {
         let both = [(0, "driver, from low K_hg"), (1, "driver, from high K_hg")];
         Panel {
             title: name.clone(),
-            y: Axis::of("K_hg", "-").within(0.0, 1.02),
+            y: Axis::new("K_hg", "-").within(0.0, 1.02),
             series: pairs.map(of_law).chain(both.into_iter().map(of_driver)).collect(),
         }
     };
     Figure {
-        x: Axis::of("K_1", "N.m"),
+        x: Axis::new("K_1", "N.m"),
         panels: results.drivers.iter().enumerate().map(panel).collect(),
         ..Figure::default()
     }
@@ -209,8 +209,8 @@ fn series_figure(results: &AdaptationResults, quantity: Quantity) -> Figure {
     let panel = |(number, name): (usize, &String)| Panel {
         title: name.clone(),
         y: match quantity {
-            Quantity::KHg => Axis::of("K_hg", "-").within(0.0, 1.02),
-            Quantity::K1 => Axis::of("K_1", "N.m"),
+            Quantity::KHg => Axis::new("K_hg", "-").within(0.0, 1.02),
+            Quantity::K1 => Axis::new("K_1", "N.m"),
         },
         series: results
             .pairs
@@ -220,7 +220,7 @@ fn series_figure(results: &AdaptationResults, quantity: Quantity) -> Figure {
             .collect(),
     };
     Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: results.drivers.iter().enumerate().map(panel).collect(),
         bands: vec![Band {
             label: "torque lost".into(),
@@ -264,12 +264,12 @@ fn swings_figure() -> Figure {
                 0.0 => "a law that follows at once".into(),
                 lag => format!("a law that follows with a lag of {lag} s"),
             },
-            y: around(Axis::of("Delay", "s"), DELAYS_S, size[1]),
+            y: around(Axis::new("Delay", "s"), DELAYS_S, size[1]),
             series: vec![Series::with_mark("", 1, mark, fields().collect())],
         }
     };
     Figure {
-        x: around(Axis::of("Lag of trust", "s"), TRUST_S, size[0]),
+        x: around(Axis::new("Lag of trust", "s"), TRUST_S, size[0]),
         panels: LAW_LAGS_S.map(panel).to_vec(),
         ..Figure::default()
     }

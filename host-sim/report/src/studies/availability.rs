@@ -2,7 +2,7 @@
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_batch::availability::{Availability, Cell as Row, Ended, Leg, Rate};
+use haptic_batch::availability::{Availability, Cell as Row, DriveSegment, Ended, Rate};
 use haptic_campaign::campaign::CaseResult;
 use haptic_sim::worlds::{WORLDS, WorldKind};
 use serde::Serialize;
@@ -213,8 +213,8 @@ fn drives(results: &Availability) -> Table {
         Ended::Latched => "latched",
         Ended::Diverged => "off the road",
     };
-    let row = |leg: &Leg| {
-        let declared = leg.declarations.iter().map(|declaration| {
+    let row = |segment: &DriveSegment| {
+        let declared = segment.declarations.iter().map(|declaration| {
             format!(
                 "{} at {:.1} s, {:.2} m/s2",
                 declaration.faults, declaration.time_s, declaration.lateral_m_per_s2
@@ -241,12 +241,12 @@ fn drives(results: &Availability) -> Table {
     Table::of_rows("Drives in which something happened", results.legs.iter().map(row))
 }
 
-/// What is real in each world.
+/// What each world has beyond the paper's.
 pub fn worlds() -> Table {
     let row = |c: &WorldKind| vec![Cell::text(c.name), Cell::text(c.what)];
     Table::new(
-        "What is real in each world",
-        ["World", "What is real"],
+        "What each world adds to the paper's",
+        ["World", "What it adds"],
         WORLDS.iter().map(row),
     )
 }
@@ -321,14 +321,14 @@ mod tests {
             judged: true,
             hours,
             available: 1.0,
-            declarations: Rate::of(count, hours),
+            declarations: Rate::new(count, hours),
             causes: Vec::new(),
             cars: 1,
             cars_with: 0,
             latched: 0,
             diverged: 0,
             lost_by_hand: Lost {
-                legs: 0,
+                segments: 0,
                 hours: 0.0,
                 declarations: 0,
             },
@@ -345,7 +345,7 @@ mod tests {
             hours: 0.1,
             cells: vec![cell(0, 1.0 / 12.0), cell(3, 2.0), cell(0, 0.0)],
             together: Vec::new(),
-            legs: Vec::new(),
+            segments: Vec::new(),
         };
         let figure = figure(&results);
         let [seen, none] = &figure.panels[0].series[..] else {

@@ -138,13 +138,13 @@ fn figure(results: &DesignResults, choice: &Choice) -> Figure {
             .into_iter()
             .map(|(label, style, points)| Series::dots(label, style, points));
         Panel {
-            y: Axis::of(quantity, "-"),
+            y: Axis::new(quantity, "-"),
             series: series.collect(),
             ..Panel::default()
         }
     };
     Figure {
-        x: Axis::of("Effort or conflict of drivers with a line", "-"),
+        x: Axis::new("Effort or conflict of drivers with a line", "-"),
         panels: vec![panel("Mean peak error", 0), panel("Mean loss", 2)],
         ..Figure::default()
     }

@@ -2,7 +2,7 @@
 
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use haptic_analysis::identify::{Difference, Population, told};
+use haptic_analysis::identify::{Difference, Population, value_and_error};
 use haptic_batch::identify::Drivers;
 
 /// Parameters that a torque record can carry.
@@ -46,7 +46,8 @@ fn gaps(found: &Drivers) -> String {
     let of = |wanted: &str| {
         let missing = found.drivers.iter().enumerate().filter(|(_, (_, fit))| {
             let list = fit.parameters.list();
-            list.iter().any(|l| l.0 == wanted && told(l.2).is_none())
+            list.iter()
+                .any(|l| l.0 == wanted && value_and_error(l.2).is_none())
         });
         let numbers: Vec<String> = missing.map(|(i, _)| (i + 1).to_string()).collect();
         (!numbers.is_empty()).then(|| format!("{wanted} of {}", numbers.join(", ")))
@@ -149,7 +150,7 @@ fn figure(found: &Drivers) -> Figure {
             let named = list.iter().find(|l| l.0 == wanted);
             unit = named.map_or(unit, |l| l.1);
             let Some(p) = named.map(|l| l.2) else { continue };
-            if let (Some((x, _)), Some(interval)) = (told(p), p.interval_95) {
+            if let (Some((x, _)), Some(interval)) = (value_and_error(p), p.interval_95) {
                 let place = usize::from(!p.identified);
                 points[place].push(((i + 1) as f64, x));
                 intervals[place].push(interval);

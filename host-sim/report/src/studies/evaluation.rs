@@ -52,7 +52,7 @@ pub fn write_series(
 fn provenance(evaluation: &Evaluation) -> Provenance {
     let mut runs = evaluation.runs.iter();
     let one = runs.find(|(s, _)| s.condition() == Condition::Mid && s.failure().kind == FailureKind::Torque);
-    Provenance::of(one.map(|(scenario, _)| scenario.to_toml()))
+    Provenance::new(one.map(|(scenario, _)| scenario.to_toml()))
 }
 
 /// The main metrics of each run.
@@ -159,7 +159,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
     let bands = bands.chain(absences);
     Figure {
         title: title.into(),
-        x: Axis::of("Distance along the road", "m").within(from, to),
+        x: Axis::new("Distance along the road", "m").within(from, to),
         same_y: true,
         panels,
         bands: bands.filter(|band| band.from < to && band.to > from).collect(),

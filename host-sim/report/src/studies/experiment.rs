@@ -219,8 +219,8 @@ fn means(experiment: &Experiment) -> String {
 /// Truth beside estimates, of the guided or the manual drives.
 fn truth_table(experiment: &Experiment, guided: bool) -> Table {
     let sum = |d: &Drive| d.truth.k_d + haptic_analysis::identify::Muscle::default().k_nms;
-    type Column = (&'static str, fn(&Parameters) -> &Parameter, usize);
-    let columns: [Column; 5] = [
+    type ParameterColumn = (&'static str, fn(&Parameters) -> &Parameter, usize);
+    let columns: [ParameterColumn; 5] = [
         ("gain_1", |p| &p.gain_1, 3),
         ("gain_2", |p| &p.gain_2, 3),
         ("gain_3", |p| &p.gain_3, 2),

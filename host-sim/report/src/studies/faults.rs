@@ -42,7 +42,7 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
 }
 
 /// What the ECU reported in a run.
-pub fn story(case: &FaultCase, outcome: TrialOutcome) -> Section {
+pub fn report_of_run(case: &FaultCase, outcome: TrialOutcome) -> Section {
     let speed = match outcome.change {
         None => format!("{} km/h", outcome.speed_kmh),
         Some(change) => change.to_string(),
@@ -236,7 +236,7 @@ fn figure(campaign: &Campaign) -> Figure {
         panels: vec![
             panel(
                 "Worst reaction",
-                Axis::of("Share of the deadline", "%"),
+                Axis::new("Share of the deadline", "%"),
                 vec![
                     Series::line("deadline", 3, bound),
                     Series::with_mark("worst seen", 1, Mark::Stems, reaction),
@@ -244,7 +244,7 @@ fn figure(campaign: &Campaign) -> Figure {
             ),
             panel(
                 "Largest torque",
-                Axis::of("Torque", "N.m"),
+                Axis::new("Torque", "N.m"),
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.peak_torque_nm))),
                     Series::dots("bound of the torque", 3, of(&|row| Some(row.torque_bound_nm))),
@@ -253,7 +253,7 @@ fn figure(campaign: &Campaign) -> Figure {
             panel(
                 "Largest deviation",
                 // What goes further is off the road.
-                Axis::of("Deviation", "m").within(0.0, OFF_ROAD_M),
+                Axis::new("Deviation", "m").within(0.0, OFF_ROAD_M),
                 vec![
                     Series::with_mark("worst seen", 1, Mark::Stems, of(&|row| Some(row.deviation_m))),
                     Series::dots("torque dropped", 4, of(&|row| row.dropped_m)),

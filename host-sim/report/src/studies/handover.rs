@@ -99,7 +99,7 @@ fn figure(results: &HandoverResults) -> Figure {
         Panel::new(format!("Driver with t_p {t_p} s"), Axis::of("Ratio", "-"), series)
     };
     Figure {
-        x: Axis::of("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),
+        x: Axis::new("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),
         same_y: true,
         panels: DRIVERS_T_P.map(panel).to_vec(),
         ..Figure::default()

@@ -72,7 +72,7 @@ fn delay_profile(found: &Identification) -> Option<Figure> {
     series.push(line("level of 95 %", 1, &ends, &[3.84, 3.84]));
     let mut panel = panel("-2 log L above optimum", "-", series);
     panel.y.limits = Some((0.0, HIGHEST));
-    Some(over(Axis::of("t_p", "s"), vec![panel]))
+    Some(over(Axis::new("t_p", "s"), vec![panel]))
 }
 
 /// Every parameter's interval as a share of its estimate, and beside it the narrower one for t_nms as assumed; none if there
@@ -143,7 +143,10 @@ fn torque(found: &Identification) -> Figure {
     if !left_out_bands(found).is_empty() {
         series.push(broken_line("measured, left out", 4, &t.unused_s, &t.unused_nm));
     }
-    let mut figure = over(Axis::of("Time", "s"), vec![panel("Driver torque", "N.m", series)]);
+    let mut figure = over(
+        Axis::new("Time", "s"),
+        vec![panel("Driver torque", "N.m", series)],
+    );
     figure.bands = left_out_bands(found);
     figure
 }
@@ -172,7 +175,7 @@ fn residuals(found: &Identification) -> Figure {
     let unexplained: Vec<f64> = both.map(|(y, m)| y - m).collect();
     let panel = |what: &str, y: &[f64]| panel(what, "N.m", vec![broken_line("", 1, &t.time_s, y)]);
     let mut figure = over(
-        Axis::of("Time", "s"),
+        Axis::new("Time", "s"),
         vec![
             panel("Measured - simulated", &unexplained),
             panel("Residual of the loss", &t.residual_nm),
@@ -210,7 +213,7 @@ fn over_time(drive: &IdentifiedDrive) -> Figure {
         panel(name, unit, series)
     };
     let mut figure = over(
-        Axis::of("Time", "s"),
+        Axis::new("Time", "s"),
         vec![
             panel("K_hg", "-", &t.k_hg),
             panel("gain_1", "N.m/m", &t.gain[0]),

@@ -124,7 +124,7 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
         }
     };
     Some(Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: histories.into_iter().map(panel).collect(),
         bands: pieces.changes.iter().map(band).collect(),
         ..Figure::default()

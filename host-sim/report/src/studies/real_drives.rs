@@ -191,7 +191,7 @@ fn predictions(found: &RealDrives) -> Figure {
             if by_hand { "by hand" } else { "shared" },
             Axis {
                 limits: Some((-1.05, 1.0)),
-                ..Axis::of("variance accounted for", "-")
+                ..Axis::new("variance accounted for", "-")
             },
             vec![
                 sorted("ours", 1, |h| h.ours),
@@ -201,7 +201,7 @@ fn predictions(found: &RealDrives) -> Figure {
         )
     };
     Figure {
-        x: Axis::of("halves, best first", "%"),
+        x: Axis::new("halves, best first", "%"),
         same_y: true,
         panels: [true, false].map(panel).into(),
         ..Figure::default()

@@ -99,7 +99,7 @@ fn figure(results: &RelianceResults) -> Figure {
     let stride = results.examples.len().div_ceil(EXAMPLES).max(1);
     let examples = results.examples.iter().step_by(stride);
     Figure {
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         same_y: true,
         panels: examples.map(example_panel).collect(),
         ..Figure::default()

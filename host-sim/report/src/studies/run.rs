@@ -111,7 +111,7 @@ fn figure(single: &SingleRun) -> Figure {
         ));
     }
     Figure {
-        x: Axis::of("Distance along the road", "m"),
+        x: Axis::new("Distance along the road", "m"),
         panels,
         markers: failed
             .map(|s| Marker {
@@ -185,7 +185,7 @@ pub fn report(single: &SingleRun) -> Report {
             ),
         ],
         // Enough to repeat the run.
-        provenance: Provenance::of(Some(scenario.to_toml())),
+        provenance: Provenance::new(Some(scenario.to_toml())),
     }
 }
 

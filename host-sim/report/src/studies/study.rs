@@ -5,12 +5,14 @@ use std::path::Path;
 use crate::document::{Block, Cell, Report, Section, Table, WriteError, write_file};
 use haptic_analysis::metrics::{DEFINITIONS, Definition};
 use haptic_batch::Away;
-use haptic_batch::study::{Difference, Recorded, Session, SessionResult, StudyResults, Who, of_participants};
+use haptic_batch::study::{
+    Difference, Recorded, Session, SessionResult, StudyResults, Subject, of_participants,
+};
 
 /// The document of a study.
 pub fn report(results: &StudyResults) -> Report {
     let mut each = vec![Block::Table(sessions(results))];
-    let waits = |s: &&SessionResult| s.who == Who::Person && s.recorded.is_none();
+    let waits = |s: &&SessionResult| s.who == Subject::Person && s.recorded.is_none();
     let waiting: Vec<_> = results.sessions.iter().filter(waits).collect();
     if let Some(session) = waiting.first() {
         each.push(Block::Text(format!(
@@ -106,10 +108,10 @@ fn row(session: &SessionResult, recorded: &Recorded) -> String {
     fields.join(",")
 }
 
-fn who(who: Who) -> &'static str {
+fn who(who: Subject) -> &'static str {
     match who {
-        Who::Simulated => "simulated",
-        Who::Person => "person",
+        Subject::Simulated => "simulated",
+        Subject::Person => "person",
     }
 }
 
@@ -147,8 +149,8 @@ fn sessions(results: &StudyResults) -> Table {
             (Some(_), _) => left
                 .and_then(|away| away.when_and_why())
                 .map_or("recorded".into(), |left| format!("guidance ended {left}")),
-            (None, Who::Person) => "waits for a person".into(),
-            (None, Who::Simulated) => "not driven".to_owned(),
+            (None, Subject::Person) => "waits for a person".into(),
+            (None, Subject::Simulated) => "not driven".to_owned(),
         };
         [
             ("Participant", text(&session.participant)),

@@ -171,7 +171,7 @@ fn coverage_figure(result: &Repetitions) -> Figure {
     Figure {
         panels: vec![Panel {
             title: String::new(),
-            y: Axis::of("95 % intervals that hold the truth", "%"),
+            y: Axis::new("95 % intervals that hold the truth", "%"),
             series,
         }],
         rows: rows.into_iter().map(String::from).collect(),

@@ -5,7 +5,7 @@ use haptic_core::controller::params::{Params, VehicleParams};
 use super::{Condition, DEFAULT_SPEED_KMH, DriverChange, Failure, Sensors, Speed};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, DriverParameters};
-use crate::models::real::WorldParameters;
+use crate::models::nonlinear::WorldParameters;
 use crate::models::road::Course;
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;

@@ -35,7 +35,7 @@ fn refuse<T>(what: impl std::fmt::Display) -> Result<T> {
 impl Pages {
     /// # Errors
     /// A compression that is not read.
-    pub(super) fn of(file: &Bytes, column: &ColumnChunkMetaData, rows: usize) -> Result<Self> {
+    pub(super) fn new(file: &Bytes, column: &ColumnChunkMetaData, rows: usize) -> Result<Self> {
         let compression = column.compression();
         if let Compression::BROTLI(_) | Compression::LZ4 | Compression::LZO = compression {
             let codec = column.compression_codec();

@@ -161,7 +161,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
         x: *x,
     });
     Figure {
-        x: Axis::of(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
+        x: Axis::new(&effect.field, effect.unit.as_deref().unwrap_or(OWN_UNIT)),
         rows: if numbers {
             Vec::new()
         } else {
