@@ -59,9 +59,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, BadInput> {
     let (checkpoint, on_record) = match &arguments.checkpoint {
         None => (None, Vec::new()),
         Some(path) => {
-            let (checkpoint, legs) = Checkpoint::open::<Leg>(path, &heading(plan.seed)?)?;
+            let (checkpoint, segments) = Checkpoint::open::<DriveSegment>(path, &heading(plan.seed)?)?;
             output::keeps(path, "drive")?;
-            (Some(checkpoint), legs)
+            (Some(checkpoint), segments)
         }
     };
     let bar = progress::bar(plan.segments().len() as u64, "drives of five minutes");

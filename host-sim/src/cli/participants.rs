@@ -1,7 +1,7 @@
 //! The paper's participants on the command line: how many, or which ones.
 
 use clap::Args;
-use haptic_batch::experiment::Plan;
+use haptic_batch::experiment::ExperimentPlan;
 use haptic_core::controller::params::PARAMETERS;
 use haptic_sim::input::{RangeError, in_range};
 use haptic_sim::participants::participants;
@@ -31,9 +31,9 @@ pub(super) struct Drives {
 }
 
 impl Drives {
-    pub(super) fn plan(&self) -> Result<Plan, RangeError> {
+    pub(super) fn plan(&self) -> Result<ExperimentPlan, RangeError> {
         check_probe("--probe", self.probe)?;
-        Ok(Plan {
+        Ok(ExperimentPlan {
             participants: self.participants.numbers(),
             probe_nm: self.probe,
             seed: self.seed,

@@ -53,7 +53,7 @@ pub struct ChangesLine {
 pub struct Changes {
     /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
     #[serde(flatten)]
-    pub plan: Plan,
+    pub plan: ExperimentPlan,
     /// Drives of each participant.
     pub drives: u32,
     /// By kind.

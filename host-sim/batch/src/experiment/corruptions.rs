@@ -86,7 +86,7 @@ pub struct CorruptionLine {
 pub struct Corruptions {
     /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
     #[serde(flatten)]
-    pub plan: Plan,
+    pub plan: ExperimentPlan,
     /// Drives of each participant and way.
     pub seeds: u32,
     /// By corruption.

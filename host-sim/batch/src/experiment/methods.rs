@@ -8,7 +8,7 @@ use haptic_analysis::identify::{Identification, Options, identify_as_published, 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Plan;
+use super::ExperimentPlan;
 use super::corruption::{Corruption, POPULATION, corrupted_log};
 use super::drives::{driven, guided};
 use super::repetitions::{COMPARED, bound_of, compared};
@@ -39,7 +39,7 @@ pub struct MethodLine {
 pub struct Methods {
     /// Who drove, with which probe; its seed is that of the first drive of each participant, from which the others count on.
     #[serde(flatten)]
-    pub plan: Plan,
+    pub plan: ExperimentPlan,
     /// Drives of each participant.
     pub seeds: u32,
     /// By noise and way.
@@ -50,7 +50,7 @@ pub struct Methods {
 ///
 /// # Errors
 /// As [`super::experiment`].
-pub fn methods(plan: &Plan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
+pub fn methods(plan: &ExperimentPlan, seeds: u32, done: impl Fn() + Sync) -> Result<Methods, StudyError> {
     let jobs = guided(plan, seeds)?;
     let noises: Vec<(&'static str, &[Corruption])> = POPULATION
         .iter()

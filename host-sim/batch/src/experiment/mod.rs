@@ -64,7 +64,7 @@ pub const PUBLISHED_TRAJECTORY_ERROR_M: [f64; 3] = [0.154, 0.218, 0.366];
 
 /// What to do.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plan {
+pub struct ExperimentPlan {
     /// Numbers of the participants, 1 to 14.
     pub participants: Vec<u32>,
     /// Amplitude of the probe in the guided drives, N.m; zero for none.
@@ -73,7 +73,7 @@ pub struct Plan {
     pub seed: u64,
 }
 
-impl Plan {
+impl ExperimentPlan {
     /// The drives of a repetition, from 0: other remnants.
     fn repetition(&self, number: u64) -> Self {
         Self {

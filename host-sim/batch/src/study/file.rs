@@ -144,11 +144,11 @@ fn session(
         (None, None, true) => Subject::Person,
         (Some(number), None, false) => {
             put_driver(of_published(number, manual).map_err(|e| bad(e.to_string()))?);
-            Who::Simulated
+            Subject::Simulated
         }
         (None, Some(given), false) => {
             put_driver(given.clone());
-            Who::Simulated
+            Subject::Simulated
         }
         _ => return Err(bad("one of published, driver and person = true is wanted".into())),
     };

@@ -13,8 +13,8 @@ seed = 7
 speed_m_per_s = 16.666666666666668
 [scenario.course]
 name = "one curve"
-lane_width = 3.6
-segment = [{ length = 100.0 }, { length = 200.0, curvature = 0.003 }]
+lane_width_m = 3.6
+segment = [{ length_m = 100.0 }, { length_m = 200.0, curvature_per_m = 0.003 }]
 [[condition]]
 name = "manual"
 scenario = { condition = "manual" }

@@ -12,10 +12,10 @@ use super::*;
 const ROAD: &str = "
 [scenario.course]
 name = \"one curve\"
-lane_width = 3.6
+lane_width_m = 3.6
 segment = [
-    { length = 100.0, curvature_start = 0.0, curvature_end = 0.0 },
-    { length = 200.0, curvature_start = 0.003, curvature_end = 0.003 },
+    { length_m = 100.0, curvature_start_per_m = 0.0, curvature_end_per_m = 0.0 },
+    { length_m = 200.0, curvature_start_per_m = 0.003, curvature_end_per_m = 0.003 },
 ]
 ";
 

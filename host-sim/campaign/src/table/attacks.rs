@@ -21,12 +21,12 @@ pub(super) const ROWS: &[FaultCase] = rows! {
     "attack-lane-0.29" "lane lie of 0.29 m in every frame"
         [Injection::Sensor(Signal::LateralError, Change::Plus(0.29))] .may_hand_over();
     "attack-lane-4" "lane lie to 4 m in 160 ms, e_theta' matched to the yaw rate"
-        [lie(4.0, false)] .may_hand_over().torque(5.0);
+        [false_lane(4.0, false)] .may_hand_over().torque(5.0);
     "attack-lane-and-column" "the same, and the driver torque made to fit the column"
-        [lie(4.0, true)] .only_rules().torque(5.0);
+        [false_lane(4.0, true)] .only_rules().torque(5.0);
     "attack-lane-and-column-opposed" "the same while the driver pulls back with 10 N.m"
         [
-            lie(4.0, true),
+            false_lane(4.0, true),
             Injection::Hand(Hand::Opposes { torque_nm: 10.0, ms: 1000 }),
         ] .only_rules().torque(5.0);
     "attack-motor-reading" "six column frames whose motor torque is 0.2 N.m off"

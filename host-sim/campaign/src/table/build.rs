@@ -35,8 +35,8 @@ words! {
     fades(ms: u32) { class: Class::A, expect: reaches(FADE), deadline_ms: ms };
     hands_over(ms: u32) { class: Class::B, expect: reaches(HANDOVER), deadline_ms: ms };
     /// Once what arrives contradicts itself.
-    contradicts() on hands_over(CONTRADICTION_MS) { seen: Seen::Contradiction };
-    may_hand_over() { expect: Expect::MayHandOver, deadline_ms: CONTRADICTION_MS, seen: Seen::Contradiction };
+    contradicts() on hands_over(CONTRADICTION_MS) { seen: Detectability::Contradiction };
+    may_hand_over() { expect: Expect::MayHandOver, deadline_ms: CONTRADICTION_MS, seen: Detectability::Contradiction };
     stops(ms: u32) { class: Class::C, expect: reaches(FAULT), deadline_ms: ms };
     locks() { class: Class::C, expect: reaches(LOCKED), deadline_ms: 20, torque_nm: 0.0 };
     yields(ms: u32) { class: Class::D, expect: Expect::Yields, deadline_ms: ms };
@@ -51,7 +51,7 @@ words! {
         { class: Class::C, expect: Expect::Restarts { reset }, deadline_ms: ms };
     engages() { expect: reaches(ACTIVE), deadline_ms: 12 };
     uncut() { expect: Expect::Uncut };
-    seen(by: Seen) { seen: by };
+    seen(by: Detectability) { seen: by };
     after_sample() { after_sample: true };
     torque(nm: f64) { torque_nm: nm };
     lasts(ms: u32) { lasts_ms: Some(ms) };

@@ -201,7 +201,7 @@ pub(super) const ROWS: &[FaultCase] = rows! {
         [
             Sensor(Speed1, Approaching { value: 0.0, per_s: 10.0 }),
             Sensor(Speed2, Approaching { value: 0.0, per_s: 10.0 }),
-        ] .fades(20).seen(Seen::Speed);
+        ] .fades(20).seen(Detectability::Speed);
     "speed-zero" "speeds 0 at once"
         [Sensor(Speed1, StuckAt(0.0)), Sensor(Speed2, StuckAt(0.0))] .hands_over(SLIP_MS);
     "speed-negative" "a speed one LSB below 0" [always(VEHICLE, 28, 16, -1)] .hands_over(STALE_MS);

@@ -39,16 +39,16 @@ pub(super) const ROWS: &[FaultCase] = rows! {
         [
             Injection::Motor(Motor::Stuck),
             Injection::Request(RequestFault::Ends),
-        ] .stops(MOTOR_MS).seen(Seen::MotorAstray).after_fade();
+        ] .stops(MOTOR_MS).seen(Detectability::MotorAstray).after_fade();
     "motor-half" "the motor delivers half"
-        [Injection::Motor(Motor::Times(0.5))] .hands_over(WEAK_MS).seen(Seen::MotorWeak);
+        [Injection::Motor(Motor::Times(0.5))] .hands_over(WEAK_MS).seen(Detectability::MotorWeak);
     "motor-dead" "the motor delivers nothing, as a limiter that zeroes in silence"
-        [Injection::Motor(Motor::Times(0.0))] .hands_over(WEAK_MS).seen(Seen::MotorWeak);
+        [Injection::Motor(Motor::Times(0.0))] .hands_over(WEAK_MS).seen(Detectability::MotorWeak);
     // Below its own error of 0.1 N.m, as on a straight, it passes for a weak one.
     "motor-reversed" "the motor turns the wrong way"
         [
             Injection::Motor(Motor::Times(-1.0)),
-        ] .place(PlaceOnRoad::In).stops(MOTOR_MS).seen(Seen::MotorAstray);
+        ] .place(PlaceOnRoad::In).stops(MOTOR_MS).seen(Detectability::MotorAstray);
     "brown-out" "the supply breaks down in the curve" [inside(Inside::BrownOut)] .restarts(5, 2);
     "three-resets" "third reset within 10 s" [] .locks().from(Start::ThirdReset).q();
     // The error that is left when guidance comes is larger than any of ordinary driving.

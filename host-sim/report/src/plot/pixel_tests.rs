@@ -8,7 +8,7 @@ use super::*;
 fn alone(mark: Mark, points: Vec<(f64, f64)>) -> Figure {
     let panel = Panel::new(
         "",
-        Axis::of("y", "-").within(-1.0, 1.0),
+        Axis::new("y", "-").within(-1.0, 1.0),
         vec![Series::with_mark("", 1, mark, points)],
     );
     Figure {

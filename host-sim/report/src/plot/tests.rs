@@ -3,7 +3,7 @@
 use super::*;
 
 fn panel(title: &str, series: Vec<Series>) -> Panel {
-    Panel::new(title, Axis::of("Lateral error", "m"), series)
+    Panel::new(title, Axis::new("Lateral error", "m"), series)
 }
 
 fn two_panels() -> Figure {
@@ -230,8 +230,8 @@ fn a_map_has_a_word_in_each_field_and_a_tick_at_each() {
         field(40.0, 0.1, "unstable", 3),
     ];
     let figure = Figure {
-        x: Axis::of("Speed", "km/h").within(15.0, 45.0),
-        panels: vec![Panel::new("", Axis::of("t_p", "s").within(0.05, 0.15), series)],
+        x: Axis::new("Speed", "km/h").within(15.0, 45.0),
+        panels: vec![Panel::new("", Axis::new("t_p", "s").within(0.05, 0.15), series)],
         ..Figure::default()
     };
     let svg = figure.to_svg().unwrap();

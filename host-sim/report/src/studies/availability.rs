@@ -82,12 +82,12 @@ fn detection_figure(faults: &Detection) -> Figure {
         panels: vec![
             Panel::new(
                 "The ECU left",
-                Axis::of("Share of the runs", "%").within(0.0, 105.0),
+                Axis::new("Share of the runs", "%").within(0.0, 105.0),
                 vec![Series::with_mark("", 2, Mark::Stems, left)],
             ),
             Panel::new(
                 "How soon",
-                Axis::of("Time from the onset", "s"),
+                Axis::new("Time from the onset", "s"),
                 vec![
                     Series::with_mark("longest", 3, Mark::Stems, after(1)),
                     Series::dots("median", 1, after(0)),
@@ -180,7 +180,7 @@ fn table(results: &Availability) -> Table {
             ),
             ("Latched", Cell::number(row.latched as f64, 0)),
             ("Off the road", Cell::number(row.diverged as f64, 0)),
-            ("Lost by hand", Cell::number(row.lost_by_hand.legs as f64, 0)),
+            ("Lost by hand", Cell::number(row.lost_by_hand.segments as f64, 0)),
             ("SDLP (m)", Cell::number(row.sdlp_m, 2)),
         ]
     };
@@ -221,24 +221,27 @@ fn drives(results: &Availability) -> Table {
             )
         });
         [
-            ("World", Cell::Text(leg.world.clone())),
-            ("Road", Cell::Text(leg.road.clone())),
-            ("Drive", Cell::number(f64::from(leg.number), 0)),
-            ("Car", Cell::Text(leg.car.to_string())),
-            ("Speed (km/h)", Cell::number(leg.speed_kmh, 1)),
+            ("World", Cell::Text(segment.world.clone())),
+            ("Road", Cell::Text(segment.road.clone())),
+            ("Drive", Cell::number(f64::from(segment.number), 0)),
+            ("Car", Cell::Text(segment.car.to_string())),
+            ("Speed (km/h)", Cell::number(segment.speed_kmh, 1)),
             (
                 "Declared, at a lateral acceleration of the road",
                 Cell::Text(declared.collect::<Vec<_>>().join("; ")),
             ),
-            ("Ended", Cell::Text(off(leg.ended).into())),
-            ("By hand", Cell::Text(off(leg.by_hand.ended).into())),
+            ("Ended", Cell::Text(off(segment.ended).into())),
+            ("By hand", Cell::Text(off(segment.by_hand.ended).into())),
             (
                 "Largest error by hand (m)",
-                Cell::number(leg.by_hand.largest_error_m, 2),
+                Cell::number(segment.by_hand.largest_error_m, 2),
             ),
         ]
     };
-    Table::of_rows("Drives in which something happened", results.legs.iter().map(row))
+    Table::of_rows(
+        "Drives in which something happened",
+        results.segments.iter().map(row),
+    )
 }
 
 /// What each world has beyond the paper's.
@@ -285,7 +288,7 @@ fn figure(results: &Availability) -> Figure {
         panels: vec![
             Panel::new(
                 "False declarations",
-                Axis::of("Rate", "1/h").within(0.0, most_rate),
+                Axis::new("Rate", "1/h").within(0.0, most_rate),
                 vec![
                     Series::with_mark(
                         "seen, with the 95 % interval",
@@ -298,7 +301,7 @@ fn figure(results: &Availability) -> Figure {
             ),
             Panel::new(
                 "Without guidance",
-                Axis::of("Share of the time", "%").within(
+                Axis::new("Share of the time", "%").within(
                     0.0,
                     most(&mut results.cells.iter().map(|row| 100.0 * (1.0 - row.available))),
                 ),

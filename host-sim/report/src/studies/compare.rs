@@ -219,7 +219,7 @@ fn figure(results: &CompareResults, place: usize, metric: &Metric) -> Figure {
             .collect();
         Panel::new(
             name.clone(),
-            Axis::of(metric.label, metric.unit),
+            Axis::new(metric.label, metric.unit),
             vec![Series::with_mark("", 0, Mark::Whiskers(ends), points)],
         )
     };

@@ -163,7 +163,7 @@ fn figure(answer: &DesignResult) -> Figure {
         });
         Panel::new(
             format!("{course}{}", without.unwrap_or_default()),
-            Axis::of("Drive needed", "min"),
+            Axis::new("Drive needed", "min"),
             series.collect(),
         )
     });

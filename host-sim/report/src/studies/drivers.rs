@@ -163,7 +163,7 @@ fn figure(found: &Drivers) -> Figure {
                 series.push(Series::with_mark(labels[place], [1, 3][place], mark, points));
             }
         }
-        Panel::new("", Axis::of(wanted, unit), series)
+        Panel::new("", Axis::new(wanted, unit), series)
     });
     Figure {
         x: Axis::counting("Driver, as the table lists them").within(ends[0], ends[1]),

@@ -144,7 +144,7 @@ fn panels(evaluation: &Evaluation, title: &str, kinds: &[Shown]) -> Figure {
             };
             panels.push(Panel::new(
                 format!("Driver {} (t_p {t_p} s){ending}", number + 1),
-                Axis::of("Lateral error", "m"),
+                Axis::new("Lateral error", "m"),
                 runs.flat_map(|(s, run)| {
                     let line = Series::line(label(s.condition()), style(s.condition()), path(run));
                     ended(line, run.diverged().then_some(LEFT_THE_ROAD))

@@ -43,10 +43,10 @@ fn paths(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Distance along the road", "m"),
+        x: Axis::new("Distance along the road", "m"),
         panels: vec![Panel::new(
             "",
-            Axis::of("Lateral error", "m"),
+            Axis::new("Lateral error", "m"),
             [Series::line("measured", 0, drive.path.clone())]
                 .into_iter()
                 .chain(again("identified driver", 1, &drive.noise_model))
@@ -68,10 +68,10 @@ fn torque(drive: &Drive) -> Figure {
     };
     Figure {
         title: format!("Participant {}, guided", drive.participant),
-        x: Axis::of("Time", "s"),
+        x: Axis::new("Time", "s"),
         panels: vec![Panel::new(
             "",
-            Axis::of("Driver torque", "N.m"),
+            Axis::new("Driver torque", "N.m"),
             vec![
                 line("measured", 0, &t.measured_nm),
                 line("simulated", 3, &t.simulated_nm),
@@ -109,7 +109,7 @@ fn trajectory_errors(experiment: &Experiment) -> Figure {
         }
         series.push(dots("noise model", 0, -ASIDE, guided, |d| &d.noise_model));
         series.push(dots("published method", 3, ASIDE, guided, |d| &d.paper));
-        Panel::new(title, Axis::of("Trajectory error", "m"), series)
+        Panel::new(title, Axis::new("Trajectory error", "m"), series)
     });
     Figure {
         x: Axis::counting("Participant").within(ends[0], ends[1]),
@@ -136,7 +136,7 @@ fn estimates(experiment: &Experiment) -> Figure {
         x: Axis::counting("Participant"),
         panels: vec![Panel::new(
             "",
-            Axis::of("K_hg", "-"),
+            Axis::new("K_hg", "-"),
             vec![
                 Series::dots("truth", 0, truth.collect()),
                 Series::with_mark("noise model, 95 % interval", 1, Mark::Whiskers(ends), points),

@@ -96,7 +96,11 @@ fn figure(results: &HandoverResults) -> Figure {
                 series.extend(ended(line, (!to_the_end).then_some(UNSTABLE)));
             }
         }
-        Panel::new(format!("Driver with t_p {t_p} s"), Axis::of("Ratio", "-"), series)
+        Panel::new(
+            format!("Driver with t_p {t_p} s"),
+            Axis::new("Ratio", "-"),
+            series,
+        )
     };
     Figure {
         x: Axis::new("Speed", "km/h").within(SPEEDS_KMH[0] - 2.0, SPEEDS_KMH[SPEEDS_KMH.len() - 1] + 2.0),

@@ -18,7 +18,7 @@ fn line(label: &str, style: usize, x: &[f64], y: &[f64]) -> Series {
 }
 
 fn panel(quantity: &str, unit: &str, series: Vec<Series>) -> Panel {
-    Panel::new("", Axis::of(quantity, unit), series)
+    Panel::new("", Axis::new(quantity, unit), series)
 }
 
 /// What a line or an area breaks at: a place between rows that are no neighbours, from whose values nothing is drawn.

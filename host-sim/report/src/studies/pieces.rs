@@ -105,7 +105,7 @@ pub(super) fn figure(drive: &IdentifiedDrive) -> Option<Figure> {
         let points = x.iter().copied().zip(middles).collect();
         Panel::new(
             "",
-            Axis::of(name, unit),
+            Axis::new(name, unit),
             vec![
                 Series::interval("95 % interval of a piece", 5, &x, &ends),
                 Series::line("followed", 4, followed.collect()),

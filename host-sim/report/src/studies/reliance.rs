@@ -26,7 +26,7 @@ pub(super) fn panel(
     let estimate = places.iter().copied().zip(estimates().map(|[k_hg, _]| k_hg));
     Panel::new(
         title,
-        Axis::of("K_hg", "-").within(-0.5, 1.5),
+        Axis::new("K_hg", "-").within(-0.5, 1.5),
         vec![
             Series::interval("estimate \u{b1} 2 deviations", 5, &places, &ends),
             Series::line("truth", 0, truth.to_vec()),

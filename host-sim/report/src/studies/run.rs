@@ -75,7 +75,7 @@ fn figure(single: &SingleRun) -> Figure {
         let points = samples.iter().map(|s| (s.s_m, value(s))).collect();
         Panel::new(
             "",
-            Axis::of(quantity, unit),
+            Axis::new(quantity, unit),
             ended(Series::line("", 1, points), diverged).collect(),
         )
     };

@@ -6,7 +6,8 @@ use super::{changes, place};
 use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Panel, Series};
 use haptic_batch::experiment::{
-    Changes, CorruptionLine, Corruptions, Held, METHODS, MethodLine, Methods, Plan, Repeated, Repetitions,
+    Changes, CorruptionLine, Corruptions, ExperimentPlan, Held, METHODS, MethodLine, Methods, Repeated,
+    Repetitions,
 };
 
 /// One of the five questions that the validation asks, answered.
@@ -39,7 +40,7 @@ impl Validation {
 
     /// What it rests on, and what came out, in a sentence or two.
     fn summary(&self) -> String {
-        let rests_on = |drives: u32, plan: &Plan| {
+        let rests_on = |drives: u32, plan: &ExperimentPlan| {
             let numbers: Vec<String> = plan.participants.iter().map(u32::to_string).collect();
             let (probe_nm, seed) = (plan.probe_nm, plan.seed);
             format!(
@@ -53,7 +54,7 @@ impl Validation {
                     r.participants.iter().filter_map(|p| p.participant).collect();
                 participants.dedup();
                 let (probe_nm, seed) = (r.probe_nm, r.seed);
-                let plan = Plan {
+                let plan = ExperimentPlan {
                     participants,
                     probe_nm,
                     seed,

@@ -10,8 +10,8 @@ use crate::fields::{Field, Fields, InFile, Range};
 use crate::input::{InputError, parse_toml};
 use crate::models::disturbances::SensorErrors;
 use crate::models::driver::{ArmGains, ArmInFile, DriverParameters};
-use crate::models::real::WorldParameters;
-use crate::models::road::{Course, LaneChoice, PAPER_COURSE, SegmentFile};
+use crate::models::nonlinear::WorldParameters;
+use crate::models::road::{COURSE_FIELDS, Course, LaneChoice, PAPER_COURSE, SEGMENT_FIELDS, SegmentFile};
 use crate::models::tolerances::Tolerances;
 use crate::models::vehicle::VehicleParameters;
 
@@ -208,7 +208,7 @@ impl CourseField {
 }
 
 impl InlineCourse {
-    fn of(course: &Course) -> Self {
+    fn new(course: &Course) -> Self {
         if !course.is_of_segments() {
             return Self {
                 name: course.name().into(),
@@ -219,7 +219,7 @@ impl InlineCourse {
         }
         Self {
             name: course.name().into(),
-            lane_width: course.lane_width_m(),
+            lane_width_m: course.lane_width_m(),
             segment: course.segments().iter().map(SegmentFile::from).collect(),
             opendrive: None,
         }
@@ -231,7 +231,7 @@ impl InlineCourse {
             return Course::from_opendrive(&self.name, text, &LaneChoice::default())
                 .map_err(|e| InputError::new(file, format!("course: {e}")));
         }
-        Course::of_file(&self.name, self.lane_width, &self.segment)
+        Course::of_file(&self.name, self.lane_width_m, &self.segment)
             .map_err(|e| InputError::new(file, format!("course: {e}")))
     }
 }

@@ -41,10 +41,10 @@ fn curve(hands: &Hands) -> Figure {
         .chain([(0.0, 0.0)])
         .collect();
     Figure {
-        x: Axis::of("felt in shared driving", "%").within(0.0, 100.0),
+        x: Axis::new("felt in shared driving", "%").within(0.0, 100.0),
         panels: vec![Panel::new(
             "",
-            Axis::of("felt by hand", "%").within(0.0, 102.0),
+            Axis::new("felt by hand", "%").within(0.0, 102.0),
             vec![
                 Series::line("no difference", 0, vec![(0.0, 0.0), (100.0, 100.0)]),
                 Series::line("by threshold", 1, all),

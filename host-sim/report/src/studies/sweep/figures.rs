@@ -20,10 +20,10 @@ pub(super) fn distribution(summary: &Summary) -> Named {
         x,
     });
     let figure = Figure {
-        x: Axis::of(&name, unit),
+        x: Axis::new(&name, unit),
         panels: vec![Panel::new(
             "",
-            Axis::of("Share of the drives", "-").within(0.0, 1.0),
+            Axis::new("Share of the drives", "-").within(0.0, 1.0),
             vec![Series::line("", 0, points)],
         )],
         markers: markers.into_iter().collect(),
@@ -92,7 +92,7 @@ pub(super) fn influence(summary: &Summary) -> Option<Named> {
     let figure = Figure {
         panels: vec![Panel::new(
             "",
-            Axis::of("Share of the variance", "-").within(-0.03, 1.03),
+            Axis::new("Share of the variance", "-").within(-0.03, 1.03),
             series,
         )],
         rows,
@@ -136,7 +136,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
     let (name, unit) = metric(summary.judge);
     let mut panels = vec![Panel::new(
         "",
-        Axis::of(&format!("Mean {}", lower(&name)), unit),
+        Axis::new(&format!("Mean {}", lower(&name)), unit),
         series(summary, effect, &places, numbers, |drives| {
             (drives.mean, drives.interval)
         }),
@@ -144,7 +144,7 @@ fn response(summary: &Summary, effect: &Effect) -> Figure {
     if summary.limit.is_some() {
         panels.push(Panel::new(
             "",
-            Axis::of("Bad drives", "%"),
+            Axis::new("Bad drives", "%"),
             series(summary, effect, &places, numbers, |drives| {
                 let ends = drives.beyond_interval.map(|ends| ends.map(|share| 100.0 * share));
                 (drives.beyond.map(|share| 100.0 * share), ends)

@@ -154,13 +154,13 @@ struct CourseFile {
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SegmentFile {
-    length: f64,
-    curvature: Option<f64>,
-    curvature_start: Option<f64>,
-    curvature_end: Option<f64>,
-    bank: Option<f64>,
-    bank_start: Option<f64>,
-    bank_end: Option<f64>,
+    length_m: f64,
+    curvature_per_m: Option<f64>,
+    curvature_start_per_m: Option<f64>,
+    curvature_end_per_m: Option<f64>,
+    bank_rad: Option<f64>,
+    bank_start_rad: Option<f64>,
+    bank_end_rad: Option<f64>,
     grade: Option<f64>,
     grade_start: Option<f64>,
     grade_end: Option<f64>,
@@ -288,7 +288,7 @@ impl Course {
     /// and range).
     pub fn from_toml(name: &str, text: &str) -> Result<Self, InputError> {
         let file: CourseFile = parse_toml(name, text)?;
-        Self::of_file(name, file.lane_width, &file.segment)
+        Self::of_file(name, file.lane_width_m, &file.segment)
     }
 
     pub(crate) fn of_file(
@@ -417,11 +417,11 @@ impl Segment {
 impl From<&Segment> for SegmentFile {
     fn from(segment: &Segment) -> Self {
         Self {
-            length: segment.length_m,
-            curvature_start: Some(segment.curvature_start_1pm),
-            curvature_end: Some(segment.curvature_end_1pm),
-            bank_start: Some(segment.bank_rad[0]),
-            bank_end: Some(segment.bank_rad[1]),
+            length_m: segment.length_m,
+            curvature_start_per_m: Some(segment.curvature_start_1pm),
+            curvature_end_per_m: Some(segment.curvature_end_1pm),
+            bank_start_rad: Some(segment.bank_rad[0]),
+            bank_end_rad: Some(segment.bank_rad[1]),
             grade_start: Some(segment.grade[0]),
             grade_end: Some(segment.grade[1]),
             ..Self::default()
