@@ -303,7 +303,7 @@ def too_long(path):
     for hour in range(11):
         unit.step(3600_000 * hour, 3600.0)
     state = unit.state()
-    assert "so long a drive" in refused(lambda: unit.fmu.serializeFMUState(state))
+    assert "too long to be saved" in refused(lambda: unit.fmu.serializeFMUState(state))
     unit.go_to(state)
     unit.end()
 

@@ -12,7 +12,7 @@ use crate::files::Source;
 use crate::files::tests::check_refusals;
 
 const ROAD: &str =
-    "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 250\ncurvature = 0.003\n";
+    "lane_width_m = 3.6\n[[segment]]\nlength_m = 150\n[[segment]]\nlength_m = 250\ncurvature_per_m = 0.003\n";
 const FILE: &str = include_str!("short.toml");
 
 fn design(text: &str) -> Result<DesignGuidance, InputError> {
