@@ -29,6 +29,7 @@ mod plausibility;
 mod probe;
 mod quantity;
 mod ramp;
+mod reference;
 mod reliance;
 mod rig;
 mod road;
