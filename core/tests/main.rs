@@ -1,5 +1,6 @@
 //! The core's tests, one program: a module a subject. `cargo test -p haptic-core law_oracle::` runs one of them.
 
+mod another_law;
 mod attacks;
 mod coast;
 mod column;
