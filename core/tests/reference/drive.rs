@@ -438,6 +438,9 @@ fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
         latched: FaultSet::NONE,
     };
     let is_engaged = seed.is_multiple_of(14);
+    // The request is high from the start, which is no rising edge.
+    let is_high = is_engaged || seed % 6 == 1;
+    let mut asks_for_ms = if is_high { 800 } else { 60 };
     let ecu = |now| {
         if is_engaged {
             Ecu::engaged(&setup, now)
@@ -465,7 +468,7 @@ fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
         wrong: Wrong::default(),
         counters: [0; 4],
         next_ms: [0; 4],
-        engage_from_ms: if is_engaged { 0 } else { 700 },
+        engage_from_ms: if is_high { 0 } else { 700 },
         authority: 1.0,
         probe: false,
         has_yaw_rate: !seed.is_multiple_of(5),
@@ -500,7 +503,7 @@ fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
             .for_each(|(kind, sender, sizes, _)| senders.wrong.add(*kind, *sender, *sizes));
         if rng.random_bool(1.0 / 1500.0) {
             match rng.random_range(0..6) {
-                0 => world.v_wanted = rng.random_range(2.0..40.0),
+                0 => world.v_wanted = rng.random_range(-3.0_f64..40.0).max(0.0),
                 1 => world.aside = rng.random_range(-1.0..1.0),
                 2 => senders.authority = [1.0, rng.random_range(0.0..1.0)][rng.random_range(0..2)],
                 // A probe has a direction of its own, and so no mirror image.
@@ -533,7 +536,8 @@ fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
         ever = ever.union(step.command.faults);
         match step.command.mode {
             // A new request some time after the last one ended.
-            Mode::Standby if ms >= senders.engage_from_ms + 60 => {
+            Mode::Standby if ms >= senders.engage_from_ms + asks_for_ms => {
+                asks_for_ms = 60;
                 senders.engage_from_ms = ms + rng.random_range(50..700);
             }
             Mode::Fault => break,
