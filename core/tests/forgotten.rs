@@ -472,7 +472,8 @@ fn guided_and_lost(rig: &mut Rig) -> Vec<(f64, Mode, FaultSet, LimitReason)> {
 fn guidance_after_any_loss_is_as_at_first() {
     let first = guided_and_lost(&mut straight(0.4));
     assert!(first[1000].0 > 0.19 && first[1000].1 == Mode::Active && first[5999].1 == Mode::Standby);
-    let wrongs: [(&str, fn(&mut Rig)); 12] = [
+    type Wrong = fn(&mut Rig);
+    let wrongs: [(&str, Wrong); 12] = [
         ("no picture", |rig| rig.silent[LANE] = true),
         ("no column", |rig| rig.silent[COLUMN] = true),
         ("no speed", |rig| rig.silent[VEHICLE] = true),

@@ -73,8 +73,11 @@ impl Reference {
                     .extrapolated(&self.c, &self.history, &last, picture.at);
                 let is_near = picture.e_y.abs() <= 0.8 && picture.e_theta.abs() <= 0.2;
                 if coast.lost <= 1_000_000 && follows(&expected, &picture) {
+                    // From where the line went on to until the picture is no rate.
+                    if coast.sight != Sight::Sees {
+                        self.law.last = Some(picture);
+                    }
                     coast.sight = Sight::Sees;
-                    self.law.last = Some(picture);
                 } else if coast.trust == 0.0 && is_near {
                     *coast = Coast {
                         trust: 0.0,

@@ -198,6 +198,39 @@ struct Ecus {
 }
 
 impl Ecus {
+    /// Started, or guiding already where the drive is one of fourteen; with its own reason of the last reset.
+    fn new(seed: u64, params: &Params, start_us: u32) -> Self {
+        let setup = Setup::new(params).unwrap();
+        let boot = Boot {
+            reset: ResetCause::from_code((seed % 7) as i64).unwrap(),
+            recent_resets: (seed % 3) as u8,
+            latched: FaultSet::NONE,
+        };
+        let ecu = |now| {
+            if is_engaged(seed) {
+                Ecu::engaged(&setup, now)
+            } else {
+                Ecu::new(Some(&setup), boot, now)
+            }
+        };
+        let start = Instant::from_us(start_us);
+        let mut reference = Reference::new(params, 0);
+        if is_engaged(seed) {
+            reference.engage();
+        }
+        Self {
+            told: ecu(start),
+            mirrored: (seed % 2 == 1).then(|| ecu(start)),
+            elsewhen: ecu(start.after(LATER)),
+            reference,
+            frames: Frames::new(seed % 7, 0),
+            us: 0,
+            start_us,
+            applied: 0.0,
+            context: String::new(),
+        }
+    }
+
     fn now(&self) -> Instant {
         Instant::from_us(self.start_us).after(Micros::from_us(self.us as u32))
     }
@@ -320,9 +353,30 @@ struct Senders {
     driver: f64,
     /// The driver has no hand on the wheel where friction holds it.
     lets_go: bool,
+    /// A probe has a direction of its own, and so no mirror image.
+    has_probe: bool,
 }
 
 impl Senders {
+    fn new(seed: u64, wheel_offset: f64) -> Self {
+        // A request that is high from the start is no rising edge.
+        let is_high = is_engaged(seed) || seed % 6 == 1;
+        Self {
+            wrong: Wrong::default(),
+            counters: [0; 4],
+            next_ms: [0; 4],
+            engage_from_ms: if is_high { 0 } else { 700 },
+            authority: 1.0,
+            probe: false,
+            has_yaw_rate: !seed.is_multiple_of(5),
+            wheel_offset,
+            lane: [0.0; 2],
+            driver: 0.0,
+            lets_go: seed % 10 == 6,
+            has_probe: seed.is_multiple_of(2),
+        }
+    }
+
     /// The next frame of a sender as it is, and mirrored.
     fn frames(&mut self, sender: usize, world: &World, params: &Params, applied: f64, ms: i64) -> [Frame; 2] {
         let wrong = &self.wrong;
@@ -422,6 +476,23 @@ fn spoilt(frame: &Frame, counter: u8, range: bool, bit: Option<u32>) -> Frame {
     Frame::new(frame.id(), &bytes[..length]).unwrap()
 }
 
+fn is_engaged(seed: u64) -> bool {
+    seed.is_multiple_of(14)
+}
+
+/// Another speed, another place on the road, another request, another bend.
+fn change(world: &mut World, senders: &mut Senders, rng: &mut SmallRng) {
+    // m/s2 to the side: gentle bends where friction may hold the wheel.
+    let sideways = if senders.lets_go { 0.4 } else { 2.0 };
+    match rng.random_range(0..6) {
+        0 => world.v_wanted = rng.random_range(-3.0_f64..40.0).max(0.0),
+        1 => world.aside = rng.random_range(-1.0..1.0),
+        2 => senders.authority = [1.0, rng.random_range(0.0..1.0)][rng.random_range(0..2)],
+        3 => senders.probe = !senders.probe && senders.has_probe,
+        _ => world.bend_wanted = rng.random_range(-sideways..sideways) / world.v.max(8.0),
+    }
+}
+
 /// Drives for so long. The steps that were compared in each mode, each fault that there was, and whether a tie ended it.
 fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
     let rng = &mut SmallRng::seed_from_u64(seed);
@@ -430,59 +501,11 @@ fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
     } else {
         parameters(rng)
     };
-    let setup = Setup::new(&params).unwrap();
-    let start_us = u32::MAX - rng.random_range(0..10_000_000);
-    let boot = Boot {
-        reset: ResetCause::from_code((seed % 7) as i64).unwrap(),
-        recent_resets: (seed % 3) as u8,
-        latched: FaultSet::NONE,
-    };
-    let is_engaged = seed.is_multiple_of(14);
-    // The request is high from the start, which is no rising edge.
-    let is_high = is_engaged || seed % 6 == 1;
-    let mut asks_for_ms = if is_high { 800 } else { 60 };
-    let ecu = |now| {
-        if is_engaged {
-            Ecu::engaged(&setup, now)
-        } else {
-            Ecu::new(Some(&setup), boot, now)
-        }
-    };
-    let start = Instant::from_us(start_us);
-    let mut ecus = Ecus {
-        told: ecu(start),
-        mirrored: (seed % 2 == 1).then(|| ecu(start)),
-        elsewhen: ecu(start.after(LATER)),
-        reference: Reference::new(&params, 0),
-        frames: Frames::new(seed % 7, 0),
-        us: 0,
-        start_us,
-        applied: 0.0,
-        context: String::new(),
-    };
-    if is_engaged {
-        ecus.reference.engage();
-    }
+    let mut ecus = Ecus::new(seed, &params, u32::MAX - rng.random_range(0..10_000_000));
     let mut world = World::new(rng.random_range(7.0..35.0));
-    let mut senders = Senders {
-        wrong: Wrong::default(),
-        counters: [0; 4],
-        next_ms: [0; 4],
-        engage_from_ms: if is_high { 0 } else { 700 },
-        authority: 1.0,
-        probe: false,
-        has_yaw_rate: !seed.is_multiple_of(5),
-        wheel_offset: rng.random_range(-0.05..0.05),
-        lane: [0.0; 2],
-        driver: 0.0,
-        lets_go: seed % 10 == 6,
-    };
-    // How often something goes wrong, and how far the line bends, m/s2.
-    let (wrongs_per_ms, sideways) = if senders.lets_go {
-        (1e-4, 0.4)
-    } else {
-        (1.2e-3, 2.0)
-    };
+    let mut senders = Senders::new(seed, rng.random_range(-0.05..0.05));
+    let mut asks_for_ms = if senders.engage_from_ms == 0 { 800 } else { 60 };
+    let wrongs_per_ms = if senders.lets_go { 1e-4 } else { 1.2e-3 };
     // What is wrong until when.
     let mut wrongs: Vec<(u32, usize, [f64; 3], i64)> = Vec::new();
     let (mut by_mode, mut ever) = ([0; 7], FaultSet::NONE);
@@ -502,14 +525,7 @@ fn drive(seed: u64, ms: i64) -> ([u32; 7], FaultSet, bool) {
             .iter()
             .for_each(|(kind, sender, sizes, _)| senders.wrong.add(*kind, *sender, *sizes));
         if rng.random_bool(1.0 / 1500.0) {
-            match rng.random_range(0..6) {
-                0 => world.v_wanted = rng.random_range(-3.0_f64..40.0).max(0.0),
-                1 => world.aside = rng.random_range(-1.0..1.0),
-                2 => senders.authority = [1.0, rng.random_range(0.0..1.0)][rng.random_range(0..2)],
-                // A probe has a direction of its own, and so no mirror image.
-                3 => senders.probe = !senders.probe && seed.is_multiple_of(2),
-                _ => world.bend_wanted = rng.random_range(-sideways..sideways) / world.v.max(8.0),
-            }
+            change(&mut world, &mut senders, rng);
         }
         ecus.us += senders.wrong.tick_us;
         world.step(&params, senders.wrong.tick_us as f64 * 1e-6);
