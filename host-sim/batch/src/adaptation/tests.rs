@@ -109,30 +109,7 @@ fn a_driver_with_two_equilibria_has_no_slope_there() {
 }
 
 const ROAD: &str = "[[segment]]\nlength_m = 100\n[[segment]]\nlength_m = 150\ncurvature_per_m = 0.002\n[[segment]]\nlength_m = 150\ncurvature_per_m = -0.002\n";
-const FILE: &str = "
-name = 'short'
-seeds = 2
-road = 'road.toml'
-speed_m_per_s = 16.666666666666668
-[scenario]
-driver = { remnant_sd_nm = 0.1 }
-guidance = { probe = true }
-[map]
-k_1 = [0.25, 0.45]
-k_hg = [0.1, 0.6]
-settles_s = 10
-averages_s = 20
-[loss]
-at_s = 40
-lasts_s = 2
-[[law]]
-kind = 'paper'
-[[law]]
-kind = 'by_reliance'
-[[driver]]
-kind = 'paper'
-around = [{ kind = 'trust', tau_s = 5 }]
-";
+const FILE: &str = include_str!("short.toml");
 
 fn study<'k>(text: &str, kinds: &'k Kinds) -> Result<Adaptation<'k>, InputError> {
     let folder = tempfile::tempdir().unwrap();
