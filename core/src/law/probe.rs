@@ -149,7 +149,7 @@ mod tests {
         let mut state = ProbeState::SILENT;
         assert!(state.is_passing_zero());
         run(&mut state, 400, true).for_each(drop);
-        // A rim that answers in phase moves the torque by as large a share: a 32nd of a turn before and behind zero, and no more.
+        // The window is a thirty-second of a turn on either side of a zero crossing: there the sine is below this.
         let most = 0.2 * (core::f64::consts::TAU / 32.0).sin();
         let mut seen = [0; 2];
         for _ in 0..4000 {

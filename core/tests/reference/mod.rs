@@ -1,10 +1,10 @@
-//! The ECU a second time, in f64 and time that does not wrap, as the documents have it: docs/explanation/behaviour.md,
-//! plausibility.md, docs/reference/bus.md. What it says of a step, the ECU has to say too, over random drives with everything
-//! that can go wrong on the bus (`drive`).
+//! A second implementation of the ECU, in f64 and with a clock that does not wrap, from docs/explanation/behaviour.md, plausibility.md
+//! and docs/reference/bus.md. Each step of the ECU is compared with it, over random drives with 21 kinds of faults on the bus
+//! (`drive`).
 //!
-//! A bound that a value lies next to, closer than the roundings of both, is a *tie*: either side is right, and the drive ends.
+//! Where a value lies closer to a bound than both implementations round, either decision is right: a *tie*, which ends the drive.
 //!
-//! Not here: the monitor, which has nothing to say in these drives, memory faults, and the estimator.
+//! Not here: the monitor, which refuses nothing in these drives, memory faults, and the estimator.
 
 mod checks;
 mod coast;

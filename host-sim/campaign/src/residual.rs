@@ -60,10 +60,11 @@ const ALIGNING_SHARE: f64 = 77.0 / 256.0;
 const ASSIST: f64 = 5.0;
 /// Wind or bank may make the aligning torques by yaw rate and by wheel angle differ by this much.
 const PUSHED_NM: f64 = 0.3;
-/// A driver torque that is the same for so long while the wheel turns so far, beside the probe and without it: a count begins anew
-/// when it moves, and after two seconds.
+/// A driver torque counts as stuck if it has not changed for this time, s, in which the wheel turned by [`STILL_TURN_RAD`].
 const STILL_S: f64 = 1.0;
+/// The turn of the wheel is measured anew when the torque changes, and after this time, s.
 const STILL_WITHIN_S: f64 = 2.0;
+/// With the probe, and without it, rad.
 const STILL_TURN_RAD: [f64; 2] = [0.0087, 0.14];
 /// Inertia of column and wheel.
 const INERTIA_KG_M2: f64 = 0.125;
@@ -135,7 +136,7 @@ pub(super) struct Residual {
     moved_m: f64,
     now_s: f64,
     column_at_s: Option<f64>,
-    /// A driver torque, since when it is the same, and the least and largest wheel angle meanwhile.
+    /// The driver torque, the time from which on it has not changed, and the least and largest wheel angle since.
     still: (f64, f64, [f64; 2]),
     momentum_nm_s: f64,
     commands_nm: [f64; MOTOR_ECHO],
@@ -327,7 +328,7 @@ impl Residual {
         self.momentum_nm_s.abs() / (COLUMN_MARGIN_NM_S + turning.max(0.0))
     }
 
-    /// Share of the turn that shows a driver torque to be stuck. It excuses a reaction and asks for none.
+    /// Used share of the turn from which on a driver torque counts as stuck. A reaction is allowed then, and not required.
     pub(super) fn still_used(&self, is_probed: bool) -> f64 {
         let (_, since_s, [least, most]) = self.still;
         let allowed = STILL_TURN_RAD[usize::from(!is_probed)];

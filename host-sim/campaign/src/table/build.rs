@@ -1,4 +1,4 @@
-//! How a row of the table says what it asks for: a chain of words behind its injections.
+//! How a row of the table says what it asks of the ECU: by methods in a chain behind its injections.
 
 use super::{CONTRADICTION_MS, Class, Expect, FaultCase, Place, PlaceOnRoad};
 use crate::bytes::{ACTIVE, FADE, FAULT, HANDOVER, LOCKED};
@@ -10,7 +10,7 @@ const fn reaches(mode: u64) -> Expect {
     Expect::Reaches { mode, fading: false }
 }
 
-/// The words, a line each: what is other than in the row before it, or than in another word's.
+/// Makes the methods, one a line: the fields that a method sets, and behind `on` the method that it applies first.
 macro_rules! words {
     ($(
         $(#[$doc:meta])*

@@ -52,14 +52,14 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
     }
 }
 
-/// Whether the bars can be had together, and what the chosen row lacks where the search has not been.
+/// Whether a set that was tried holds all bars, and which bars the chosen row misses on the held-out drives.
 fn what_holds(results: &DesignResults, choice: &Choice) -> String {
     let bars = &results.bars;
     let is_over = |(ratio, bar): (&f64, &Bar)| *ratio > bar.limit;
     let holding = results
         .sets
         .iter()
-        .filter(|set| !set.ratios.iter().zip(bars).any(is_over));
+        .filter(|set| set.unstable == 0 && !set.ratios.iter().zip(bars).any(is_over));
     let missed: Vec<String> = choice
         .held_out
         .iter()

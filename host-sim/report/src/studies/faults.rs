@@ -14,7 +14,7 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
          without a mark on the left has no deadline. The deviation is that from the fault-free run, beside what it is if the torque \
          is dropped in the step in which the ECU leaves. Off road: runs that go more than {OFF_ROAD_M} m aside with the torque \
          dropped as well, or that are so far aside without the fault too when the ECU leaves; their excess is not judged. \
-         Pushed: how far a fault of class C goes from a vehicle whose torque is cut at the onset. A number with an arrow stands for \
+         Pushed: the distance from a vehicle whose torque is cut at the onset, for class C. A number with an arrow stands for \
          what is beyond the axis."
     );
     let mut blocks = vec![
@@ -138,7 +138,7 @@ fn shares(campaign: &Campaign) -> Table {
     Table::of_rows("", campaign.rows.iter().map(row))
 }
 
-/// What the faults of each class do, without rows in which no ECU decides where the vehicle goes.
+/// Sums of the rows of each class that the limits judge ([`CaseResult::is_limited`]).
 fn by_class(campaign: &Campaign) -> Table {
     let row = |class: Class| {
         let rows: Vec<&CaseResult> = campaign
@@ -166,7 +166,12 @@ fn by_class(campaign: &Campaign) -> Table {
         ]
     };
     let classes = Class::ALL.into_iter();
-    let there = classes.filter(|&class| campaign.rows.iter().any(|row| row.class == class));
+    let there = classes.filter(|&class| {
+        campaign
+            .rows
+            .iter()
+            .any(|row| row.class == class && row.is_limited)
+    });
     Table::of_rows("Rows that the limits judge", there.map(row))
 }
 
