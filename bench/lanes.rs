@@ -21,7 +21,8 @@ use haptic_vectorised::{BATCH, Event, Options, Width, run_batch};
 const USAGE: &str = "usage: lanes [--width widest|avx2|portable] [--repeat N] [--alone] \
     [--beside probe|sensors|wind|everything], the fastest of N rounds is timed";
 
-fn main() {
+/// What the command line asks for: rounds, width, whether the drives run one by one too, and what they have beside the paper's world.
+fn asked() -> (u32, Width, bool, Beside) {
     let (mut repeat, mut width, mut alone, mut beside) = (1, Width::Widest, false, Beside::Nothing);
     let mut arguments = std::env::args().skip(1);
     while let Some(option) = arguments.next() {
@@ -44,6 +45,11 @@ fn main() {
             }
         }
     }
+    (repeat, width, alone, beside)
+}
+
+fn main() {
+    let (repeat, width, alone, beside) = asked();
     let scenarios = drives(beside);
     let _built = scenarios[0].course().centreline();
     let (mut processor_seconds, mut alone_seconds) = (f64::INFINITY, f64::INFINITY);

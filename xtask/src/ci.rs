@@ -161,22 +161,7 @@ pub(crate) fn check(options: &Options) -> Result<()> {
     packages
         .join()
         .map_err(|_| anyhow::anyhow!("the installation panicked"))??;
-    let queue = Mutex::new(VecDeque::from(beside));
-    let late = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                while let Some(stage) = { queue.lock().ok().and_then(|mut queue| queue.pop_front()) } {
-                    if !in_its_own_process(stage, begin) {
-                        late.lock()
-                            .map(|mut late| late.push(stage.name))
-                            .unwrap_or_default();
-                    }
-                }
-            });
-        }
-    });
-    failed.extend(late.into_inner().unwrap_or_default());
+    failed.extend(two_at_a_time(beside, begin));
     print_count();
     if options.only.is_empty()
         && let Err(error) = trace::by_execution(&logs())
@@ -187,6 +172,27 @@ pub(crate) fn check(options: &Options) -> Result<()> {
     println!("{} s in all", begin.elapsed().as_secs());
     ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
     Ok(())
+}
+
+/// Runs stages in order, two at a time, and returns the names of those that failed.
+fn two_at_a_time(stages: Vec<&'static Stage>, begin: Instant) -> Vec<&'static str> {
+    let queue = Mutex::new(VecDeque::from(stages));
+    let failed = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while let Some(stage) = { queue.lock().ok().and_then(|mut queue| queue.pop_front()) } {
+                    if !in_its_own_process(stage, begin) {
+                        failed
+                            .lock()
+                            .map(|mut failed| failed.push(stage.name))
+                            .unwrap_or_default();
+                    }
+                }
+            });
+        }
+    });
+    failed.into_inner().unwrap_or_default()
 }
 
 /// Runs a stage with its output in its log; says how long it took, and where it failed what it printed.

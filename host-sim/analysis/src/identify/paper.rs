@@ -208,27 +208,10 @@ impl<'a> Problem<'a> {
             ("wheel_angle_rad", &self.log.wheel_angle_rad),
             ("guidance_torque_nm", &self.log.guidance_torque_nm),
         ];
-        let on_bound: Vec<&str> = parameters
-            .list()
-            .iter()
-            .filter(|(_, _, p)| p.on_bound)
-            .map(|(n, ..)| *n)
-            .collect();
         let whiteness = diagnostics::whiteness(&residual, 0);
         let input_correlation = diagnostics::input_correlation(&residual, &inputs, self.log.dt_s);
-        let mut notes = Vec::new();
-        if !whiteness.white || input_correlation.iter().any(|input| !input.independent) {
-            parameters.disown();
-            notes.push(
-                "The published method takes its residuals as white and independent of the inputs, and they are not: its standard \
-                 errors are too small, and its values biased by the closed loop. They are shown as it prints them; nothing is \
-                 identified."
-                    .to_owned(),
-            );
-        }
-        if !on_bound.is_empty() {
-            notes.push(format!("on a bound of table 4: {}", on_bound.join(", ")));
-        }
+        let is_white = whiteness.white && input_correlation.iter().all(|input| input.independent);
+        let notes = notes(&mut parameters, is_white);
         Identification {
             method: "paper",
             fit_percent: diagnostics::fit_percent(measured, simulated.iter().copied()),
@@ -344,6 +327,30 @@ fn discretise(t_p: f64, t_nms: f64, dt: f64) -> (SMatrix<f64, 5, 5>, [Unit; 2]) 
     let e = (a * dt).exp();
     let column = |c: usize| Unit::from_fn(|r, _| e[(r, c)]);
     (e.fixed_view::<5, 5>(0, 0).into_owned(), [column(5), column(6)])
+}
+
+/// What has to be said of the values; where the residuals are not what the method takes them for, no value is identified.
+fn notes(parameters: &mut Parameters, is_white: bool) -> Vec<String> {
+    let list = parameters.list();
+    let on_bound: Vec<&str> = list
+        .iter()
+        .filter(|(_, _, p)| p.on_bound)
+        .map(|(n, ..)| *n)
+        .collect();
+    let mut notes = Vec::new();
+    if !is_white {
+        parameters.disown();
+        notes.push(
+            "The published method takes its residuals as white and independent of the inputs, and they are not: its standard \
+             errors are too small, and its values biased by the closed loop. They are shown as it prints them; nothing is \
+             identified."
+                .to_owned(),
+        );
+    }
+    if !on_bound.is_empty() {
+        notes.push(format!("on a bound of table 4: {}", on_bound.join(", ")));
+    }
+    notes
 }
 
 #[cfg(test)]

@@ -18,6 +18,8 @@ pub use filters::{zero_phase_low_pass, zero_phase_notch};
 pub use lane_crossing::{Placement, distance_to_lane_crossing_m};
 pub use reversals::count_reversals;
 
+use std::ops::Range;
+
 use haptic_log::trace::{Sample, Trace};
 use moments::Moments;
 
@@ -113,12 +115,7 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         .map(|failure| recovery(&trace.samples[..range.end], &failure))
         .unwrap_or_default();
     let angle_deg = without_probe(trace, circumstances.probe_hz, |s| s.wheel_angle_rad.to_degrees());
-    let reversals_per_min = |(gap_deg, cut_off_hz)| {
-        let filtered = zero_phase_low_pass(&angle_deg, trace.sample_rate_hz, cut_off_hz)?;
-        let filtered = &filtered[range.clone()];
-        let known = filtered.iter().all(|x| x.is_finite());
-        known.then(|| count_reversals(filtered, gap_deg) as f64 * 60.0 / duration_s)
-    };
+    let reversals_per_min = |kind| reversals_per_min(&angle_deg, trace.sample_rate_hz, range.clone(), kind);
 
     Metrics {
         duration_s: finite(duration_s),
@@ -148,6 +145,20 @@ pub fn measure(trace: &Trace, circumstances: &Circumstances) -> Metrics {
         min_speed_m_per_s: speeds().reduce(f64::min),
         max_speed_m_per_s: speeds().reduce(f64::max),
     }
+}
+
+/// Reversals a minute of an angle in a range of its samples, by their least size, deg, after a low-pass, Hz.
+fn reversals_per_min(
+    angle_deg: &[f64],
+    sample_rate_hz: f64,
+    range: Range<usize>,
+    (gap_deg, cut_off_hz): (f64, f64),
+) -> Option<f64> {
+    let filtered = zero_phase_low_pass(angle_deg, sample_rate_hz, cut_off_hz)?;
+    let filtered = &filtered[range];
+    let known = filtered.iter().all(|x| x.is_finite());
+    let duration_s = filtered.len() as f64 / sample_rate_hz;
+    known.then(|| count_reversals(filtered, gap_deg) as f64 * 60.0 / duration_s)
 }
 
 /// A quantity over the whole run, so that the ends of a window carry no transient of the filter; as it is where there is no

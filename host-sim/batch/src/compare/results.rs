@@ -211,20 +211,6 @@ pub(super) fn sum_up(
         }
     };
     let places = compare.judged.places.len() / compare.worlds.len();
-    let row = |(job, driven): (&Job, &Driven)| {
-        let (road, speed_kmh, _) = &compare.judged.places[job.place];
-        DriveRow {
-            names: [
-                compare.laws[job.law].name.clone(),
-                compare.drivers[job.driver].name.clone(),
-                compare.worlds[job.place / places].clone(),
-                road.clone(),
-            ],
-            speed_kmh: *speed_kmh,
-            seed: job.seed,
-            driven: driven.clone(),
-        }
-    };
     let Faults {
         sudden_loss,
         silent_lane,
@@ -259,7 +245,25 @@ pub(super) fn sum_up(
         instants: [sudden_loss, silent_lane],
         cells: (0..compare.laws.len() * drivers).map(cell).collect(),
         ratios: ratios(compare, driven),
-        rows: jobs.iter().zip(driven).map(row).collect(),
+        rows: (jobs.iter().zip(driven))
+            .map(|(job, driven)| drive_row(compare, job, driven))
+            .collect(),
+    }
+}
+
+fn drive_row(compare: &Compare, job: &Job, driven: &Driven) -> DriveRow {
+    let places = compare.judged.places.len() / compare.worlds.len();
+    let (road, speed_kmh, _) = &compare.judged.places[job.place];
+    DriveRow {
+        names: [
+            compare.laws[job.law].name.clone(),
+            compare.drivers[job.driver].name.clone(),
+            compare.worlds[job.place / places].clone(),
+            road.clone(),
+        ],
+        speed_kmh: *speed_kmh,
+        seed: job.seed,
+        driven: driven.clone(),
     }
 }
 

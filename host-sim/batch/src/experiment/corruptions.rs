@@ -5,15 +5,17 @@
 //! 10 % (15 ms of t_p, 0.05 of K_hg) from the truth. A value that is taken back is none; so the clean drives
 //! beside it show what was given up.
 
-use haptic_analysis::identify::{DriveLog, Identification, Options, Traces, identify_with_noise_model};
+use haptic_analysis::identify::{
+    DriveLog, Identification, Options, Parameters, Traces, identify_with_noise_model,
+};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::ExperimentPlan;
 use super::changing::driver_at;
 use super::corruption::{Corruption, POPULATION, changing, corrupted_log};
 use super::drives::{driven_by, guided};
 use super::repetitions::{COMPARED, Compared, bound_of, compared};
+use super::{ExperimentPlan, PublishedDriver};
 use crate::error::StudyError;
 
 /// How many 95 % intervals of identified values hold the truth.
@@ -155,23 +157,13 @@ pub fn corruptions(
                 };
                 let mut fit = identify_with_noise_model(&log, &options);
                 fit.traces = Traces::default();
-                let mut values = compared(&truth, &fit.parameters);
-                if let Some(drawn) = changing {
-                    // Nobody has one value throughout: held against the one before or the one after, whichever is nearer.
-                    let ends = [
-                        drawn.first,
-                        driver_at(&drawn.first, &drawn.changes, f64::INFINITY),
-                    ];
-                    let [before, after] = ends.map(|driver| compared(&driver, &fit.parameters));
-                    let miss = |v: &Compared| (v.1.optimum.unwrap_or(v.2) - v.2).abs();
-                    values = std::array::from_fn(|i| {
-                        if miss(&before[i]) < miss(&after[i]) {
-                            before[i]
-                        } else {
-                            after[i]
-                        }
-                    });
-                }
+                let values = match &changing {
+                    None => compared(&truth, &fit.parameters),
+                    Some(drawn) => {
+                        let last = driver_at(&drawn.first, &drawn.changes, f64::INFINITY);
+                        compared_with_nearer([drawn.first, last], &fit.parameters)
+                    }
+                };
                 fits.push((values, fit));
                 done();
             }
@@ -193,6 +185,19 @@ pub fn corruptions(
         .map(|((name, _), found)| CorruptionLine::new(name, found))
         .collect();
     Ok(Corruptions::new(plan, seeds, lines, bound))
+}
+
+/// Nobody who changes has one value throughout: each is held against the first driver or the last, whichever is nearer.
+fn compared_with_nearer(ends: [PublishedDriver; 2], found: &Parameters) -> [Compared; COMPARED] {
+    let [before, after] = ends.map(|driver| compared(&driver, found));
+    let miss = |v: &Compared| (v.1.optimum.unwrap_or(v.2) - v.2).abs();
+    std::array::from_fn(|i| {
+        if miss(&before[i]) < miss(&after[i]) {
+            before[i]
+        } else {
+            after[i]
+        }
+    })
 }
 
 /// How far from the truth a value may be without being wrong.

@@ -15,10 +15,6 @@ struct Element {
     width_m: [f64; 2],
 }
 
-#[expect(
-    clippy::too_many_lines,
-    reason = "the elements of the file, one after the other"
-)]
 pub(in crate::models::road) fn write(course: &Course) -> String {
     let elements = elements(course);
     let length_m: f64 = elements.iter().map(|element| element.length_m).sum();
@@ -27,28 +23,8 @@ pub(in crate::models::road) fn write(course: &Course) -> String {
     let (mut last_bank, mut last_grade, mut last_width) = (Linear::NONE, Linear::NONE, Linear::NONE);
     let (mut s, mut z) = (0.0, 0.0);
     for element in &elements {
-        let Element {
-            length_m: l,
-            start: Pose {
-                x_m,
-                y_m,
-                heading_rad,
-            },
-            curvature_1pm: [k0, k1],
-            ..
-        } = element;
-        let kind = match (k0 == k1, *k0 == 0.0) {
-            (true, true) => "<line/>".into(),
-            (true, false) => format!("<arc curvature=\"{k0:e}\"/>"),
-            (false, _) => format!("<spiral curvStart=\"{k0:e}\" curvEnd=\"{k1:e}\"/>"),
-        };
-        line(
-            &mut plan,
-            3,
-            &format!(
-                "<geometry s=\"{s}\" x=\"{x_m}\" y=\"{y_m}\" hdg=\"{heading_rad}\" length=\"{l}\">{kind}</geometry>"
-            ),
-        );
+        let l = &element.length_m;
+        line(&mut plan, 3, &geometry(element, s));
         let slope = |[start, end]: [f64; 2]| (end - start) / l;
         if last_bank.changes(s, element.bank_rad, *l) {
             let [a, b] = [element.bank_rad[0], slope(element.bank_rad)];
@@ -100,6 +76,28 @@ pub(in crate::models::road) fn write(course: &Course) -> String {
   </road>
 </OpenDRIVE>
 "#
+    )
+}
+
+/// The element of the plan view that begins at arc length `s`, m.
+fn geometry(element: &Element, s: f64) -> String {
+    let Element {
+        length_m: l,
+        start: Pose {
+            x_m,
+            y_m,
+            heading_rad,
+        },
+        curvature_1pm: [k0, k1],
+        ..
+    } = element;
+    let kind = match (k0 == k1, *k0 == 0.0) {
+        (true, true) => "<line/>".into(),
+        (true, false) => format!("<arc curvature=\"{k0:e}\"/>"),
+        (false, _) => format!("<spiral curvStart=\"{k0:e}\" curvEnd=\"{k1:e}\"/>"),
+    };
+    format!(
+        "<geometry s=\"{s}\" x=\"{x_m}\" y=\"{y_m}\" hdg=\"{heading_rad}\" length=\"{l}\">{kind}</geometry>"
     )
 }
 
