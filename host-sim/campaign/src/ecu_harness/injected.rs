@@ -18,8 +18,8 @@ const TAP_MS: i64 = 40;
 impl EcuHarness<'_> {
     /// What goes wrong in the ECU in this step.
     pub(super) fn disturb_inside(&mut self, step: u32, now_us: u32) {
-        let since = self.since(step);
-        if since < 0 || self.healthy {
+        let since = self.timing.since(step);
+        if since < 0 || self.timing.healthy {
             return;
         }
         for injection in self.row.injections {
@@ -61,7 +61,7 @@ impl EcuHarness<'_> {
     /// Torque that the motor delivers, N.m.
     pub(super) fn motor(&self, step: u32) -> f64 {
         let motor = self.row.injections.iter().find_map(|injection| match injection {
-            Injection::Motor(motor) if self.acts(step) => Some(*motor),
+            Injection::Motor(motor) if self.timing.acts(step) => Some(*motor),
             _ => None,
         });
         match motor {
@@ -73,7 +73,7 @@ impl EcuHarness<'_> {
 
     /// Torque of a hand on the wheel, N.m, beside that of the driver's arm.
     pub(crate) fn hand_torque_nm(&self, step: u32, arm_torque_nm: f64) -> f64 {
-        let since = self.since(step);
+        let since = self.timing.since(step);
         let against = if self.commanded_nm == 0.0 {
             -self.side
         } else {
