@@ -57,6 +57,7 @@ impl Bench {
         let evidence = Evidence {
             lane: lane.as_ref(),
             column: column.as_ref(),
+            vehicle: None,
             request: None,
             guidance: &frame,
             elapsed_us: us,

@@ -176,6 +176,7 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
             let evidence = Evidence {
                 lane: Some(&lane),
                 column: None,
+                vehicle: None,
                 request: ms.is_multiple_of(10).then_some(&request),
                 guidance: &guidance,
                 elapsed_us,
@@ -218,6 +219,7 @@ fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> Monit
         let evidence = Evidence {
             lane: Some(&lane),
             column: None,
+            vehicle: None,
             request: Some(request),
             guidance: &guidance,
             elapsed_us: 1_000,

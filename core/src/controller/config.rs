@@ -11,25 +11,28 @@
     reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
 )]
 
-use crate::controller::params::{ParamError, Params, in_range};
+use crate::controller::params::{DRIVER_ACTIVITY, FDCA, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
+use crate::law::fdca::Fdca;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
-    CurvaturePerAngle, Micros, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
-    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
+    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
-use crate::safety::monitor::Monitor;
+use crate::safety::monitor::{self, Monitor};
 use crate::safety::plausibility::Plausibility;
-use crate::safety::redundant::words;
+use crate::safety::redundant::{Optional, words};
 
 words! {
     /// The checked configuration of every block of the controller.
     pub struct Config {
-        /// Equation (9).
+        /// Equation (9), and the filter of the rates.
         pub law: Law,
+        /// The least share of (9) that driver activity leaves; one if it is not chosen.
+        pub least_share: Ratio,
         /// Torque limits.
         pub envelope: Envelope,
         /// Margins of the input checks.
@@ -40,6 +43,8 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
+        /// FDCA in its place, if it is chosen.
+        pub fdca: Optional<Fdca>,
     }
 }
 
@@ -84,7 +89,10 @@ impl Config {
             }
             i += 1;
         }
-        Ok(Self::from_params(p))
+        match check_law(p) {
+            Ok(()) => Ok(Self::from_params(p)),
+            Err(error) => Err(error),
+        }
     }
 
     /// The configuration of parameters that are in range.
@@ -98,6 +106,22 @@ impl Config {
                 e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
                 tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
             },
+            fdca: if p.law == FDCA {
+                Optional::used(Fdca {
+                    k_y: AnglePerLength::from_rad_per_m(p.fdca_sohf * p.fdca_k_y_rad_per_m),
+                    k_psi: Ratio::from_si(p.fdca_sohf * p.fdca_k_psi),
+                    path: TorquePerAcceleration::from_nm_s2_per_m(p.fdca_lohs * v.aligning_gain_nm_s2_per_m),
+                    loha: TorquePerAngle::from_nm_per_rad(p.fdca_loha_nm_per_rad),
+                    aligning: TorquePerAcceleration::from_nm_s2_per_m(v.aligning_gain_nm_s2_per_m),
+                })
+            } else {
+                Optional::unused(Fdca::NONE)
+            },
+            least_share: Ratio::from_si(if p.law == DRIVER_ACTIVITY {
+                p.activity_lambda_min
+            } else {
+                1.0
+            }),
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
                 wind_up: TorqueRate::from_nm_per_s(p.wind_up_nm_per_s),
@@ -132,6 +156,10 @@ const fn phase_per_us(frequency_hz: f64) -> u32 {
 /// times the difference of their delays: the errors' second derivatives are up to 4 m/s2 and 1 rad/s2 on a road. Noise
 /// of 15 mm and 1.5 mrad, three times what a camera has, moves the law's rates by its share of a sample.
 const fn monitor_band_nm(p: &Params) -> f64 {
+    if p.law == FDCA {
+        // The monitor's own FDCA has the law's filter.
+        return LEAST_BAND_NM;
+    }
     let tau_s = 1.0 / (2.0 * core::f64::consts::PI * p.rate_corner_hz);
     let apart_s = f64::max(tau_s - 0.02, 0.06 - tau_s);
     let noise_per_s = 1.5 / (tau_s + 1.0 / 120.0);
@@ -141,6 +169,78 @@ const fn monitor_band_nm(p: &Params) -> f64 {
     let ahead = 0.03 * p.k_1 * (p.a_1 * 4.0 + p.a_3) * apart_s;
     let carried = 0.03 * p.k_1 * (p.a_1 * 1.5 + p.a_3 * 0.3);
     f64::max(LEAST_BAND_NM, 2.0 * (a_rate + theta_rate + ahead) + carried)
+}
+
+/// The fastest that the bus carries, m/s.
+const FASTEST_M_PER_S: f64 = 90.0;
+/// Largest gains of FDCA, N.m per unit, as [`MAX_GAIN`]: three terms have more room than four.
+const MAX_FDCA_GAIN: f64 = 64.0;
+const MAX_TURNING_GAIN: f64 = 127.0;
+
+/// Whether the law is one of the list, and its gains are what its sum holds, from the slowest speed that guides to the fastest.
+const fn check_law(p: &Params) -> Result<(), ParamError> {
+    if p.law != (p.law as u32) as f64 {
+        return Err(ParamError {
+            name: "law",
+            value: p.law,
+            min: 0.0,
+            max: DRIVER_ACTIVITY,
+            unit: "in whole numbers",
+        });
+    }
+    if p.law != FDCA {
+        return Ok(());
+    }
+    let [slow, fast] = [
+        fdca_gains(p, p.least_speed_m_per_s),
+        fdca_gains(p, FASTEST_M_PER_S),
+    ];
+    let gain = [0.0, MAX_FDCA_GAIN];
+    let turning = [0.0, MAX_TURNING_GAIN];
+    let products = [
+        in_range(
+            "fdca_sohf * fdca_k_psi",
+            p.fdca_sohf * p.fdca_k_psi,
+            [0.0, 100.0],
+            "1",
+        ),
+        in_range("FDCA's gain on e_y' at the fastest", fast[0], gain, "N.m/m"),
+        in_range("FDCA's gain on e_theta' at the fastest", fast[1], gain, "N.m/rad"),
+        in_range(
+            "FDCA's gain on the rate of turn at the slowest",
+            slow[2],
+            turning,
+            "N.m.s/rad",
+        ),
+        in_range(
+            "FDCA's gain on the rate of turn at the fastest",
+            fast[2],
+            turning,
+            "N.m.s/rad",
+        ),
+    ];
+    let mut i = 0;
+    while i < products.len() {
+        if let Err(error) = products[i] {
+            return Err(error);
+        }
+        i += 1;
+    }
+    Ok(())
+}
+
+/// Gains of FDCA at a speed: on e_y', on e_theta', on the rate of turn. The first two grow with it, the last is largest at one of
+/// the ends.
+const fn fdca_gains(p: &Params, v: f64) -> [f64; 3] {
+    let car = &p.vehicle;
+    let turning_gain = v * car.curvature_gain_per_m / (1.0 + car.stability_factor_s2_per_m2 * v * v);
+    let sideways = car.aligning_gain_nm_s2_per_m * v;
+    let both = sideways * turning_gain + p.fdca_loha_nm_per_rad;
+    [
+        p.fdca_sohf * p.fdca_k_y_rad_per_m * both,
+        p.fdca_sohf * p.fdca_k_psi * both,
+        p.fdca_lohs * sideways + p.fdca_loha_nm_per_rad / turning_gain,
+    ]
 }
 
 /// Everything that parameters decide: the controller's configuration, the monitor's and the estimator's.
@@ -231,7 +331,29 @@ impl Monitor {
                 (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
                 (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
             ],
+            fdca: if p.law == FDCA {
+                Optional::used(monitor_fdca(p))
+            } else {
+                Optional::unused(monitor::Fdca::NONE)
+            },
         }
+    }
+}
+
+/// The monitor's own FDCA, in its units.
+const fn monitor_fdca(p: &Params) -> monitor::Fdca {
+    let car = &p.vehicle;
+    // mN.m per rad, of which 2^20 are one per urad.
+    let torque = 1e3 * 1.048_576;
+    monitor::Fdca {
+        k_y: (p.fdca_sohf * p.fdca_k_y_rad_per_m * 1e3 * 256.0 + 0.5) as i32,
+        k_psi: (p.fdca_sohf * p.fdca_k_psi * 256.0 + 0.5) as i32,
+        path: (p.fdca_lohs * car.aligning_gain_nm_s2_per_m * torque + 0.5) as i32,
+        aligning: (car.aligning_gain_nm_s2_per_m * torque + 0.5) as i32,
+        loha: (p.fdca_loha_nm_per_rad * torque + 0.5) as i32,
+        curvature: (car.curvature_gain_per_m * 262_144.0 + 0.5) as i32,
+        stability: (car.stability_factor_s2_per_m2 * 67_108_864.0 + 0.5) as i32,
+        filter: (1e4 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as i32,
     }
 }
 

@@ -11,8 +11,9 @@ mod step;
 
 use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
-use crate::controller::inputs::Inputs;
+use crate::controller::inputs::{Input, Inputs};
 use crate::law::LawState;
+use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
@@ -207,6 +208,7 @@ pub struct ControllerState {
     torque_history: TorqueHistory,
     motion_history: MotionHistory,
     pending: PendingChecks,
+    activity: Activity,
 }
 
 impl ControllerState {
@@ -228,6 +230,7 @@ impl ControllerState {
             torque_history: TorqueHistory::new(),
             motion_history: MotionHistory::new(),
             pending: PendingChecks::default(),
+            activity: Activity::NEW,
         }
     }
 
@@ -302,30 +305,34 @@ impl Controller {
         if !is_known_intact && !are_intact(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
-        let memory = state.memory.value_mut();
+        let ControllerState {
+            memory: kept,
+            torque_history,
+            motion_history,
+            pending,
+            activity,
+        } = state;
+        let memory = kept.value_mut();
+        let config = self.config.value();
         let mut step = Step {
-            config: self.config.value(),
+            config,
             now,
             applied,
             inputs,
             lane: inputs.lane,
             elapsed: now.since(memory.fast.last_step),
+            activity: if config.least_share < Ratio::ONE {
+                share_of_activity(activity, config, now, applied, inputs)
+            } else {
+                Ratio::ONE
+            },
             injection,
         };
         memory.fast.last_step = now;
         let mut changed = ChangedParts::NOTHING;
-        let (torque_history, motion_history) = (&mut state.torque_history, &mut state.motion_history);
-        let command = step.run(
-            memory,
-            &mut changed,
-            torque_history,
-            motion_history,
-            &mut state.pending,
-        );
-        seal(&mut state.memory, changed);
-        state
-            .torque_history
-            .push(now, subtract_probe(command.torque, command.probe));
+        let command = step.run(memory, &mut changed, torque_history, motion_history, pending);
+        seal(kept, changed);
+        torque_history.push(now, subtract_probe(command.torque, command.probe));
         command
     }
 }
@@ -356,4 +363,19 @@ fn seal(memory: &mut Redundant<Memory>, changed: ChangedParts) {
     if changed.has(ChangedParts::RAMP) {
         memory.seal_part(|v| &mut v.ramp);
     }
+}
+
+/// The share of the law's torque that driver activity leaves in this step.
+fn share_of_activity(
+    activity: &mut Activity,
+    config: &Config,
+    now: Instant,
+    applied: Torque,
+    inputs: &Inputs,
+) -> Ratio {
+    if let Input::New(column) = inputs.column {
+        let torques = [column.driver_torque, applied];
+        activity.update(&config.law, config.least_share, now, column.wheel_angle, torques);
+    }
+    activity.share()
 }

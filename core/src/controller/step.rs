@@ -5,6 +5,7 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
+use crate::law::fdca::Car;
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
@@ -57,6 +58,8 @@ pub(super) struct Step<'a, I> {
     /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
+    /// The share of the law's torque that driver activity leaves.
+    pub(super) activity: Ratio,
     pub(super) injection: &'a I,
 }
 
@@ -133,13 +136,15 @@ impl<I: Injection> Step<'_, I> {
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let ego = self.ego_motion(v, last);
-        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
+        let demanded = self.law(v, last);
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
+                // FDCA stands on its rates, so they must not stand still while trust comes back.
+                let goes_by_pictures = self.config.fdca.get().is_some() && v.coast.sees();
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
+                    PictureVerdict::Expected if goes_by_pictures => {}
                     PictureVerdict::Expected => v.law.relocate(sample),
                     PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
@@ -380,6 +385,24 @@ impl<I: Injection> Step<'_, I> {
         ))
     }
 
+    /// What the law demands by the sample taken last.
+    #[inline(always)]
+    fn law(&self, v: &Memory, sample: LaneSample) -> Torque {
+        let (law, ego) = (&self.config.law, self.ego_motion(v, sample));
+        match self.config.fdca.get() {
+            None => law.demanded(&v.law, self.now, ego.as_ref()),
+            Some(fdca) => {
+                let car = Car {
+                    speed: v.plausibility.speed(),
+                    turning_gain: v.plausibility.turning_gain(),
+                    turning: v.plausibility.turning(),
+                    wheel: v.plausibility.wheel(),
+                };
+                fdca.demanded(law, &v.law, self.now, ego.as_ref(), &car)
+            }
+        }
+    }
+
     /// Whether both speeds reach the slowest that is guided, if they are known.
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
@@ -563,11 +586,13 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(ChangedParts::LAW);
                 self.config.law.update(&mut v.law, sample);
             }
-            self.config
-                .law
-                .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
+            self.law(v, sample)
         });
-        let demanded = self.injection.law(v.coast.limited(demanded));
+        let mut demanded = v.coast.limited(demanded);
+        if self.activity < Ratio::ONE {
+            demanded = Torque::from_fixed(share_of(self.activity.fixed(), demanded.fixed()));
+        }
+        let demanded = self.injection.law(demanded);
         // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);

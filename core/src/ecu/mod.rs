@@ -228,6 +228,7 @@ impl Ecu {
         let evidence = Evidence {
             lane: accepted.lane.as_ref(),
             column: accepted.column.as_ref(),
+            vehicle: accepted.vehicle.as_ref(),
             request: accepted.request.as_ref(),
             guidance: guidance.bytes(),
             elapsed_us,
@@ -367,6 +368,9 @@ fn seal(memory: &mut Redundant<Memory>, is_new_picture: bool) {
     if is_new_picture {
         memory.seal_part(|v| &mut v.monitor.lane_state);
     }
+    if memory.value().monitor.car.get().is_some() {
+        memory.seal_part(|v| &mut v.monitor.car);
+    }
 }
 
 /// Whether the monitor is tested in this step.
@@ -404,6 +408,7 @@ fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injectio
         let evidence = Evidence {
             lane: None,
             column: None,
+            vehicle: None,
             request: None,
             guidance: &guidance,
             elapsed_us: 1000,

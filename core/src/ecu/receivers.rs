@@ -241,6 +241,7 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
     pub(super) column: Option<[u8; 8]>,
+    pub(super) vehicle: Option<[u8; 8]>,
     pub(super) request: Option<[u8; 8]>,
 }
 
@@ -248,6 +249,7 @@ impl Accepted {
     pub(super) const NONE: Self = Self {
         lane: None,
         column: None,
+        vehicle: None,
         request: None,
     };
 }
@@ -386,6 +388,7 @@ impl Receivers {
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
+                    accepted.vehicle = Some(*frame.bytes());
                     Ok(())
                 });
                 if heard != Some(Ok(())) {

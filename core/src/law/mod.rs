@@ -13,8 +13,12 @@
 //! Error: at most 0.2 mN.m from a float64 evaluation of the same discrete law over the whole input range
 //! (`core/tests/law_oracle.rs` asserts it). Cost: see `cargo xtask bench`.
 //!
+//! In its place the parameters may choose FDCA ([`fdca`]), or leave a share of it by the driver's [`activity`].
+//!
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
+pub mod activity;
+pub mod fdca;
 pub mod probe;
 pub mod schedule;
 pub(crate) mod sine;

@@ -11,11 +11,15 @@
 //! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
 //! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
 //! an honest change about. While the host asks for the probe, and for a second after, the band is wider by the probe's
-//! amplitude.
+//! amplitude. Where the parameters choose FDCA, it is computed here a second time, and its band has reasons of its own (`monitor/fdca.rs`). Driver
+//! activity leaves a share of (9), which lies between it and zero: its band is that of (9).
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-use crate::safety::redundant::words;
+mod fdca;
+
+use crate::safety::redundant::{Optional, words};
+pub(crate) use fdca::{Car, Fdca};
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -32,6 +36,8 @@ words! {
         pub(crate) probe_mnm: i32,
         /// Law, mN.m per m, per rad, per m/s, per rad/s.
         pub(crate) gains_mnm: [i32; 4],
+        /// FDCA in its place.
+        pub(crate) fdca: Optional<Fdca>,
     }
 }
 
@@ -40,6 +46,8 @@ words! {
     pub struct MonitorState {
         pub(crate) step: StepState,
         pub(crate) lane_state: LaneState,
+        /// For FDCA.
+        pub(crate) car: Optional<Car>,
     }
 }
 
@@ -89,6 +97,8 @@ pub struct Evidence<'a> {
     pub lane: Option<&'a [u8; 8]>,
     /// Bytes of the latest column frame in use, if a new one arrived.
     pub column: Option<&'a [u8; 8]>,
+    /// Bytes of the latest vehicle frame in use, if a new one arrived.
+    pub vehicle: Option<&'a [u8; 8]>,
     /// Bytes of the latest command frame in use, if a new one arrived.
     pub request: Option<&'a [u8; 8]>,
     /// Bytes of the guidance frame about to leave.
@@ -156,6 +166,7 @@ impl MonitorState {
             position_mnm: 0,
             rate_mnm: 0,
         },
+        car: Optional::unused(Car::NEW),
     };
 }
 
@@ -168,7 +179,9 @@ impl Monitor {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if state.observe(evidence, elapsed_us) {
+        if let Some(fdca) = self.fdca.get() {
+            state.drive(fdca, evidence, elapsed_us);
+        } else if state.observe(evidence, elapsed_us) {
             self.update_demand(state);
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
@@ -201,7 +214,7 @@ impl Monitor {
             && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
             && self.leaves_the_driver_in_charge(torque, state.step.driver_mnm)
-            && (mode != ACTIVE || self.follows_the_lane(state, torque));
+            && (mode != ACTIVE || self.follows_the_lane(state, torque, evidence.guidance));
         state.step.torque_mnm = torque;
         state.step.withdrawn |= i32::from(!agrees);
         state.step.withdrawn == 0
@@ -213,6 +226,7 @@ impl Monitor {
     pub const fn with_another_law(self) -> Self {
         Self {
             band_mnm: self.limit_mnm,
+            fdca: Optional::unused(Fdca::NONE),
             ..self
         }
     }
@@ -259,30 +273,17 @@ impl Monitor {
     }
 
     #[inline(always)]
-    fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
+    fn follows_the_lane(&self, state: &mut MonitorState, torque: i32, guidance: &[u8; 8]) -> bool {
         if state.step.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
         }
         // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
         let late_us = state.step.age_us.saturating_sub(PROMPT_LANE_US);
-        let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
-        let both = position.saturating_add(rate);
-        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
-        let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
-        if late_us >= 1000 {
-            let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
-            let [per_m, per_rad, ..] = self.gains_mnm;
-            let (e_y_mmps, e_theta_urps) = state.rates();
-            let carried = per_m
-                .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
-                .saturating_div(1000)
-                .saturating_add(
-                    per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
-                );
-            let position = position.saturating_add(carried);
-            let both = position.saturating_add(rate);
-            (low, high) = (low.min(position).min(both), high.max(position).max(both));
-        }
+        // Limits, ramps, the authority and the driver's activity can only make the torque smaller: zero is always in the band.
+        let (low, high) = match self.fdca.get() {
+            None => self.range(state, late_us),
+            Some(fdca) => state.range(fdca, late_us, field(guidance, YAW_RATE_FAULT, 1) != 0),
+        };
         let probe = if state.step.probe_left_us > 0 {
             self.probe_mnm
         } else {
@@ -300,6 +301,29 @@ impl Monitor {
             state.step.astray_ms = state.step.astray_ms.saturating_add(1);
         }
         state.step.astray_ms <= ASTRAY_MS
+    }
+
+    /// From where to where (9) asks for a torque.
+    #[inline(always)]
+    fn range(&self, state: &MonitorState, late_us: i32) -> (i32, i32) {
+        let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
+        let both = position.saturating_add(rate);
+        let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
+        if late_us >= 1000 {
+            let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
+            let [per_m, per_rad, ..] = self.gains_mnm;
+            let (e_y_mmps, e_theta_urps) = state.rates();
+            let carried = per_m
+                .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
+                .saturating_div(1000)
+                .saturating_add(
+                    per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
+                );
+            let position = position.saturating_add(carried);
+            let both = position.saturating_add(rate);
+            (low, high) = (low.min(position).min(both), high.max(position).max(both));
+        }
+        (low, high)
     }
 
     /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
@@ -368,6 +392,42 @@ impl MonitorState {
         lane.is_some()
     }
 
+    /// [`Self::observe`], and what FDCA takes of the frames.
+    #[inline(never)]
+    fn drive(&mut self, fdca: &Fdca, evidence: &Evidence<'_>, elapsed_us: i32) {
+        let (before, age_us) = (self.lane_state.lane, self.step.age_us);
+        let is_new = self.observe(evidence, elapsed_us);
+        let car = self.car.get_mut();
+        car.pass(elapsed_us, says_aside(evidence.guidance));
+        if let Some(bytes) = evidence.column {
+            car.turn_wheel(bytes);
+            // Without authority the wheel angle only stands in for a yaw rate, which comes with the vehicle.
+            if fdca.loha != 0 {
+                car.hear();
+            }
+        }
+        if let Some(bytes) = evidence.vehicle {
+            let is_distrusted = field(evidence.guidance, YAW_RATE_FAULT, 1) != 0;
+            fdca.drive(car, bytes, is_distrusted);
+            car.hear();
+        }
+        if is_new {
+            let apart_us = age_us.saturating_add(elapsed_us).saturating_sub(self.step.age_us);
+            fdca.see(car, &before, &self.lane_state.lane, apart_us);
+            car.hear();
+        }
+    }
+
+    /// From where to where FDCA asks for a torque.
+    #[inline(never)]
+    fn range(&mut self, fdca: &Fdca, late_us: i32, is_distrusted: bool) -> (i32, i32) {
+        let (e_y_mmps, _) = if late_us > 0 { self.rates() } else { (0, 0) };
+        let picture = &self.lane_state;
+        let ages = [late_us.min(LONGEST_LATE_US), picture.came_us];
+        let car = self.car.get_mut();
+        fdca.range(car, &picture.lane, e_y_mmps, ages, is_distrusted)
+    }
+
     /// How fast the lane errors move, mm/s and urad/s.
     #[expect(
         clippy::arithmetic_side_effects,
@@ -389,6 +449,9 @@ impl MonitorState {
         (e_y_mmps, e_theta_urps)
     }
 }
+
+/// The place of the fault YawRate in a guidance frame.
+const YAW_RATE_FAULT: u32 = 57;
 
 /// Whether a guidance frame says LaneTimeout or LaneStep.
 #[cold]

@@ -20,6 +20,8 @@ use super::counts::{ONE, speed_heard};
 pub enum Reason {
     /// A camera whose pictures come late, that is blind at times, or that jumps to another line.
     Camera,
+    /// Another law than the paper's.
+    AnotherLaw,
     /// Exact sensors, past the bus.
     ExactSensors,
     /// Slower than the controller guides.
@@ -64,12 +66,13 @@ pub enum Reason {
 
 impl Reason {
     /// Every reason, those that are known before a run begins first, with what a study says of them.
-    pub const ALL: [(Self, &str); 21] = [
+    pub const ALL: [(Self, &str); 22] = [
         (
             Self::Camera,
             "a camera that is late, blind at times, or on another line",
         ),
-        (Self::ExactSensors, "exact sensors, motion_history the bus"),
+        (Self::AnotherLaw, "another law than the paper's"),
+        (Self::ExactSensors, "exact sensors, past the bus"),
         (Self::TooSlow, "slower than is guided"),
         (
             Self::EarlyFailure,
@@ -155,6 +158,7 @@ pub fn unsupported_reason(scenario: &Scenario) -> Option<Reason> {
     let heard_m_per_s = f64::from(speed_heard(scenario)) * (1.0 / ONE);
     let reasons = [
         (guided && camera.iter().any(|error| *error != 0.0), Reason::Camera),
+        (guided && params.law != 0.0, Reason::AnotherLaw),
         (guided && *sensors == Sensors::Exact, Reason::ExactSensors),
         (
             guided && heard_m_per_s < params.least_speed_m_per_s + SPEED_LSB_M_PER_S,
@@ -273,6 +277,14 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
                 far_time_s: _,
                 near_time_s: _,
             },
+        law: _,
+        // Without its law none of these acts.
+        fdca_k_y_rad_per_m: _,
+        fdca_k_psi: _,
+        fdca_lohs: _,
+        fdca_sohf: _,
+        fdca_loha_nm_per_rad: _,
+        activity_lambda_min: _,
     } = controller;
     controller
 }
