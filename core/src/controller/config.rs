@@ -13,8 +13,8 @@
 
 use crate::controller::params::{DRIVER_ACTIVITY, FDCA, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
-use crate::law::Law;
 use crate::law::fdca::Fdca;
+use crate::law::Law;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
@@ -24,15 +24,13 @@ use crate::quantity::{
 use crate::safety::envelope::Envelope;
 use crate::safety::monitor::{self, Monitor};
 use crate::safety::plausibility::Plausibility;
-use crate::safety::redundant::{Optional, words};
+use crate::safety::redundant::words;
 
 words! {
     /// The checked configuration of every block of the controller.
     pub struct Config {
         /// Equation (9), and the filter of the rates.
         pub law: Law,
-        /// The least share of (9) that driver activity leaves; one if it is not chosen.
-        pub least_share: Ratio,
         /// Torque limits.
         pub envelope: Envelope,
         /// Margins of the input checks.
@@ -43,8 +41,16 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
-        /// FDCA in its place, if it is chosen.
-        pub fdca: Optional<Fdca>,
+        /// The law, and what driver activity leaves of (9) at least: one for (9) itself, minus one for FDCA.
+        pub(crate) least_share: Ratio,
+    }
+}
+
+words! {
+    /// What the laws beside (9) take from the parameters.
+    pub struct OtherLaws {
+        /// The choices of FDCA.
+        pub fdca: Fdca,
     }
 }
 
@@ -95,6 +101,12 @@ impl Config {
         }
     }
 
+    /// Whether FDCA is in the place of (9).
+    #[inline(always)]
+    pub(crate) fn is_fdca(&self) -> bool {
+        self.least_share < Ratio::ZERO
+    }
+
     /// The configuration of parameters that are in range.
     const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
@@ -106,22 +118,6 @@ impl Config {
                 e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
                 tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
             },
-            fdca: if p.law == FDCA {
-                Optional::used(Fdca {
-                    k_y: AnglePerLength::from_rad_per_m(p.fdca_sohf * p.fdca_k_y_rad_per_m),
-                    k_psi: Ratio::from_si(p.fdca_sohf * p.fdca_k_psi),
-                    path: TorquePerAcceleration::from_nm_s2_per_m(p.fdca_lohs * v.aligning_gain_nm_s2_per_m),
-                    loha: TorquePerAngle::from_nm_per_rad(p.fdca_loha_nm_per_rad),
-                    aligning: TorquePerAcceleration::from_nm_s2_per_m(v.aligning_gain_nm_s2_per_m),
-                })
-            } else {
-                Optional::unused(Fdca::NONE)
-            },
-            least_share: Ratio::from_si(if p.law == DRIVER_ACTIVITY {
-                p.activity_lambda_min
-            } else {
-                1.0
-            }),
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
                 wind_up: TorqueRate::from_nm_per_s(p.wind_up_nm_per_s),
@@ -142,6 +138,29 @@ impl Config {
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
+            least_share: Ratio::from_si(if p.law == FDCA {
+                -1.0
+            } else if p.law == DRIVER_ACTIVITY {
+                p.activity_lambda_min
+            } else {
+                1.0
+            }),
+        }
+    }
+}
+
+impl OtherLaws {
+    /// Of parameters that are in range.
+    const fn from_params(p: &Params) -> Self {
+        let aligning = p.vehicle.aligning_gain_nm_s2_per_m;
+        Self {
+            fdca: Fdca {
+                k_y: AnglePerLength::from_rad_per_m(p.fdca_sohf * p.fdca_k_y_rad_per_m),
+                k_psi: Ratio::from_si(p.fdca_sohf * p.fdca_k_psi),
+                path: TorquePerAcceleration::from_nm_s2_per_m(p.fdca_lohs * aligning),
+                loha: TorquePerAngle::from_nm_per_rad(p.fdca_loha_nm_per_rad),
+                aligning: TorquePerAcceleration::from_nm_s2_per_m(aligning),
+            },
         }
     }
 }
@@ -248,8 +267,12 @@ const fn fdca_gains(p: &Params, v: f64) -> [f64; 3] {
 pub struct Setup {
     /// Law, envelope, plausibility.
     pub config: Config,
+    /// The laws beside (9).
+    pub others: OtherLaws,
     /// The monitor's own limits.
     pub monitor: Monitor,
+    /// The monitor's own FDCA.
+    pub watch: monitor::Fdca,
     /// The estimator of K_hg.
     pub estimator: Estimator,
 }
@@ -258,7 +281,9 @@ impl Setup {
     /// The paper's parameters.
     pub const PAPER: Self = Self {
         config: Config::PAPER,
+        others: OtherLaws::from_params(&Params::PAPER),
         monitor: Monitor::new(&Params::PAPER),
+        watch: monitor::Fdca::new(&Params::PAPER),
         estimator: Estimator::new(&Params::PAPER),
     };
 
@@ -275,7 +300,9 @@ impl Setup {
         match in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m") {
             Ok(()) => Ok(Self {
                 config,
+                others: OtherLaws::from_params(p),
                 monitor: Monitor::new(p),
+                watch: monitor::Fdca::new(p),
                 estimator: Estimator::new(p),
             }),
             Err(error) => Err(error),
@@ -325,27 +352,27 @@ impl Monitor {
             fall_mnm_per_ms: (p.reduction_nm_per_s + 0.999) as i32,
             band_mnm: (monitor_band_nm(p) * 1e3 + 0.5) as i32,
             probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
-            gains_mnm: [
-                (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
-                (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
-                (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
-                (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
-            ],
-            fdca: if p.law == FDCA {
-                Optional::used(monitor_fdca(p))
+            gains_mnm: if p.law == FDCA {
+                monitor::OF_FDCA
             } else {
-                Optional::unused(monitor::Fdca::NONE)
+                [
+                    (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
+                    (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
+                    (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
+                    (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
+                ]
             },
         }
     }
 }
 
-/// The monitor's own FDCA, in its units.
-const fn monitor_fdca(p: &Params) -> monitor::Fdca {
-    let car = &p.vehicle;
-    // mN.m per rad, of which 2^20 are one per urad.
-    let torque = 1e3 * 1.048_576;
-    monitor::Fdca {
+impl monitor::Fdca {
+    /// The monitor's own FDCA, in its units.
+    const fn new(p: &Params) -> Self {
+        let car = &p.vehicle;
+        // mN.m per rad, of which 2^20 are one per urad.
+        let torque = 1e3 * 1.048_576;
+        Self {
         k_y: (p.fdca_sohf * p.fdca_k_y_rad_per_m * 1e3 * 256.0 + 0.5) as i32,
         k_psi: (p.fdca_sohf * p.fdca_k_psi * 256.0 + 0.5) as i32,
         path: (p.fdca_lohs * car.aligning_gain_nm_s2_per_m * torque + 0.5) as i32,
@@ -353,7 +380,8 @@ const fn monitor_fdca(p: &Params) -> monitor::Fdca {
         loha: (p.fdca_loha_nm_per_rad * torque + 0.5) as i32,
         curvature: (car.curvature_gain_per_m * 262_144.0 + 0.5) as i32,
         stability: (car.stability_factor_s2_per_m2 * 67_108_864.0 + 0.5) as i32,
-        filter: (1e4 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as i32,
+            filter: (1e4 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as i32,
+        }
     }
 }
 

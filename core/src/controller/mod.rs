@@ -6,14 +6,15 @@
 pub mod config;
 pub(crate) mod injection;
 pub mod inputs;
+pub(crate) mod other_laws;
 pub mod params;
 mod step;
 
-use crate::controller::config::Config;
+use crate::controller::config::{Config, OtherLaws, Setup};
 use crate::controller::injection::{Injection, NoInjection};
-use crate::controller::inputs::{Input, Inputs};
+use crate::controller::inputs::Inputs;
+use crate::controller::other_laws::OtherState;
 use crate::law::LawState;
-use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
@@ -113,6 +114,8 @@ impl ChangedParts {
 struct PendingChecks {
     lane: bool,
     column: bool,
+    /// A law beside (9) has not seen the last speed yet.
+    other_law: bool,
     frozen_torque: FrozenTorqueState,
 }
 
@@ -208,7 +211,7 @@ pub struct ControllerState {
     torque_history: TorqueHistory,
     motion_history: MotionHistory,
     pending: PendingChecks,
-    activity: Activity,
+    pub(crate) others: OtherState,
 }
 
 impl ControllerState {
@@ -230,7 +233,7 @@ impl ControllerState {
             torque_history: TorqueHistory::new(),
             motion_history: MotionHistory::new(),
             pending: PendingChecks::default(),
-            activity: Activity::NEW,
+            others: OtherState::new(),
         }
     }
 
@@ -256,14 +259,16 @@ impl ControllerState {
 #[derive(Debug, Clone, Copy)]
 pub struct Controller {
     pub(crate) config: Redundant<Config>,
+    pub(crate) others: Redundant<OtherLaws>,
 }
 
 impl Controller {
     /// A controller with checked parameters.
     #[must_use]
-    pub fn new(config: Config) -> Self {
+    pub fn new(setup: &Setup) -> Self {
         Self {
-            config: Redundant::new(config),
+            config: Redundant::new(setup.config),
+            others: Redundant::new(setup.others),
         }
     }
 
@@ -305,34 +310,39 @@ impl Controller {
         if !is_known_intact && !are_intact(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
-        let ControllerState {
-            memory: kept,
-            torque_history,
-            motion_history,
-            pending,
-            activity,
-        } = state;
-        let memory = kept.value_mut();
         let config = self.config.value();
+        if state.pending.other_law && !state.pending.lane {
+            state.pending.other_law = false;
+            let (memory, others) = (state.memory.value(), &mut state.others);
+            if others.work(&self.others, config, memory, applied, inputs).is_none() {
+                return state.lose_memory(now);
+            }
+        }
+        let memory = state.memory.value_mut();
         let mut step = Step {
             config,
+            others: &state.others,
             now,
             applied,
             inputs,
             lane: inputs.lane,
             elapsed: now.since(memory.fast.last_step),
-            activity: if config.least_share < Ratio::ONE {
-                share_of_activity(activity, config, now, applied, inputs)
-            } else {
-                Ratio::ONE
-            },
             injection,
         };
         memory.fast.last_step = now;
         let mut changed = ChangedParts::NOTHING;
-        let command = step.run(memory, &mut changed, torque_history, motion_history, pending);
-        seal(kept, changed);
-        torque_history.push(now, subtract_probe(command.torque, command.probe));
+        let (torque_history, motion_history) = (&mut state.torque_history, &mut state.motion_history);
+        let command = step.run(
+            memory,
+            &mut changed,
+            torque_history,
+            motion_history,
+            &mut state.pending,
+        );
+        seal(&mut state.memory, changed);
+        state
+            .torque_history
+            .push(now, subtract_probe(command.torque, command.probe));
         command
     }
 }
@@ -363,19 +373,4 @@ fn seal(memory: &mut Redundant<Memory>, changed: ChangedParts) {
     if changed.has(ChangedParts::RAMP) {
         memory.seal_part(|v| &mut v.ramp);
     }
-}
-
-/// The share of the law's torque that driver activity leaves in this step.
-fn share_of_activity(
-    activity: &mut Activity,
-    config: &Config,
-    now: Instant,
-    applied: Torque,
-    inputs: &Inputs,
-) -> Ratio {
-    if let Input::New(column) = inputs.column {
-        let torques = [column.driver_torque, applied];
-        activity.update(&config.law, config.least_share, now, column.wheel_angle, torques);
-    }
-    activity.share()
 }

@@ -5,7 +5,7 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
-use crate::law::fdca::Car;
+use crate::controller::other_laws::OtherState;
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
@@ -52,14 +52,14 @@ const BRIDGED: FaultSet = FaultSet::NONE
 /// One step: what it reads and does not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
+    /// What the laws beside (9) remember.
+    pub(super) others: &'a OtherState,
     pub(super) now: Instant,
     pub(super) applied: Torque,
     pub(super) inputs: &'a Inputs,
     /// The lane that the law uses: the input's, or the last one, extrapolated.
     pub(super) lane: Input<LaneSample>,
     pub(super) elapsed: Micros,
-    /// The share of the law's torque that driver activity leaves.
-    pub(super) activity: Ratio,
     pub(super) injection: &'a I,
 }
 
@@ -142,7 +142,7 @@ impl<I: Injection> Step<'_, I> {
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
                 // FDCA stands on its rates, so they must not stand still while trust comes back.
-                let goes_by_pictures = self.config.fdca.get().is_some() && v.coast.sees();
+                let goes_by_pictures = self.config.is_fdca() && v.coast.sees();
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
                     PictureVerdict::Expected if goes_by_pictures => {}
                     PictureVerdict::Expected => v.law.relocate(sample),
@@ -198,6 +198,13 @@ impl<I: Injection> Step<'_, I> {
 
         if let Input::New(motion) = motion {
             self.update_motion(v, changed, motion, motion_history, &mut kept);
+            if self.config.least_share < Ratio::ONE {
+                pending.other_law = true;
+                if !self.config.is_fdca() {
+                    let left = self.others.share(self.config.least_share);
+                    v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
+                }
+            }
         }
         if fast_enough != Some(true) {
             changed.add(ChangedParts::LANE);
@@ -388,19 +395,21 @@ impl<I: Injection> Step<'_, I> {
     /// What the law demands by the sample taken last.
     #[inline(always)]
     fn law(&self, v: &Memory, sample: LaneSample) -> Torque {
-        let (law, ego) = (&self.config.law, self.ego_motion(v, sample));
-        match self.config.fdca.get() {
-            None => law.demanded(&v.law, self.now, ego.as_ref()),
-            Some(fdca) => {
-                let car = Car {
-                    speed: v.plausibility.speed(),
-                    turning_gain: v.plausibility.turning_gain(),
-                    turning: v.plausibility.turning(),
-                    wheel: v.plausibility.wheel(),
-                };
-                fdca.demanded(law, &v.law, self.now, ego.as_ref(), &car)
-            }
+        if self.config.is_fdca() {
+            return self.fdca(v, sample);
         }
+        let ego = self.ego_motion(v, sample);
+        self.config.law.demanded(&v.law, self.now, ego.as_ref())
+    }
+
+    /// The same of FDCA. Not inlined, so that it costs (9) nothing. Gains whose copies do not agree ask for nothing.
+    #[inline(never)]
+    fn fdca(&self, v: &Memory, sample: LaneSample) -> Torque {
+        let ego = self.ego_motion(v, sample);
+        let motion = (v.plausibility.turning(), v.plausibility.wheel());
+        self.others.gains.get().map_or(Torque::ZERO, |gains| {
+            gains.demanded(&v.law, self.now, ego.as_ref(), motion)
+        })
     }
 
     /// Whether both speeds reach the slowest that is guided, if they are known.
@@ -588,11 +597,7 @@ impl<I: Injection> Step<'_, I> {
             }
             self.law(v, sample)
         });
-        let mut demanded = v.coast.limited(demanded);
-        if self.activity < Ratio::ONE {
-            demanded = Torque::from_fixed(share_of(self.activity.fixed(), demanded.fixed()));
-        }
-        let demanded = self.injection.law(demanded);
+        let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.
         let share = |request: Request| request.authority.max(Ratio::ZERO).min(Ratio::ONE);
         let authority = self.inputs.request.value().map_or(Ratio::ONE, share);
@@ -607,7 +612,7 @@ impl<I: Injection> Step<'_, I> {
 /// checks nothing. Where every step has a new value, every second one is checked, over the time of both.
 fn to_check<T: Copy>(input: &Input<T>, is_pending: &mut bool) -> Option<T> {
     let was_pending = core::mem::replace(is_pending, matches!(input, Input::New(_)) && !*is_pending);
-    input.value().filter(|_| was_pending)
+    if was_pending { input.value() } else { None }
 }
 
 fn add_probe(guidance: Torque, probe: Option<Torque>) -> Torque {

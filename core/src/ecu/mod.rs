@@ -24,9 +24,9 @@ use crate::safety::actuator::Motor;
 use crate::safety::envelope::LimitReason;
 use crate::safety::faults::{Fault, FaultHistory, FaultSet};
 use crate::safety::modes::Mode;
-use crate::safety::monitor::{Evidence, Monitor, MonitorState};
+use crate::safety::monitor::{Evidence, Monitor, MonitorState, Watch};
 use crate::safety::redundant::{Redundant, words};
-use receivers::{Accepted, Receivers};
+use receivers::Receivers;
 
 /// How the ECU came up: what the firmware knows before the first step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -96,6 +96,7 @@ pub struct Ecu {
     controller: Controller,
     state: ControllerState,
     monitor: Redundant<Monitor>,
+    watch: Watch,
     memory: Redundant<Memory>,
     receivers: Receivers,
     history: FaultHistory,
@@ -156,9 +157,10 @@ impl Ecu {
         now: Instant,
     ) -> Self {
         Self {
-            controller: Controller::new(setup.config),
+            controller: Controller::new(setup),
             state: ControllerState::with(mode, now),
             monitor: Redundant::new(setup.monitor),
+            watch: Watch::new(setup.watch),
             memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: FaultHistory::new(now),
@@ -226,15 +228,16 @@ impl Ecu {
 
         let accepted = &self.receivers.accepted;
         let evidence = Evidence {
-            lane: accepted.lane.as_ref(),
-            column: accepted.column.as_ref(),
-            vehicle: accepted.vehicle.as_ref(),
-            request: accepted.request.as_ref(),
+            lane: &accepted.lane,
+            column: &accepted.column,
+            vehicle: &accepted.vehicle,
+            request: &accepted.request,
             guidance: guidance.bytes(),
             elapsed_us,
         };
         let v = self.memory.value_mut();
-        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
+        let watch = Some(&mut self.watch);
+        let permitted = permits(monitor, &mut v.monitor, &evidence, watch, injection);
         faults.insert_if(!permitted, Fault::Monitor);
         v.step = LastStep {
             applied: if permitted { command.torque } else { Torque::ZERO },
@@ -242,9 +245,9 @@ impl Ecu {
             at: now,
             count: steps.wrapping_add(1),
         };
-        seal(&mut self.memory, evidence.lane.is_some());
+        seal(&mut self.memory, evidence.lane.is_some() || self.watch.has_judged);
         // Each accepted frame is shown to the monitor once.
-        self.receivers.accepted = Accepted::NONE;
+        self.receivers.accepted.clear();
         if !permitted {
             command = Command {
                 torque: Torque::ZERO,
@@ -368,9 +371,6 @@ fn seal(memory: &mut Redundant<Memory>, is_new_picture: bool) {
     if is_new_picture {
         memory.seal_part(|v| &mut v.monitor.lane_state);
     }
-    if memory.value().monitor.car.get().is_some() {
-        memory.seal_part(|v| &mut v.monitor.car);
-    }
 }
 
 /// Whether the monitor is tested in this step.
@@ -406,14 +406,14 @@ fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injectio
     monitor.is_none_or(|monitor| {
         let (mut state, guidance) = monitor.self_test_vector(turn);
         let evidence = Evidence {
-            lane: None,
-            column: None,
-            vehicle: None,
-            request: None,
+            lane: &None,
+            column: &None,
+            vehicle: &None,
+            request: &None,
             guidance: &guidance,
             elapsed_us: 1000,
         };
-        !permits(Some(monitor), &mut state, &evidence, injection)
+        !permits(Some(monitor), &mut state, &evidence, None, injection)
     })
 }
 
@@ -422,8 +422,9 @@ fn permits<I: Injection>(
     monitor: Option<&Monitor>,
     state: &mut MonitorState,
     evidence: &Evidence<'_>,
+    watch: Option<&mut Watch>,
     injection: &I,
 ) -> bool {
     injection.monitor_passes(evidence.guidance)
-        || monitor.is_some_and(|monitor| monitor.step(state, evidence))
+        || monitor.is_some_and(|monitor| monitor.step(state, evidence, watch))
 }

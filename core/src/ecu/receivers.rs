@@ -246,6 +246,15 @@ pub(super) struct Accepted {
 }
 
 impl Accepted {
+    /// Nothing accepted since. The bytes stay, which costs fewer instructions.
+    #[inline(always)]
+    pub(super) const fn clear(&mut self) {
+        self.lane = None;
+        self.column = None;
+        self.vehicle = None;
+        self.request = None;
+    }
+
     pub(super) const NONE: Self = Self {
         lane: None,
         column: None,

@@ -29,7 +29,6 @@ pub struct Activity {
     /// L[P_d*P_h] and L[abs(P_d*P_h)].
     agreement: i64,
     size: i64,
-    share: Ratio,
 }
 
 impl Activity {
@@ -40,33 +39,24 @@ impl Activity {
         rate: I12F20::ZERO,
         agreement: 0,
         size: 0,
-        share: Ratio::ONE,
     };
 
-    /// The share that is left.
-    #[must_use]
-    pub const fn share(&self) -> Ratio {
-        self.share
-    }
-
-    /// Takes a sample of the column beside the guidance torque that was applied; `law` has the filter of the rate, `least` is
-    /// lambda_min.
-    #[inline(never)]
+    /// Takes a sample of the column, which came at an instant, beside the guidance torque that was applied; `law` has the filter of
+    /// the rate.
     pub fn update(
         &mut self,
         law: &Law,
-        least: Ratio,
-        now: Instant,
+        at: Instant,
         wheel: Radians,
         [driver, guidance]: [Torque; 2],
     ) {
-        let passed = now.since(self.at).min(GAP);
+        let passed = at.since(self.at).min(GAP);
         self.rate = if passed == GAP {
             I12F20::ZERO
         } else {
             law.filter(self.rate, self.wheel.fixed(), wheel.fixed(), passed)
         };
-        (self.wheel, self.at) = (wheel, now);
+        (self.wheel, self.at) = (wheel, at);
         let rate = i64::from(self.rate.to_bits());
         // 62 bits, cut to 24 fractional ones: a flipped bit must not make it wrap.
         let square =
@@ -78,9 +68,12 @@ impl Activity {
         let weight = passed.us().saturating_mul(PER_US);
         self.agreement = low_pass(self.agreement, both, weight);
         self.size = low_pass(self.size, both.saturating_abs(), weight);
-        let against = self.against();
-        let taken = share_of(Ratio::ONE.minus(least).fixed(), against);
-        self.share = Ratio::ONE.minus(Ratio::from_fixed(taken));
+    }
+
+    /// The share of (9) that is taken away, where `least` is lambda_min.
+    #[must_use]
+    pub fn taken(&self, least: Ratio) -> Ratio {
+        Ratio::from_fixed(share_of(Ratio::ONE.minus(least).fixed(), self.against()))
     }
 
     /// `max(0, -c)`.

@@ -11,13 +11,12 @@
 //!
 //! Error: at most 1 mN.m from a float64 evaluation at speeds that guide (`core/tests/laws.rs` asserts it).
 
-use fixed::types::{I8F24, I40F24};
+use fixed::types::{I8F24, I12F20, I40F24};
 
 use super::{EgoMotion, LaneSample, Law, LawState};
 use crate::quantity::{
-    AnglePerLength, Instant, Radians, Ratio, Speed, Torque, TorquePerAcceleration, TorquePerAngle,
-    TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TurningRate, TurningRatePerAngle, product,
-    saturate, signed_quotient,
+    AnglePerLength, Instant, Micros, Radians, Ratio, Speed, Torque, TorquePerAcceleration, TorquePerAngle,
+    TorquePerLength, TorquePerTurningRate, TurningRate, TurningRatePerAngle, product, rounded, saturate, signed_quotient,
 };
 use crate::safety::redundant::words;
 
@@ -37,34 +36,65 @@ words! {
     }
 }
 
-/// How the vehicle moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Car {
-    /// v.
-    pub speed: Speed,
-    /// g.
-    pub turning_gain: TurningRatePerAngle,
-    /// r.
-    pub turning: TurningRate,
-    /// phi.
-    pub wheel: Radians,
+words! {
+    /// The gains at a speed, which is new a hundred times a second.
+    pub struct Gains {
+        /// (K + LoHA)*SoHF*k_y.
+        e_y: TorquePerLength,
+        /// (K + LoHA)*SoHF*k_psi.
+        e_theta: TorquePerAngle,
+        /// LoHS*c*v + LoHA/g.
+        turning: TorquePerTurningRate,
+        /// LoHA.
+        wheel: TorquePerAngle,
+    }
 }
 
 /// Largest gain on an error, more than those of (9), which has four terms; that on the rate of the yaw error ends where its format does.
-/// The wide sum of [`Law`] stays inside 64 bits: three times 2^61. `config` refuses choices that need more at a speed that guides.
+/// The wide sum of [`Gains::demanded`] stays inside 64 bits: three times 2^61 and the wheel's 2^57. `config` refuses choices that need
+/// more at a speed that guides.
 const MOST: I40F24 = I40F24::const_from_int(64);
 
 impl Fdca {
-    /// None, for another law.
+    /// The gains at a speed, where the vehicle turns so fast per wheel angle.
+    #[must_use]
+    pub fn gains(&self, speed: Speed, turning_gain: TurningRatePerAngle) -> Gains {
+        let v = speed.fixed();
+        let stiffness = product(
+            saturate(product(self.aligning.fixed(), v)),
+            turning_gain.fixed(),
+        );
+        let both = saturate(stiffness.saturating_add(self.loha.fixed().into()));
+        let gain = |of: I8F24| saturate(product(both, of).min(MOST));
+        // Only who wants authority pays for the division.
+        let held = if self.loha == TorquePerAngle::ZERO {
+            I8F24::ZERO
+        } else {
+            let dividend = i64::from(self.loha.bits()) << I8F24::FRAC_NBITS;
+            let divisor = u32::try_from(turning_gain.bits()).unwrap_or(0);
+            I8F24::from_bits(signed_quotient(dividend, divisor))
+        };
+        let path = product(self.path.fixed(), v).saturating_add(held.into());
+        Gains {
+            e_y: TorquePerLength::from_fixed(gain(self.k_y.fixed())),
+            e_theta: TorquePerAngle::from_fixed(gain(self.k_psi.fixed())),
+            turning: TorquePerTurningRate::from_fixed(saturate(path)),
+            wheel: self.loha,
+        }
+    }
+}
+
+impl Gains {
+    /// Before the first speed.
     pub(crate) const NONE: Self = Self {
-        k_y: AnglePerLength::ZERO,
-        k_psi: Ratio::ZERO,
-        path: TorquePerAcceleration::ZERO,
-        loha: TorquePerAngle::ZERO,
-        aligning: TorquePerAcceleration::ZERO,
+        e_y: TorquePerLength::ZERO,
+        e_theta: TorquePerAngle::ZERO,
+        turning: TorquePerTurningRate::ZERO,
+        wheel: TorquePerAngle::ZERO,
     };
 
-    /// The torque that the law demands now, from the latest sample received; `law` has the filter of the rates.
+    /// The torque demanded now, from the latest sample received, the rate of turn and the wheel angle; `law` has the filter of the
+    /// rates.
     #[must_use]
     pub fn step(
         &self,
@@ -72,59 +102,40 @@ impl Fdca {
         state: &mut LawState,
         now: Instant,
         sample: LaneSample,
-        car: &Car,
+        motion: (TurningRate, Radians),
     ) -> Torque {
         if !state.is_latest(&sample) {
             law.update(state, sample);
         }
-        self.demanded(law, state, now, None, car)
+        self.demanded(state, now, None, motion)
     }
 
-    /// The torque demanded now, from the sample taken last; `law` has the filter of the rates.
-    #[inline(never)]
+    /// The torque demanded now, from the sample taken last. Exact wide products of 20 and 24 fractional bits and one rounding, as
+    /// those of [`Law`].
+    #[inline(always)]
     pub(crate) fn demanded(
         &self,
-        law: &Law,
         state: &LawState,
         now: Instant,
         ego: Option<&EgoMotion>,
-        car: &Car,
+        motion: (TurningRate, Radians),
     ) -> Torque {
-        let gains = self.at(law.tau, car);
-        let lane = gains.demanded(state, now, ego);
-        let path = product(gains.e_theta_rate.fixed(), car.turning.fixed());
-        let held = product(self.loha.fixed(), car.wheel.fixed());
-        Torque::from_wide(
-            I40F24::from(lane.fixed())
-                .saturating_add(path)
-                .saturating_sub(held),
-        )
+        let age = now.since(state.last.at);
+        match ego {
+            None => self.torque(state, age, motion),
+            Some(ego) => self.torque(&state.moved_with(age, ego), age, motion),
+        }
     }
 
-    /// The gains at a speed.
-    fn at(&self, tau: u32, car: &Car) -> Law {
-        let v = car.speed.fixed();
-        let stiffness = product(
-            saturate(product(self.aligning.fixed(), v)),
-            car.turning_gain.fixed(),
-        );
-        let both = saturate(stiffness.saturating_add(self.loha.fixed().into()));
-        let gain = |of: I8F24| saturate(product(both, of).min(MOST));
-        let turning_gain = u32::try_from(car.turning_gain.bits()).unwrap_or(0);
-        // Only who wants authority pays for the division.
-        let held = if self.loha == TorquePerAngle::ZERO {
-            I8F24::ZERO
-        } else {
-            let dividend = i64::from(self.loha.bits()) << I8F24::FRAC_NBITS;
-            I8F24::from_bits(signed_quotient(dividend, turning_gain))
-        };
-        let path = product(self.path.fixed(), v).saturating_add(held.into());
-        Law {
-            e_y: TorquePerLength::from_fixed(gain(self.k_y.fixed())),
-            e_y_rate: TorquePerSpeed::ZERO,
-            e_theta: TorquePerAngle::from_fixed(gain(self.k_psi.fixed())),
-            e_theta_rate: TorquePerTurningRate::from_fixed(saturate(path)),
-            tau,
-        }
+    #[inline(always)]
+    fn torque(&self, state: &LawState, age: Micros, (turning, wheel): (TurningRate, Radians)) -> Torque {
+        let [e_y, e_theta] = state.continued(age);
+        let [turning, wheel] = [turning.fixed(), wheel.fixed()].map(I12F20::wrapping_from_num);
+        let turns = state.e_theta_rate.saturating_add(turning);
+        let sum = (self.e_y.fixed().wide_mul(e_y))
+            .wrapping_add(self.e_theta.fixed().wide_mul(e_theta))
+            .wrapping_add(self.turning.fixed().wide_mul(turns))
+            .wrapping_sub(self.wheel.fixed().wide_mul(wheel));
+        Torque::from_wide(rounded(sum))
     }
 }

@@ -18,8 +18,8 @@
 
 mod fdca;
 
-use crate::safety::redundant::{Optional, words};
-pub(crate) use fdca::{Car, Fdca};
+use crate::safety::redundant::words;
+pub use fdca::{Fdca, Watch};
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -34,10 +34,8 @@ words! {
         pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
         pub(crate) probe_mnm: i32,
-        /// Law, mN.m per m, per rad, per m/s, per rad/s.
+        /// Law, mN.m per m, per rad, per m/s, per rad/s, or [`OF_FDCA`].
         pub(crate) gains_mnm: [i32; 4],
-        /// FDCA in its place.
-        pub(crate) fdca: Optional<Fdca>,
     }
 }
 
@@ -46,8 +44,6 @@ words! {
     pub struct MonitorState {
         pub(crate) step: StepState,
         pub(crate) lane_state: LaneState,
-        /// For FDCA.
-        pub(crate) car: Optional<Car>,
     }
 }
 
@@ -76,7 +72,7 @@ words! {
         /// An older lane sample, for rates, and how much older it is.
         before: Lane,
         older_us: i32,
-        /// What its position asks for, and what its rates ask for beside.
+        /// What its position asks for, and what its rates ask for beside; of FDCA the least that may be, and how much the most is more.
         position_mnm: i32,
         rate_mnm: i32,
     }
@@ -94,13 +90,13 @@ words! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Evidence<'a> {
     /// Bytes of the latest lane preview frame in use, if a new one arrived.
-    pub lane: Option<&'a [u8; 8]>,
+    pub lane: &'a Option<[u8; 8]>,
     /// Bytes of the latest column frame in use, if a new one arrived.
-    pub column: Option<&'a [u8; 8]>,
+    pub column: &'a Option<[u8; 8]>,
     /// Bytes of the latest vehicle frame in use, if a new one arrived.
-    pub vehicle: Option<&'a [u8; 8]>,
+    pub vehicle: &'a Option<[u8; 8]>,
     /// Bytes of the latest command frame in use, if a new one arrived.
-    pub request: Option<&'a [u8; 8]>,
+    pub request: &'a Option<[u8; 8]>,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
@@ -166,23 +162,38 @@ impl MonitorState {
             position_mnm: 0,
             rate_mnm: 0,
         },
-        car: Optional::unused(Car::NEW),
     };
 }
 
+/// In the place of the gains of (9), none of which is negative.
+pub(crate) const OF_FDCA: [i32; 4] = [-1, 0, 0, 0];
+
 impl Monitor {
+    #[inline(always)]
+    const fn is_fdca(&self) -> bool {
+        let [per_m, ..] = self.gains_mnm;
+        per_m.is_negative()
+    }
+
     /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
-    /// `false` it is never renewed.
+    /// `false` it is never renewed. FDCA needs a `watch`.
     #[must_use]
     #[inline(always)]
-    pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
+    pub fn step(
+        &self,
+        state: &mut MonitorState,
+        evidence: &Evidence<'_>,
+        watch: Option<&mut Watch>,
+    ) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if let Some(fdca) = self.fdca.get() {
-            state.drive(fdca, evidence, elapsed_us);
-        } else if state.observe(evidence, elapsed_us) {
-            self.update_demand(state);
+        if !self.is_fdca() {
+            if state.observe(evidence, elapsed_us) {
+                self.update_demand(state);
+            }
+        } else if !watch.is_none_or(|watch| watch.observe(state, evidence, elapsed_us)) {
+            state.step.withdrawn = 1;
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
@@ -214,7 +225,7 @@ impl Monitor {
             && may_fall
             && (torque == 0 || (ACTIVE..=LAST_WITH_TORQUE).contains(&mode))
             && self.leaves_the_driver_in_charge(torque, state.step.driver_mnm)
-            && (mode != ACTIVE || self.follows_the_lane(state, torque, evidence.guidance));
+            && (mode != ACTIVE || self.follows_the_lane(state, torque));
         state.step.torque_mnm = torque;
         state.step.withdrawn |= i32::from(!agrees);
         state.step.withdrawn == 0
@@ -226,7 +237,11 @@ impl Monitor {
     pub const fn with_another_law(self) -> Self {
         Self {
             band_mnm: self.limit_mnm,
-            fdca: Optional::unused(Fdca::NONE),
+            gains_mnm: if self.is_fdca() {
+                [0; 4]
+            } else {
+                self.gains_mnm
+            },
             ..self
         }
     }
@@ -273,17 +288,14 @@ impl Monitor {
     }
 
     #[inline(always)]
-    fn follows_the_lane(&self, state: &mut MonitorState, torque: i32, guidance: &[u8; 8]) -> bool {
+    fn follows_the_lane(&self, state: &mut MonitorState, torque: i32) -> bool {
         if state.step.age_us > OLDEST_LANE_US.saturating_add(COAST_US) && torque != 0 {
             return false;
         }
         // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
         let late_us = state.step.age_us.saturating_sub(PROMPT_LANE_US);
         // Limits, ramps, the authority and the driver's activity can only make the torque smaller: zero is always in the band.
-        let (low, high) = match self.fdca.get() {
-            None => self.range(state, late_us),
-            Some(fdca) => state.range(fdca, late_us, field(guidance, YAW_RATE_FAULT, 1) != 0),
-        };
+        let (low, high) = self.range(state, late_us);
         let probe = if state.step.probe_left_us > 0 {
             self.probe_mnm
         } else {
@@ -303,13 +315,14 @@ impl Monitor {
         state.step.astray_ms <= ASTRAY_MS
     }
 
-    /// From where to where (9) asks for a torque.
+    /// From where to where the law asks for a torque.
     #[inline(always)]
     fn range(&self, state: &MonitorState, late_us: i32) -> (i32, i32) {
         let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
         let both = position.saturating_add(rate);
         let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
-        if late_us >= 1000 {
+        // FDCA's watch knows how late it is.
+        if late_us >= 1000 && !self.is_fdca() {
             let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
             let [per_m, per_rad, ..] = self.gains_mnm;
             let (e_y_mmps, e_theta_urps) = state.rates();
@@ -362,6 +375,7 @@ impl MonitorState {
         let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
         let lane = evidence
             .lane
+            .as_ref()
             .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
         if let Some(bytes) = lane {
             let new = Lane {
@@ -386,46 +400,10 @@ impl MonitorState {
             self.step.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
         }
         self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
-        if evidence.request.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
+        if evidence.request.as_ref().is_some_and(|bytes| field(bytes, 21, 1) != 0) {
             self.step.probe_left_us = PROBE_END_US;
         }
         lane.is_some()
-    }
-
-    /// [`Self::observe`], and what FDCA takes of the frames.
-    #[inline(never)]
-    fn drive(&mut self, fdca: &Fdca, evidence: &Evidence<'_>, elapsed_us: i32) {
-        let (before, age_us) = (self.lane_state.lane, self.step.age_us);
-        let is_new = self.observe(evidence, elapsed_us);
-        let car = self.car.get_mut();
-        car.pass(elapsed_us, says_aside(evidence.guidance));
-        if let Some(bytes) = evidence.column {
-            car.turn_wheel(bytes);
-            // Without authority the wheel angle only stands in for a yaw rate, which comes with the vehicle.
-            if fdca.loha != 0 {
-                car.hear();
-            }
-        }
-        if let Some(bytes) = evidence.vehicle {
-            let is_distrusted = field(evidence.guidance, YAW_RATE_FAULT, 1) != 0;
-            fdca.drive(car, bytes, is_distrusted);
-            car.hear();
-        }
-        if is_new {
-            let apart_us = age_us.saturating_add(elapsed_us).saturating_sub(self.step.age_us);
-            fdca.see(car, &before, &self.lane_state.lane, apart_us);
-            car.hear();
-        }
-    }
-
-    /// From where to where FDCA asks for a torque.
-    #[inline(never)]
-    fn range(&mut self, fdca: &Fdca, late_us: i32, is_distrusted: bool) -> (i32, i32) {
-        let (e_y_mmps, _) = if late_us > 0 { self.rates() } else { (0, 0) };
-        let picture = &self.lane_state;
-        let ages = [late_us.min(LONGEST_LATE_US), picture.came_us];
-        let car = self.car.get_mut();
-        fdca.range(car, &picture.lane, e_y_mmps, ages, is_distrusted)
     }
 
     /// How fast the lane errors move, mm/s and urad/s.
@@ -449,9 +427,6 @@ impl MonitorState {
         (e_y_mmps, e_theta_urps)
     }
 }
-
-/// The place of the fault YawRate in a guidance frame.
-const YAW_RATE_FAULT: u32 = 57;
 
 /// Whether a guidance frame says LaneTimeout or LaneStep.
 #[cold]

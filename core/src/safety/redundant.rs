@@ -69,65 +69,6 @@ impl<T: Words, const N: usize> Words for [T; N] {
     }
 }
 
-/// Words that count only where they are used, because to compare them costs time: a flipped bit among those that are not changes
-/// nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(C)]
-pub struct Optional<T> {
-    is_used: u32,
-    words: T,
-}
-
-impl<T> Optional<T> {
-    /// Words in use.
-    pub(crate) const fn used(words: T) -> Self {
-        Self { is_used: 1, words }
-    }
-
-    /// Words out of use.
-    pub(crate) const fn unused(words: T) -> Self {
-        Self { is_used: 0, words }
-    }
-
-    /// The words, if they are in use.
-    #[inline(always)]
-    #[must_use]
-    pub fn get(&self) -> Option<&T> {
-        (self.is_used != 0).then_some(&self.words)
-    }
-
-    /// The words, which are in use from now on.
-    pub(crate) fn get_mut(&mut self) -> &mut T {
-        self.is_used = 1;
-        &mut self.words
-    }
-}
-
-impl<T: Words> Words for Optional<T> {
-    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
-        // Either copy has to tell.
-        let are_used = matches!(self.is_used, 1 | 0xFFFF_FFFE);
-        Self {
-            is_used: change(self.is_used),
-            words: if are_used {
-                self.words.map_words(change)
-            } else {
-                self.words
-            },
-        }
-    }
-
-    #[inline(always)]
-    fn agreement(&self, other: &Self) -> u32 {
-        let all = self.is_used.agreement(&other.is_used);
-        if self.is_used == 0 {
-            all
-        } else {
-            all & self.words.agreement(&other.words)
-        }
-    }
-}
-
 /// Bytes of a block.
 #[cfg(target_pointer_width = "32")]
 const BLOCK: usize = 16;

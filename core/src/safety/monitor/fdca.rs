@@ -3,6 +3,10 @@
 //! `T = (K + LoHA)*d_fb + (LoHS*c*v + LoHA/g)*(r + de_theta'/dt) - LoHA*phi`, from frames that the monitor decodes itself. The rate
 //! of the yaw error has the law's filter, because this law stands on it: a rate over 50 ms would be wrong by as much as a torque.
 //!
+//! A picture moves the rate in the step in which it comes. The torque is computed a hundred times a second, with a vehicle frame, or a
+//! step later where a picture came with that; without vehicle frames, with the third picture. What the law does between is less
+//! than the time for which it may be astray.
+//!
 //! What an honest law may do otherwise makes a band of it, with zero in it:
 //!
 //! - r may be the measured yaw rate or, where that is not believed, what wheel angle and speed say, with what the two differed by in
@@ -12,13 +16,17 @@
 //!   yaw error may be wrong by [`UNSETTLED_URPS`].
 //! - A sample older than [`super::PROMPT_LANE_US`] may go on at its rates, or the torque stands as it was before.
 //! - A picture that was late when it came goes with the r of then: [`YAW_ACCELERATION`] times its age.
+//!
+//! All of it is kept twice, and compared where it is read.
 
-use super::{Lane, PROMPT_LANE_US, UNSEEN_US, field};
-use crate::safety::redundant::words;
+use super::{
+    Evidence, LONGEST_LATE_US, LaneState, MonitorState, PROMPT_LANE_US, StepState, UNSEEN_US, field, says_aside,
+};
+use crate::safety::redundant::{Redundant, words};
 
 words! {
     /// The choices. Torques per angle are in 1.048576 mN.m/rad, so that their product with urad is 2^20 mN.m.
-    pub(crate) struct Fdca {
+    pub struct Fdca {
         /// SoHF*k_y, 2^-8 urad/mm; SoHF*k_psi, 2^-8.
         pub(crate) k_y: i32,
         pub(crate) k_psi: i32,
@@ -36,7 +44,7 @@ words! {
 
 words! {
     /// What is remembered of vehicle, wheel and yaw error.
-    pub(crate) struct Car {
+    struct Car {
         wheel_urad: i32,
         yaw_urps: i32,
         /// 1 where the last frame had a yaw rate.
@@ -57,12 +65,27 @@ words! {
         unsettled_us: i32,
         /// What was asked for when they last were, and prompt.
         held_mnm: i32,
-        /// From where to where the torque may be, as long as nothing came.
-        least_mnm: i32,
-        most_mnm: i32,
-        /// 1 where something came since.
-        has_news: i32,
+        /// For how long pictures came without a vehicle frame.
+        unjudged_us: i32,
     }
+}
+
+words! {
+    /// What is kept twice.
+    pub(crate) struct Kept {
+        fdca: Fdca,
+        car: Car,
+    }
+}
+
+/// What the monitor needs beside [`super::MonitorState`] where the law is FDCA.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    pub(crate) kept: Redundant<Kept>,
+    /// A vehicle frame that came with a picture.
+    vehicle: Option<[u8; 8]>,
+    /// What may be was computed in this step.
+    pub(crate) has_judged: bool,
 }
 
 /// Two speeds further apart than this are not both right: 2 m/s.
@@ -81,9 +104,13 @@ const UNSETTLED_US: i32 = 200_000;
 const UNSETTLED_URPS: i32 = 100_000;
 /// Two pictures further apart than this share no rate.
 const GAP_US: i32 = 100_000;
+/// Without a vehicle frame for so long, pictures have to do.
+const UNJUDGED_US: i32 = 20_000;
+/// The place of the fault YawRate in a guidance frame.
+const YAW_RATE_FAULT: u32 = 57;
 
 impl Car {
-    pub(crate) const NEW: Self = Self {
+    const NEW: Self = Self {
         wheel_urad: 0,
         yaw_urps: 0,
         has_yaw: 0,
@@ -96,48 +123,95 @@ impl Car {
         apart_us: 0,
         unsettled_us: 0,
         held_mnm: 0,
-        least_mnm: 0,
-        most_mnm: 0,
-        has_news: 1,
+        unjudged_us: 0,
     };
+}
 
-    /// Time passes; `is_aside` says that the law leaves pictures aside.
-    pub(super) fn pass(&mut self, elapsed_us: i32, is_aside: bool) {
-        self.unsettled_us = if is_aside {
-            UNSETTLED_US
-        } else {
-            self.unsettled_us.saturating_sub(elapsed_us).max(0)
-        };
+impl Watch {
+    /// Nothing seen.
+    #[must_use]
+    pub fn new(fdca: Fdca) -> Self {
+        Self {
+            kept: Redundant::new(Kept {
+                fdca,
+                car: Car::NEW,
+            }),
+            vehicle: None,
+            has_judged: false,
+        }
     }
 
-    /// Something came that moves the torque.
-    pub(super) fn hear(&mut self) {
-        self.has_news = 1;
+    /// Takes what came; `false` where the copies of what it needs do not agree.
+    #[inline(never)]
+    pub(super) fn observe(
+        &mut self,
+        state: &mut MonitorState,
+        evidence: &Evidence<'_>,
+        elapsed_us: i32,
+    ) -> bool {
+        self.has_judged = false;
+        let (before, age_us) = (state.lane_state.lane.e_theta_urad, state.step.age_us);
+        let is_new = state.observe(evidence, elapsed_us);
+        if let Some(bytes) = evidence.column {
+            // 0.01 deg are 174.53 urad.
+            let wheel_urad = field(bytes, 30, 18).saturating_mul(11_170) / 64;
+            self.kept.put(|kept| &mut kept.car.wheel_urad, wheel_urad);
+        }
+        if evidence.vehicle.is_some() {
+            self.vehicle = *evidence.vehicle;
+        }
+        if !is_new && self.vehicle.is_none() {
+            return true;
+        }
+        let is_distrusted = field(evidence.guidance, YAW_RATE_FAULT, 1) != 0;
+        let Self {
+            kept,
+            vehicle,
+            has_judged,
+        } = self;
+        kept.change(|Kept { fdca, car }| {
+                if is_new {
+                    let apart_us = age_us.saturating_add(elapsed_us).saturating_sub(state.step.age_us);
+                    let moved = state.lane_state.lane.e_theta_urad.saturating_sub(before);
+                    fdca.see(car, moved, apart_us);
+                    car.unjudged_us = car.unjudged_us.saturating_add(apart_us);
+                    if car.unjudged_us <= UNJUDGED_US {
+                        return;
+                    }
+                }
+                if let Some(bytes) = vehicle.take() {
+                    fdca.drive(car, &bytes, is_distrusted);
+                }
+                car.unjudged_us = 0;
+                *has_judged = true;
+                car.doubt(&state.step, &state.lane_state, says_aside(evidence.guidance));
+                let (least, most) = fdca.range(car, state, is_distrusted);
+                state.lane_state.position_mnm = least;
+                state.lane_state.rate_mnm = most.saturating_sub(least);
+            })
+            .is_some()
+    }
+}
+
+impl Car {
+    /// Pictures are not what the law goes by where it says so, and where there is none for longer than usual.
+    fn doubt(&mut self, step: &StepState, picture: &LaneState, is_aside: bool) {
+        let unseen_us = step.age_us.saturating_sub(picture.came_us);
+        if is_aside || self.is_silence(unseen_us) {
+            self.unsettled_us = UNSETTLED_US;
+        }
     }
 
-    pub(super) fn turn_wheel(&mut self, column: &[u8; 8]) {
-        // 0.01 deg are 174.53 urad.
-        self.wheel_urad = field(column, 30, 18).saturating_mul(11_170) / 64;
+    /// A slow camera is no silence.
+    const fn is_silence(&self, unseen_us: i32) -> bool {
+        unseen_us > UNSEEN_US && unseen_us / 3 > self.apart_us / 2
     }
 }
 
 impl Fdca {
-    /// None, for another law.
-    pub(crate) const NONE: Self = Self {
-        k_y: 0,
-        k_psi: 0,
-        path: 0,
-        aligning: 0,
-        loha: 0,
-        curvature: 0,
-        stability: 0,
-        filter: 0,
-    };
-
     /// Takes a vehicle frame: the gains at its speed, and its yaw rate.
     #[expect(clippy::arithmetic_side_effects, reason = "every divisor is at least one")]
-    #[inline(never)]
-    pub(super) fn drive(&self, car: &mut Car, vehicle: &[u8; 8], is_distrusted: bool) {
+    fn drive(&self, car: &mut Car, vehicle: &[u8; 8], is_distrusted: bool) {
         let (speed, other) = (field(vehicle, 12, 16), field(vehicle, 28, 16));
         if speed.saturating_sub(other).saturating_abs() < SPREAD {
             // 1 + A*v^2 in 2^-16, and g.
@@ -164,10 +238,9 @@ impl Fdca {
         car.has_yaw = i32::from(field(vehicle, 58, 1) != 0);
     }
 
-    /// Takes a picture, so long after the last.
+    /// Takes a picture, so long after the last, in which the yaw error has moved.
     #[expect(clippy::arithmetic_side_effects, reason = "every divisor is at least one")]
-    pub(super) fn see(&self, car: &mut Car, from: &Lane, to: &Lane, apart_us: i32) {
-        let moved = to.e_theta_urad.saturating_sub(from.e_theta_urad);
+    fn see(&self, car: &mut Car, moved: i32, apart_us: i32) {
         let apart = (apart_us / 100).max(0);
         let span = self.filter.saturating_add(apart).max(1);
         let filtered = |rate: i32| {
@@ -177,9 +250,9 @@ impl Fdca {
                 .saturating_div(span);
             rate.saturating_add(change)
         };
-        // A slow camera is no silence.
-        let is_silence = apart_us > UNSEEN_US && apart_us / 3 > car.apart_us / 2;
+        let is_silence = car.is_silence(apart_us);
         car.apart_us = apart_us;
+        car.unsettled_us = car.unsettled_us.saturating_sub(apart_us).max(0);
         let now_urps = if car.has_yaw == 0 {
             times(car.turning, car.wheel_urad, 16)
         } else {
@@ -200,22 +273,12 @@ impl Fdca {
         };
     }
 
-    /// From where to where the torque may be, mN.m: `lane` moves at `e_y_mmps`, is `late_us` older than prompt, and was `came_us`
-    /// old when it came.
-    pub(super) fn range(
-        &self,
-        car: &mut Car,
-        lane: &Lane,
-        e_y_mmps: i32,
-        [late_us, came_us]: [i32; 2],
-        is_distrusted: bool,
-    ) -> (i32, i32) {
+    /// From where to where the torque may be, mN.m.
+    fn range(&self, car: &mut Car, state: &MonitorState, is_distrusted: bool) -> (i32, i32) {
+        let picture = &state.lane_state;
+        let (lane, came_us) = (&picture.lane, picture.came_us);
+        let late_us = state.step.age_us.saturating_sub(PROMPT_LANE_US).min(LONGEST_LATE_US);
         let is_usual = late_us <= 0 && car.unsettled_us <= 0;
-        if is_usual && car.has_news == 0 {
-            return (car.least_mnm, car.most_mnm);
-        }
-        // What is unusual changes with time.
-        car.has_news = i32::from(!is_usual);
         let angle = |e_y_mm: i32, e_theta_urad: i32| {
             times(self.k_y, e_y_mm, 8).saturating_add(times(self.k_psi, e_theta_urad, 8))
         };
@@ -251,6 +314,7 @@ impl Fdca {
         if is_usual {
             car.held_mnm = least.saturating_add(most) / 2;
         } else {
+            let (e_y_mmps, _) = state.rates();
             let late_ms = late_us.max(0) / 1000;
             let moved = |per_s: i32| (per_s / 1000).saturating_mul(late_ms);
             let went_on = position(angle(
@@ -260,8 +324,7 @@ impl Fdca {
             least = least.min(went_on.saturating_add(low)).min(car.held_mnm);
             most = most.max(went_on.saturating_add(high)).max(car.held_mnm);
         }
-        (car.least_mnm, car.most_mnm) = (least.min(0), most.max(0));
-        (car.least_mnm, car.most_mnm)
+        (least.min(0), most.max(0))
     }
 }
 
