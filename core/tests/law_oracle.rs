@@ -1,6 +1,6 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
-use haptic_core::controller::config::Config;
+use haptic_core::controller::config::{Config, Setup};
 use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
 use haptic_core::controller::params::Params;
 use haptic_core::controller::{Controller, ControllerState};

@@ -14,7 +14,7 @@
 use crate::controller::params::{DRIVER_ACTIVITY, FDCA, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::fdca::Fdca;
-use crate::law::Law;
+use crate::law::{Choice, Law};
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
@@ -41,8 +41,6 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
-        /// The law, and what driver activity leaves of (9) at least: one for (9) itself, minus one for FDCA.
-        pub(crate) least_share: Ratio,
     }
 }
 
@@ -51,6 +49,8 @@ words! {
     pub struct OtherLaws {
         /// The choices of FDCA.
         pub fdca: Fdca,
+        /// The least share of (9) that driver activity leaves.
+        pub least_share: Ratio,
     }
 }
 
@@ -101,12 +101,6 @@ impl Config {
         }
     }
 
-    /// Whether FDCA is in the place of (9).
-    #[inline(always)]
-    pub(crate) fn is_fdca(&self) -> bool {
-        self.least_share < Ratio::ZERO
-    }
-
     /// The configuration of parameters that are in range.
     const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
@@ -116,7 +110,8 @@ impl Config {
                 e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
                 e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
                 e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
-                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
+                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32
+                    | choice_of(p).bits(),
             },
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
@@ -138,13 +133,6 @@ impl Config {
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
-            least_share: Ratio::from_si(if p.law == FDCA {
-                -1.0
-            } else if p.law == DRIVER_ACTIVITY {
-                p.activity_lambda_min
-            } else {
-                1.0
-            }),
         }
     }
 }
@@ -161,7 +149,18 @@ impl OtherLaws {
                 loha: TorquePerAngle::from_nm_per_rad(p.fdca_loha_nm_per_rad),
                 aligning: TorquePerAcceleration::from_nm_s2_per_m(aligning),
             },
+            least_share: Ratio::from_si(p.activity_lambda_min),
         }
+    }
+}
+
+const fn choice_of(p: &Params) -> Choice {
+    if p.law == FDCA {
+        Choice::Fdca
+    } else if p.law == DRIVER_ACTIVITY {
+        Choice::DriverActivity
+    } else {
+        Choice::Paper
     }
 }
 

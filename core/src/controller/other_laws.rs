@@ -8,6 +8,7 @@
 use super::Memory;
 use crate::controller::config::{Config, OtherLaws};
 use crate::controller::inputs::Inputs;
+use crate::law::Choice;
 use crate::law::activity::Activity;
 use crate::law::fdca::Gains;
 use crate::quantity::{Ratio, Torque};
@@ -18,6 +19,8 @@ use crate::safety::redundant::Redundant;
 pub(crate) struct OtherState {
     /// Of FDCA, at the speed in use. Compared where it is read: (9) does not pay for it.
     pub(crate) gains: Redundant<Gains>,
+    /// What driver activity leaves of (9).
+    pub(crate) share: Redundant<Ratio>,
     /// Not kept twice (`law::activity` says why).
     activity: Activity,
 }
@@ -26,6 +29,7 @@ impl OtherState {
     pub(super) fn new() -> Self {
         Self {
             gains: Redundant::new(Gains::NONE),
+            share: Redundant::new(Ratio::ONE),
             activity: Activity::NEW,
         }
     }
@@ -41,8 +45,9 @@ impl OtherState {
         applied: Torque,
         inputs: &Inputs,
     ) -> Option<()> {
-        if config.is_fdca() {
-            let (laws, motion) = (laws.get()?, &memory.plausibility);
+        let laws = laws.get()?;
+        if config.law.is(Choice::Fdca) {
+            let motion = &memory.plausibility;
             let gains = laws.fdca.gains(motion.speed(), motion.turning_gain());
             return self.gains.change(|kept| *kept = gains);
         }
@@ -50,12 +55,7 @@ impl OtherState {
             let (at, torques) = (memory.input_times.column, [column.driver_torque, applied]);
             self.activity.update(&config.law, at, column.wheel_angle, torques);
         }
-        Some(())
-    }
-
-    /// The share of (9) that driver activity leaves, where it may leave so little: of that alone is more than one copy.
-    pub(super) fn share(&self, least: Ratio) -> Ratio {
-        let taken = self.activity.taken(least);
-        Ratio::ONE.minus(taken).max(least).min(Ratio::ONE)
+        let share = Ratio::ONE.minus(self.activity.taken(laws.least_share));
+        self.share.change(|kept| *kept = share)
     }
 }

@@ -7,7 +7,7 @@ use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
 use crate::controller::other_laws::OtherState;
 use crate::law::probe::ProbeState;
-use crate::law::{EgoMotion, LaneSample, LawState};
+use crate::law::{Choice, EgoMotion, LaneSample, LawState};
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
@@ -142,7 +142,7 @@ impl<I: Injection> Step<'_, I> {
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
                 // FDCA stands on its rates, so they must not stand still while trust comes back.
-                let goes_by_pictures = self.config.is_fdca() && v.coast.sees();
+                let goes_by_pictures = self.config.law.is(Choice::Fdca) && v.coast.sees();
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
                     PictureVerdict::Expected if goes_by_pictures => {}
                     PictureVerdict::Expected => v.law.relocate(sample),
@@ -198,12 +198,10 @@ impl<I: Injection> Step<'_, I> {
 
         if let Input::New(motion) = motion {
             self.update_motion(v, changed, motion, motion_history, &mut kept);
-            if self.config.least_share < Ratio::ONE {
+            if !self.config.law.is(Choice::Paper) {
                 pending.other_law = true;
-                if !self.config.is_fdca() {
-                    let left = self.others.share(self.config.least_share);
-                    v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
-                }
+                let left = self.others.share.get().copied().unwrap_or(Ratio::ZERO);
+                v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
             }
         }
         if fast_enough != Some(true) {
@@ -395,7 +393,7 @@ impl<I: Injection> Step<'_, I> {
     /// What the law demands by the sample taken last.
     #[inline(always)]
     fn law(&self, v: &Memory, sample: LaneSample) -> Torque {
-        if self.config.is_fdca() {
+        if self.config.law.is(Choice::Fdca) {
             return self.fdca(v, sample);
         }
         let ego = self.ego_motion(v, sample);

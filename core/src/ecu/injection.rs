@@ -138,6 +138,7 @@ impl Ecu {
             Region::Fdca => {
                 flip(&mut self.controller.others, bit, &mut words);
                 flip(&mut self.state.others.gains, bit, &mut words);
+                flip(&mut self.state.others.share, bit, &mut words);
                 flip(&mut self.watch.kept, bit, &mut words);
             }
         }

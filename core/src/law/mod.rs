@@ -57,9 +57,32 @@ pub struct Law {
     pub(crate) e_theta: TorquePerAngle,
     /// K_1*a4'.
     pub(crate) e_theta_rate: TorquePerTurningRate,
-    /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner.
+    /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner. Its upper two bits are a
+    /// [`Choice`], as a word of its own would have to be compared in every step.
     pub(crate) tau: u32,
 }
+}
+
+/// The law in use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Choice {
+    /// Equation (9).
+    Paper = 0,
+    /// [`fdca`] in its place.
+    Fdca = 1,
+    /// A share of (9) by the driver's [`activity`].
+    DriverActivity = 2,
+}
+
+/// Bits of [`Law::tau`] that are the time constant: the longest has 27.
+const TAU_BITS: u32 = 30;
+
+impl Choice {
+    /// Its bits of [`Law::tau`].
+    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
+    pub(crate) const fn bits(self) -> u32 {
+        (self as u32) << TAU_BITS
+    }
 }
 
 words! {
@@ -195,6 +218,16 @@ const GAP: Micros = Micros::from_ms(100);
 pub const MAX_RATE: u32 = 1000;
 
 impl Law {
+    const fn tau(&self) -> u32 {
+        self.tau & ((1 << TAU_BITS) - 1)
+    }
+
+    /// Whether this law is in use.
+    #[inline(always)]
+    pub(crate) const fn is(&self, choice: Choice) -> bool {
+        self.tau >> TAU_BITS == choice.bits() >> TAU_BITS
+    }
+
     /// The torque that the law demands now, from the latest sample received and the vehicle's motion since.
     #[must_use]
     pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, ego: &EgoMotion) -> Torque {
@@ -239,7 +272,7 @@ impl Law {
     #[inline(always)]
     fn filter(&self, rate: I12F20, from: I8F24, to: I8F24, dt: Micros) -> I12F20 {
         const MOST: u32 = MAX_RATE << I12F20::FRAC_NBITS;
-        let tau = i64::from(self.tau);
+        let tau = i64::from(self.tau());
         // 2^8 for the format of tau, 2^-4 from the errors' 24 fractional bits to the rates' 20.
         let change = i64::from(to.to_bits())
             .saturating_sub(i64::from(from.to_bits()))
@@ -247,7 +280,7 @@ impl Law {
         // 32 bits times 31.
         let sum = tau.wrapping_mul(i64::from(rate.to_bits())).saturating_add(change);
         // At most 100 ms and 320 ms, in 2^-8 us.
-        let span = self.tau.saturating_add(dt.us().saturating_mul(1 << 8));
+        let span = self.tau().saturating_add(dt.us().saturating_mul(1 << 8));
         // Rounded to nearest.
         let size = sum.unsigned_abs().saturating_add(u64::from(span >> 1));
         let size = I12F20::from_bits(quotient(size, span).min(MOST).cast_signed());
