@@ -1,6 +1,6 @@
 //! The fixed-point law against a float64 oracle of the same discrete law, over the whole input range.
 
-use haptic_core::controller::config::{Config, Setup};
+use haptic_core::controller::config::Config;
 use haptic_core::controller::inputs::{ColumnState, Input, Inputs, Motion, Request};
 use haptic_core::controller::params::Params;
 use haptic_core::controller::{Controller, ControllerState};
@@ -270,7 +270,7 @@ fn errors_go_on_at_their_rates_for_half_a_second_at_most() {
 /// the torque: `K_1*a_1*e_y` once it has wound up.
 #[test]
 fn the_controller_alone_gives_the_law() {
-    let controller = Controller::new(&Setup::PAPER);
+    let controller = Controller::new(Config::new(&Params::PAPER).unwrap());
     for e_y in [-0.6, 0.4] {
         let mut state = ControllerState::engaged(Instant::from_us(0));
         let mut applied = Torque::ZERO;

@@ -1,15 +1,11 @@
-//! The laws that ship beside equation (9), against float64 evaluations of the same discrete laws, and what the monitor makes of
-//! each where it is wrong.
+//! The law that ships beside equation (9), driver activity, against a float64 evaluation of the same discrete law, and what the monitor
+//! makes of each where it is wrong.
 
 use haptic_core::controller::config::Setup;
-use haptic_core::controller::params::{DRIVER_ACTIVITY, FDCA, Params};
+use haptic_core::controller::params::{DRIVER_ACTIVITY, Params};
 use haptic_core::ecu::Boot;
-use haptic_core::ecu::injection::Region;
 use haptic_core::law::activity::Activity;
-use haptic_core::law::{LaneSample, LawState};
-use haptic_core::quantity::{
-    Instant, Metres, Micros, Radians, Ratio, Speed, Torque, TurningRate, TurningRatePerAngle,
-};
+use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Torque};
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
@@ -36,65 +32,6 @@ impl Rate {
 
 const fn tau_s(p: &Params) -> f64 {
     1.0 / (2.0 * std::f64::consts::PI * p.rate_corner_hz)
-}
-
-/// From the slowest speed that guides to the fastest that the bus carries, with every choice; errors of all sizes.
-#[test]
-fn fdca_is_within_1_mnm_of_its_equation() {
-    let mut rng = SmallRng::seed_from_u64(11);
-    let (mut worst, mut drives) = (0.0_f64, 0);
-    while drives < 300 {
-        let p = Params {
-            law: FDCA,
-            fdca_k_y_rad_per_m: rng.random_range(0.0..1.0),
-            fdca_k_psi: rng.random_range(0.0..5.0),
-            fdca_lohs: rng.random_range(0.0..1.2),
-            fdca_sohf: rng.random_range(0.0..2.0),
-            fdca_loha_nm_per_rad: [0.0, 2.0, rng.random_range(0.0..10.0)][drives % 3],
-            rate_corner_hz: [3.0, 10.0, 30.0][drives % 3],
-            ..Params::PAPER
-        };
-        let Ok(setup) = Setup::new(&p) else { continue };
-        drives += 1;
-        let law = setup.config.law;
-        let (mut state, mut rates) = (LawState::NEW, [Rate::default(), Rate::default()]);
-        let v: f64 = rng.random_range(5.0..90.0);
-        let g = v * p.vehicle.curvature_gain_per_m / (1.0 + p.vehicle.stability_factor_s2_per_m2 * v * v);
-        let (speed, turning_gain) = (Speed::from_m_per_s(v), TurningRatePerAngle::from_per_s(g));
-        let gains = setup.others.fdca.gains(speed, turning_gain);
-        let (mut y, mut theta) = (0.0_f64, 0.0_f64);
-        for k in 1..400_u32 {
-            y = (y + rng.random_range(-0.05..0.05)).clamp(-4.0, 4.0);
-            theta = (theta + rng.random_range(-0.005..0.005)).clamp(-0.5, 0.5);
-            let at = Instant::from_us(8333 * k);
-            let sample = LaneSample {
-                e_y: Metres::from_m(y),
-                e_theta: Radians::from_rad(theta),
-                at,
-            };
-            let t_s = 8333e-6 * f64::from(k);
-            rates[0].take(t_s, y, tau_s(&p));
-            rates[1].take(t_s, theta, tau_s(&p));
-            let (turning, wheel) = (rng.random_range(-0.5..0.5), rng.random_range(-3.0..3.0));
-            let motion = (TurningRate::from_rad_per_s(turning), Radians::from_rad(wheel));
-            let age_us = k * 7 % 31 * 1000;
-            let now = at.after(Micros::from_us(age_us));
-            let asked = gains.step(&law, &mut state, now, sample, motion);
-            let age_s = f64::from(age_us) * 1e-6;
-            let [y_rate, theta_rate] = [rates[0].rate, rates[1].rate];
-            let back = p.fdca_sohf
-                * (p.fdca_k_y_rad_per_m * (y + y_rate * age_s) + p.fdca_k_psi * (theta + theta_rate * age_s));
-            let forward = (turning + theta_rate) / g;
-            let stiffness = p.vehicle.aligning_gain_nm_s2_per_m * v * g;
-            let expected = p.fdca_loha_nm_per_rad * (back + forward - wheel)
-                + stiffness * (p.fdca_lohs * forward + back);
-            if expected.abs() < 20.0 {
-                worst = worst.max((asked.nm() - expected).abs());
-            }
-        }
-    }
-    println!("FDCA: at most {:.4} mN.m apart", worst * 1e3);
-    assert!(worst < 1e-3, "{worst} N.m");
 }
 
 #[test]
@@ -127,8 +64,9 @@ fn the_share_of_driver_activity_is_within_1_percent_of_its_equation() {
             let expected = 1.0 - (1.0 - least) * against;
             let torques = [driver, guidance].map(Torque::from_nm);
             let now = Instant::from_us(1000 * ms);
-            activity.update(&law, now, wheel, torques);
-            let share = 1.0 - activity.taken(Ratio::from_si(least)).si();
+            let least_share = Ratio::from_si(least);
+            activity.update(&law, least_share, now, wheel, torques);
+            let share = activity.share(least_share).si();
             assert!((least - 1e-6..=1.0).contains(&share), "{share}");
             least_seen = least_seen.min(share);
             // Until something was felt, the first LSB decides.
@@ -151,9 +89,9 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
             let wheel = Radians::from_rad(1e-4 * f64::from(ms));
             let torques = [driver, 0.5].map(Torque::from_nm);
             let now = Instant::from_us(1000 * ms);
-            activity.update(&law, now, wheel, torques);
+            activity.update(&law, Ratio::from_si(0.25), now, wheel, torques);
         }
-        let share = 1.0 - activity.taken(Ratio::from_si(0.25)).si();
+        let share = activity.share(Ratio::from_si(0.25)).si();
         assert!((share - expected).abs() < 1e-5, "{driver}: {share}");
     }
 }
@@ -162,21 +100,12 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
 fn in_curve(params: &Params, yaw_rate: f64) -> (Rig, f64) {
     let mut rig = Rig::new(Some(&Setup::new(params).unwrap()), Boot::default());
     let v = &params.vehicle;
-    let g = SPEED * v.curvature_gain_per_m / (1.0 + v.stability_factor_s2_per_m2 * SPEED * SPEED);
     rig.turn(yaw_rate);
     let (e_y, e_theta) = (0.1, 0.7 * yaw_rate);
     rig.lane.e_y = Metres::from_m(e_y);
     rig.lane.e_theta = Radians::from_rad(e_theta);
     rig.aligning = v.aligning_gain_nm_s2_per_m * SPEED * yaw_rate;
-    // 0.9 m/s further along the near point's line: it stands still where the line turns with the vehicle.
-    let back = params.fdca_sohf * (params.fdca_k_y_rad_per_m * e_y + params.fdca_k_psi * e_theta);
-    let (forward, stiffness) = (yaw_rate / g, v.aligning_gain_nm_s2_per_m * SPEED * g);
-    let asked = if params.law == FDCA {
-        params.fdca_loha_nm_per_rad * (back + forward - rig.wheel)
-            + stiffness * (params.fdca_lohs * forward + back)
-    } else {
-        params.k_1 * (params.a_1 * e_y + params.a_3 * e_theta)
-    };
+    let asked = params.k_1 * (params.a_1 * e_y + params.a_3 * e_theta);
     rig.run(600);
     rig.engage = true;
     let last = rig.run(1500);
@@ -184,26 +113,15 @@ fn in_curve(params: &Params, yaw_rate: f64) -> (Rig, f64) {
     (rig, asked)
 }
 
-fn fdca(loha: f64) -> Params {
-    Params {
-        law: FDCA,
-        fdca_lohs: 0.7,
-        fdca_loha_nm_per_rad: loha,
-        ..Params::PAPER
-    }
-}
+const ACTIVITY: Params = Params {
+    law: DRIVER_ACTIVITY,
+    ..Params::PAPER
+};
 
 #[test]
 fn the_ecu_gives_what_the_chosen_law_asks_for() {
     for sign in [1.0, -1.0] {
-        for params in [
-            fdca(0.0),
-            fdca(2.0),
-            Params {
-                law: DRIVER_ACTIVITY,
-                ..Params::PAPER
-            },
-        ] {
+        for params in [Params::PAPER, ACTIVITY] {
             let (rig, asked) = in_curve(&params, sign * 0.05);
             // Nobody turns the wheel, so activity takes nothing.
             assert!((rig.applied - asked).abs() < 5e-3, "{} {asked}", rig.applied);
@@ -224,14 +142,7 @@ fn refused_after(rig: &Rig, lie: f64) -> Option<u32> {
 #[test]
 fn the_monitor_knows_each_law() {
     for sign in [1.0, -1.0] {
-        for params in [
-            fdca(0.0),
-            fdca(2.0),
-            Params {
-                law: DRIVER_ACTIVITY,
-                ..Params::PAPER
-            },
-        ] {
+        for params in [Params::PAPER, ACTIVITY] {
             let (rig, asked) = in_curve(&params, sign * 0.05);
             for harmless in [asked, 0.5 * asked, 0.0, asked + sign * 0.28, -sign * 0.28] {
                 assert_eq!(
@@ -250,42 +161,4 @@ fn the_monitor_knows_each_law() {
             assert!(turned.abs_diff(way) <= 6, "{} {turned} {way}", params.law);
         }
     }
-}
-
-/// A frame says what FDCA stands on, each without a word of the others: a monitor that took no notice would refuse the torque that
-/// follows.
-#[test]
-fn the_monitor_follows_vehicle_wheel_and_picture() {
-    let (rig, asked) = in_curve(&fdca(2.0), 0.03);
-    type Turn = fn(&mut Rig);
-    let turns: [(&str, Turn); 3] = [
-        ("the yaw rate, and the wheel with it", |rig| rig.turn(0.07)),
-        ("the speed", |rig| rig.speeds = [SPEED + 0.9; 2]),
-        ("the picture", |rig| rig.lane.e_theta = Radians::from_rad(0.055)),
-    ];
-    for (what, turn) in turns {
-        let mut rig = rig.clone();
-        turn(&mut rig);
-        for _ in 0..400 {
-            let command = rig.tick().command;
-            assert!(!command.faults.contains(Fault::Monitor), "{what}");
-        }
-        println!("{what}: from {asked:.3} to {:.3} N.m", rig.applied);
-    }
-}
-
-/// What FDCA needs beside is compared where it is read, a hundred times a second.
-#[test]
-fn every_flip_in_what_fdca_needs_ends_guidance_within_11_ms() {
-    let (rig, _) = in_curve(&fdca(2.0), 0.05);
-    let bits = rig.ecu.redundant_bits(Region::Fdca);
-    let mut flips = 0;
-    for bit in 0..bits {
-        let mut rig = rig.clone();
-        rig.ecu.flip_bit(Region::Fdca, bit);
-        let last = rig.run(11);
-        assert!(last.command.mode == Mode::Fault && last.command.torque == Torque::ZERO, "bit {bit}: {:?}", last.command);
-        flips += 1;
-    }
-    assert!(flips > 1500, "{flips} flips");
 }

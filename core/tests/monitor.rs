@@ -55,14 +55,13 @@ impl Bench {
 
     fn show(&mut self, lane: Option<[u8; 8]>, column: Option<[u8; 8]>, frame: [u8; 8], us: u32) -> bool {
         let evidence = Evidence {
-            lane: &lane,
-            column: &column,
-            vehicle: &None,
-            request: &None,
+            lane: lane.as_ref(),
+            column: column.as_ref(),
+            request: None,
             guidance: &frame,
             elapsed_us: us,
         };
-        self.monitor.step(&mut self.state, &evidence, None)
+        self.monitor.step(&mut self.state, &evidence)
     }
 
     fn torque(&mut self, torque: i64, mode: u64) -> bool {

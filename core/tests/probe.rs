@@ -174,15 +174,14 @@ fn the_monitor_widens_its_band_only_while_it_is_asked_for() {
         (0..5_000).find(|ms| {
             let request = request(*ms < until);
             let evidence = Evidence {
-                lane: &Some(lane),
-                column: &None,
-                vehicle: &None,
-                request: &ms.is_multiple_of(10).then_some(request),
+                lane: Some(&lane),
+                column: None,
+                request: ms.is_multiple_of(10).then_some(&request),
                 guidance: &guidance,
                 elapsed_us,
             };
             let state_before = state;
-            let permitted = monitor.step(&mut state, &evidence, None);
+            let permitted = monitor.step(&mut state, &evidence);
             // The first step grows too fast for the monitor; it is not what this is about.
             if *ms == 0 && !permitted {
                 state = grown(&monitor, state_before, &request);
@@ -217,14 +216,13 @@ fn grown(monitor: &Monitor, mut state: MonitorState, request: &[u8; 8]) -> Monit
         };
         let guidance = bytes(&guidance.encode(0));
         let evidence = Evidence {
-            lane: &Some(lane),
-            column: &None,
-            vehicle: &None,
-            request: &Some(*request),
+            lane: Some(&lane),
+            column: None,
+            request: Some(request),
             guidance: &guidance,
             elapsed_us: 1_000,
         };
-        assert!(monitor.step(&mut state, &evidence, None));
+        assert!(monitor.step(&mut state, &evidence));
     }
     state
 }

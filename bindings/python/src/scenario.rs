@@ -191,6 +191,12 @@ impl Scenario {
             Some(_) => Path::new(""),
             None => &self.folder,
         };
+        // A speed takes the place of the other form of it.
+        for (one, other) in [("speed", "speed_m_per_s"), ("speed_m_per_s", "speed")] {
+            if changes.contains_key(one) {
+                merged.remove(other);
+            }
+        }
         for (name, value) in changes {
             match (merged.get_mut(&name), value) {
                 (Some(Value::Table(old)), Value::Table(new))

@@ -11,25 +11,24 @@
     reason = "parameters are SI values in f64, turned into bits at compile time or before the first step"
 )]
 
-use crate::controller::params::{DRIVER_ACTIVITY, FDCA, ParamError, Params, in_range};
+use crate::controller::params::{DRIVER_ACTIVITY, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
-use crate::law::fdca::Fdca;
-use crate::law::{Choice, Law};
+use crate::law::Law;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
-    AnglePerLength, CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque,
-    TorquePerAcceleration, TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
+    CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
+    TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
-use crate::safety::monitor::{self, Monitor};
+use crate::safety::monitor::Monitor;
 use crate::safety::plausibility::Plausibility;
 use crate::safety::redundant::words;
 
 words! {
     /// The checked configuration of every block of the controller.
     pub struct Config {
-        /// Equation (9), and the filter of the rates.
+        /// Equation (9).
         pub law: Law,
         /// Torque limits.
         pub envelope: Envelope,
@@ -41,15 +40,7 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
-    }
-}
-
-words! {
-    /// What the laws beside (9) take from the parameters.
-    pub struct OtherLaws {
-        /// The choices of FDCA.
-        pub fdca: Fdca,
-        /// The least share of (9) that driver activity leaves.
+        /// What driver activity leaves of (9) at least: all of it where the law is (9) itself.
         pub least_share: Ratio,
     }
 }
@@ -79,6 +70,15 @@ impl Config {
         if let Err(error) = p.check() {
             return Err(error);
         }
+        if p.law != 0.0 && p.law != DRIVER_ACTIVITY {
+            return Err(ParamError {
+                name: "law",
+                value: p.law,
+                min: 0.0,
+                max: DRIVER_ACTIVITY,
+                unit: "in whole numbers",
+            });
+        }
         let slope = 2.0 * core::f64::consts::PI * p.probe_amplitude_nm * p.probe_frequency_hz;
         let gains = [0.0, MAX_GAIN];
         let products = [
@@ -95,10 +95,7 @@ impl Config {
             }
             i += 1;
         }
-        match check_law(p) {
-            Ok(()) => Ok(Self::from_params(p)),
-            Err(error) => Err(error),
-        }
+        Ok(Self::from_params(p))
     }
 
     /// The configuration of parameters that are in range.
@@ -110,8 +107,7 @@ impl Config {
                 e_y_rate: TorquePerSpeed::from_nm_s_per_m(p.k_1 * p.a_2),
                 e_theta: TorquePerAngle::from_nm_per_rad(p.k_1 * p.a_3),
                 e_theta_rate: TorquePerTurningRate::from_nm_s_per_rad(p.k_1 * p.a_4),
-                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32
-                    | choice_of(p).bits(),
+                tau: (256e6 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as u32,
             },
             envelope: Envelope {
                 absolute: Torque::from_nm(p.torque_limit_nm),
@@ -133,34 +129,12 @@ impl Config {
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
+            least_share: Ratio::from_si(if p.law == DRIVER_ACTIVITY {
+                p.activity_lambda_min
+            } else {
+                1.0
+            }),
         }
-    }
-}
-
-impl OtherLaws {
-    /// Of parameters that are in range.
-    const fn from_params(p: &Params) -> Self {
-        let aligning = p.vehicle.aligning_gain_nm_s2_per_m;
-        Self {
-            fdca: Fdca {
-                k_y: AnglePerLength::from_rad_per_m(p.fdca_sohf * p.fdca_k_y_rad_per_m),
-                k_psi: Ratio::from_si(p.fdca_sohf * p.fdca_k_psi),
-                path: TorquePerAcceleration::from_nm_s2_per_m(p.fdca_lohs * aligning),
-                loha: TorquePerAngle::from_nm_per_rad(p.fdca_loha_nm_per_rad),
-                aligning: TorquePerAcceleration::from_nm_s2_per_m(aligning),
-            },
-            least_share: Ratio::from_si(p.activity_lambda_min),
-        }
-    }
-}
-
-const fn choice_of(p: &Params) -> Choice {
-    if p.law == FDCA {
-        Choice::Fdca
-    } else if p.law == DRIVER_ACTIVITY {
-        Choice::DriverActivity
-    } else {
-        Choice::Paper
     }
 }
 
@@ -174,10 +148,6 @@ const fn phase_per_us(frequency_hz: f64) -> u32 {
 /// times the difference of their delays: the errors' second derivatives are up to 4 m/s2 and 1 rad/s2 on a road. Noise
 /// of 15 mm and 1.5 mrad, three times what a camera has, moves the law's rates by its share of a sample.
 const fn monitor_band_nm(p: &Params) -> f64 {
-    if p.law == FDCA {
-        // The monitor's own FDCA has the law's filter.
-        return LEAST_BAND_NM;
-    }
     let tau_s = 1.0 / (2.0 * core::f64::consts::PI * p.rate_corner_hz);
     let apart_s = f64::max(tau_s - 0.02, 0.06 - tau_s);
     let noise_per_s = 1.5 / (tau_s + 1.0 / 120.0);
@@ -189,89 +159,13 @@ const fn monitor_band_nm(p: &Params) -> f64 {
     f64::max(LEAST_BAND_NM, 2.0 * (a_rate + theta_rate + ahead) + carried)
 }
 
-/// The fastest that the bus carries, m/s.
-const FASTEST_M_PER_S: f64 = 90.0;
-/// Largest gains of FDCA, N.m per unit, as [`MAX_GAIN`]: three terms have more room than four.
-const MAX_FDCA_GAIN: f64 = 64.0;
-const MAX_TURNING_GAIN: f64 = 127.0;
-
-/// Whether the law is one of the list, and its gains are what its sum holds, from the slowest speed that guides to the fastest.
-const fn check_law(p: &Params) -> Result<(), ParamError> {
-    if p.law != (p.law as u32) as f64 {
-        return Err(ParamError {
-            name: "law",
-            value: p.law,
-            min: 0.0,
-            max: DRIVER_ACTIVITY,
-            unit: "in whole numbers",
-        });
-    }
-    if p.law != FDCA {
-        return Ok(());
-    }
-    let [slow, fast] = [
-        fdca_gains(p, p.least_speed_m_per_s),
-        fdca_gains(p, FASTEST_M_PER_S),
-    ];
-    let gain = [0.0, MAX_FDCA_GAIN];
-    let turning = [0.0, MAX_TURNING_GAIN];
-    let products = [
-        in_range(
-            "fdca_sohf * fdca_k_psi",
-            p.fdca_sohf * p.fdca_k_psi,
-            [0.0, 100.0],
-            "1",
-        ),
-        in_range("FDCA's gain on e_y' at the fastest", fast[0], gain, "N.m/m"),
-        in_range("FDCA's gain on e_theta' at the fastest", fast[1], gain, "N.m/rad"),
-        in_range(
-            "FDCA's gain on the rate of turn at the slowest",
-            slow[2],
-            turning,
-            "N.m.s/rad",
-        ),
-        in_range(
-            "FDCA's gain on the rate of turn at the fastest",
-            fast[2],
-            turning,
-            "N.m.s/rad",
-        ),
-    ];
-    let mut i = 0;
-    while i < products.len() {
-        if let Err(error) = products[i] {
-            return Err(error);
-        }
-        i += 1;
-    }
-    Ok(())
-}
-
-/// Gains of FDCA at a speed: on e_y', on e_theta', on the rate of turn. The first two grow with it, the last is largest at one of
-/// the ends.
-const fn fdca_gains(p: &Params, v: f64) -> [f64; 3] {
-    let car = &p.vehicle;
-    let turning_gain = v * car.curvature_gain_per_m / (1.0 + car.stability_factor_s2_per_m2 * v * v);
-    let sideways = car.aligning_gain_nm_s2_per_m * v;
-    let both = sideways * turning_gain + p.fdca_loha_nm_per_rad;
-    [
-        p.fdca_sohf * p.fdca_k_y_rad_per_m * both,
-        p.fdca_sohf * p.fdca_k_psi * both,
-        p.fdca_lohs * sideways + p.fdca_loha_nm_per_rad / turning_gain,
-    ]
-}
-
 /// Everything that parameters decide: the controller's configuration, the monitor's and the estimator's.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup {
     /// Law, envelope, plausibility.
     pub config: Config,
-    /// The laws beside (9).
-    pub others: OtherLaws,
     /// The monitor's own limits.
     pub monitor: Monitor,
-    /// The monitor's own FDCA.
-    pub watch: monitor::Fdca,
     /// The estimator of K_hg.
     pub estimator: Estimator,
 }
@@ -280,9 +174,7 @@ impl Setup {
     /// The paper's parameters.
     pub const PAPER: Self = Self {
         config: Config::PAPER,
-        others: OtherLaws::from_params(&Params::PAPER),
         monitor: Monitor::new(&Params::PAPER),
-        watch: monitor::Fdca::new(&Params::PAPER),
         estimator: Estimator::new(&Params::PAPER),
     };
 
@@ -299,9 +191,7 @@ impl Setup {
         match in_range(BAND, monitor_band_nm(p), [LEAST_BAND_NM, MOST_BAND_NM], "N.m") {
             Ok(()) => Ok(Self {
                 config,
-                others: OtherLaws::from_params(p),
                 monitor: Monitor::new(p),
-                watch: monitor::Fdca::new(p),
                 estimator: Estimator::new(p),
             }),
             Err(error) => Err(error),
@@ -351,35 +241,12 @@ impl Monitor {
             fall_mnm_per_ms: (p.reduction_nm_per_s + 0.999) as i32,
             band_mnm: (monitor_band_nm(p) * 1e3 + 0.5) as i32,
             probe_mnm: (p.probe_amplitude_nm * 1e3 + 0.999) as i32,
-            gains_mnm: if p.law == FDCA {
-                monitor::OF_FDCA
-            } else {
-                [
-                    (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
-                    (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
-                    (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
-                    (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
-                ]
-            },
-        }
-    }
-}
-
-impl monitor::Fdca {
-    /// The monitor's own FDCA, in its units.
-    const fn new(p: &Params) -> Self {
-        let car = &p.vehicle;
-        // mN.m per rad, of which 2^20 are one per urad.
-        let torque = 1e3 * 1.048_576;
-        Self {
-        k_y: (p.fdca_sohf * p.fdca_k_y_rad_per_m * 1e3 * 256.0 + 0.5) as i32,
-        k_psi: (p.fdca_sohf * p.fdca_k_psi * 256.0 + 0.5) as i32,
-        path: (p.fdca_lohs * car.aligning_gain_nm_s2_per_m * torque + 0.5) as i32,
-        aligning: (car.aligning_gain_nm_s2_per_m * torque + 0.5) as i32,
-        loha: (p.fdca_loha_nm_per_rad * torque + 0.5) as i32,
-        curvature: (car.curvature_gain_per_m * 262_144.0 + 0.5) as i32,
-        stability: (car.stability_factor_s2_per_m2 * 67_108_864.0 + 0.5) as i32,
-            filter: (1e4 / (2.0 * core::f64::consts::PI * p.rate_corner_hz) + 0.5) as i32,
+            gains_mnm: [
+                (p.k_1 * p.a_1 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_3 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_2 * 1e3 + 0.5) as i32,
+                (p.k_1 * p.a_4 * 1e3 + 0.5) as i32,
+            ],
         }
     }
 }

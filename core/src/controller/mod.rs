@@ -6,15 +6,14 @@
 pub mod config;
 pub(crate) mod injection;
 pub mod inputs;
-pub(crate) mod other_laws;
 pub mod params;
 mod step;
 
-use crate::controller::config::{Config, OtherLaws, Setup};
+use crate::controller::config::Config;
 use crate::controller::injection::{Injection, NoInjection};
 use crate::controller::inputs::Inputs;
-use crate::controller::other_laws::OtherState;
 use crate::law::LawState;
+use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, TurningRate};
 use crate::safety::coast::Coast;
@@ -109,14 +108,43 @@ impl ChangedParts {
 
 /// Inputs whose newest sample is still to be checked. Not kept twice: a flipped bit skips one check, whose time the next one
 /// covers, or repeats one on the same sample, over no time.
-/// Beside them what the column's check alone knows of the driver torque.
-#[derive(Debug, Clone, Copy, Default)]
+/// Beside them what the column's check alone knows of the driver torque, and driver activity, which is bounded where it is read.
+#[derive(Debug, Clone, Copy)]
 struct PendingChecks {
     lane: bool,
     column: bool,
-    /// A law beside (9) has not seen the last speed yet.
-    other_law: bool,
+    /// Driver activity has not looked since a vehicle frame came.
+    activity_due: bool,
     frozen_torque: FrozenTorqueState,
+    activity: Activity,
+}
+
+impl PendingChecks {
+    fn new() -> Self {
+        Self {
+            lane: false,
+            column: false,
+            activity_due: false,
+            frozen_torque: FrozenTorqueState::default(),
+            activity: Activity::NEW,
+        }
+    }
+
+    /// Driver activity looks at the column once for each vehicle frame: a step later or more, where no lane sample is checked, so
+    /// that no step with most of the frames does more.
+    #[inline(always)]
+    fn look_at_activity(&mut self, config: &Config, column_at: Instant, applied: Torque, inputs: &Inputs) {
+        if self.activity_due
+            && !self.lane
+            && let Some(column) = inputs.column.value()
+        {
+            self.activity_due = false;
+            let torques = [column.driver_torque, applied];
+            let (law, least) = (&config.law, config.least_share);
+            self.activity
+                .update(law, least, column_at, column.wheel_angle, torques);
+        }
+    }
 }
 
 /// Four bytes that share a word, as memory is compared word by word.
@@ -211,7 +239,6 @@ pub struct ControllerState {
     torque_history: TorqueHistory,
     motion_history: MotionHistory,
     pending: PendingChecks,
-    pub(crate) others: OtherState,
 }
 
 impl ControllerState {
@@ -232,8 +259,7 @@ impl ControllerState {
             memory: Redundant::new(Memory::new(mode, now)),
             torque_history: TorqueHistory::new(),
             motion_history: MotionHistory::new(),
-            pending: PendingChecks::default(),
-            others: OtherState::new(),
+            pending: PendingChecks::new(),
         }
     }
 
@@ -259,16 +285,14 @@ impl ControllerState {
 #[derive(Debug, Clone, Copy)]
 pub struct Controller {
     pub(crate) config: Redundant<Config>,
-    pub(crate) others: Redundant<OtherLaws>,
 }
 
 impl Controller {
     /// A controller with checked parameters.
     #[must_use]
-    pub fn new(setup: &Setup) -> Self {
+    pub fn new(config: Config) -> Self {
         Self {
-            config: Redundant::new(setup.config),
-            others: Redundant::new(setup.others),
+            config: Redundant::new(config),
         }
     }
 
@@ -310,18 +334,11 @@ impl Controller {
         if !is_known_intact && !are_intact(&self.config, &state.memory) {
             return state.lose_memory(now);
         }
-        let config = self.config.value();
-        if state.pending.other_law && !state.pending.lane {
-            state.pending.other_law = false;
-            let (memory, others) = (state.memory.value(), &mut state.others);
-            if others.work(&self.others, config, memory, applied, inputs).is_none() {
-                return state.lose_memory(now);
-            }
-        }
         let memory = state.memory.value_mut();
+        let (config, pending) = (self.config.value(), &mut state.pending);
+        pending.look_at_activity(config, memory.input_times.column, applied, inputs);
         let mut step = Step {
             config,
-            others: &state.others,
             now,
             applied,
             inputs,

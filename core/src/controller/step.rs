@@ -5,9 +5,8 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
-use crate::controller::other_laws::OtherState;
 use crate::law::probe::ProbeState;
-use crate::law::{Choice, EgoMotion, LaneSample, LawState};
+use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
     Instant, Metres, Micros, Radians, Ratio, Torque, TorqueRate, TurningRate, per_second, product, share_of,
 };
@@ -52,8 +51,6 @@ const BRIDGED: FaultSet = FaultSet::NONE
 /// One step: what it reads and does not change.
 pub(super) struct Step<'a, I> {
     pub(super) config: &'a Config,
-    /// What the laws beside (9) remember.
-    pub(super) others: &'a OtherState,
     pub(super) now: Instant,
     pub(super) applied: Torque,
     pub(super) inputs: &'a Inputs,
@@ -136,15 +133,13 @@ impl<I: Injection> Step<'_, I> {
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
-        let demanded = self.law(v, last);
+        let ego = self.ego_motion(v, last);
+        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
-                // FDCA stands on its rates, so they must not stand still while trust comes back.
-                let goes_by_pictures = self.config.law.is(Choice::Fdca) && v.coast.sees();
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
-                    PictureVerdict::Expected if goes_by_pictures => {}
                     PictureVerdict::Expected => v.law.relocate(sample),
                     PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
@@ -198,10 +193,11 @@ impl<I: Injection> Step<'_, I> {
 
         if let Input::New(motion) = motion {
             self.update_motion(v, changed, motion, motion_history, &mut kept);
-            if !self.config.law.is(Choice::Paper) {
-                pending.other_law = true;
-                let left = self.others.share.get().copied().unwrap_or(Ratio::ZERO);
+            let least = self.config.least_share;
+            if least < Ratio::ONE {
+                let left = pending.activity.share(least);
                 v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
+                pending.activity_due = true;
             }
         }
         if fast_enough != Some(true) {
@@ -390,26 +386,6 @@ impl<I: Injection> Step<'_, I> {
         ))
     }
 
-    /// What the law demands by the sample taken last.
-    #[inline(always)]
-    fn law(&self, v: &Memory, sample: LaneSample) -> Torque {
-        if self.config.law.is(Choice::Fdca) {
-            return self.fdca(v, sample);
-        }
-        let ego = self.ego_motion(v, sample);
-        self.config.law.demanded(&v.law, self.now, ego.as_ref())
-    }
-
-    /// The same of FDCA. Not inlined, so that it costs (9) nothing. Gains whose copies do not agree ask for nothing.
-    #[inline(never)]
-    fn fdca(&self, v: &Memory, sample: LaneSample) -> Torque {
-        let ego = self.ego_motion(v, sample);
-        let motion = (v.plausibility.turning(), v.plausibility.wheel());
-        self.others.gains.get().map_or(Torque::ZERO, |gains| {
-            gains.demanded(&v.law, self.now, ego.as_ref(), motion)
-        })
-    }
-
     /// Whether both speeds reach the slowest that is guided, if they are known.
     fn is_fast_enough(&self) -> Option<bool> {
         let least = self.config.least_speed;
@@ -593,7 +569,9 @@ impl<I: Injection> Step<'_, I> {
                 changed.add(ChangedParts::LAW);
                 self.config.law.update(&mut v.law, sample);
             }
-            self.law(v, sample)
+            self.config
+                .law
+                .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
         });
         let demanded = self.injection.law(v.coast.limited(demanded));
         // Clamped to 0 to 1: beyond that the host is wrong.

@@ -100,12 +100,10 @@ pub enum Region {
     Ecu,
     /// The monitor's limits.
     Monitor,
-    /// What FDCA needs beside, in the controller and in the monitor: compared where it is read.
-    Fdca,
 }
 
 impl Region {
-    /// Every region that is compared in each step.
+    /// Every region.
     pub const ALL: [Self; 4] = [Self::Config, Self::Controller, Self::Ecu, Self::Monitor];
 }
 
@@ -135,12 +133,6 @@ impl Ecu {
                 flip(&mut self.memory, bit, &mut words);
             }
             Region::Monitor => flip(&mut self.monitor, bit, &mut words),
-            Region::Fdca => {
-                flip(&mut self.controller.others, bit, &mut words);
-                flip(&mut self.state.others.gains, bit, &mut words);
-                flip(&mut self.state.others.share, bit, &mut words);
-                flip(&mut self.watch.kept, bit, &mut words);
-            }
         }
         words.saturating_mul(32)
     }

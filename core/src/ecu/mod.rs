@@ -24,9 +24,9 @@ use crate::safety::actuator::Motor;
 use crate::safety::envelope::LimitReason;
 use crate::safety::faults::{Fault, FaultHistory, FaultSet};
 use crate::safety::modes::Mode;
-use crate::safety::monitor::{Evidence, Monitor, MonitorState, Watch};
+use crate::safety::monitor::{Evidence, Monitor, MonitorState};
 use crate::safety::redundant::{Redundant, words};
-use receivers::Receivers;
+use receivers::{Accepted, Receivers};
 
 /// How the ECU came up: what the firmware knows before the first step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -96,7 +96,6 @@ pub struct Ecu {
     controller: Controller,
     state: ControllerState,
     monitor: Redundant<Monitor>,
-    watch: Watch,
     memory: Redundant<Memory>,
     receivers: Receivers,
     history: FaultHistory,
@@ -157,10 +156,9 @@ impl Ecu {
         now: Instant,
     ) -> Self {
         Self {
-            controller: Controller::new(setup),
+            controller: Controller::new(setup.config),
             state: ControllerState::with(mode, now),
             monitor: Redundant::new(setup.monitor),
-            watch: Watch::new(setup.watch),
             memory: Redundant::new(Memory::new(faults, now)),
             receivers: Receivers::new(e2e, now),
             history: FaultHistory::new(now),
@@ -228,16 +226,14 @@ impl Ecu {
 
         let accepted = &self.receivers.accepted;
         let evidence = Evidence {
-            lane: &accepted.lane,
-            column: &accepted.column,
-            vehicle: &accepted.vehicle,
-            request: &accepted.request,
+            lane: accepted.lane.as_ref(),
+            column: accepted.column.as_ref(),
+            request: accepted.request.as_ref(),
             guidance: guidance.bytes(),
             elapsed_us,
         };
         let v = self.memory.value_mut();
-        let watch = Some(&mut self.watch);
-        let permitted = permits(monitor, &mut v.monitor, &evidence, watch, injection);
+        let permitted = permits(monitor, &mut v.monitor, &evidence, injection);
         faults.insert_if(!permitted, Fault::Monitor);
         v.step = LastStep {
             applied: if permitted { command.torque } else { Torque::ZERO },
@@ -245,9 +241,9 @@ impl Ecu {
             at: now,
             count: steps.wrapping_add(1),
         };
-        seal(&mut self.memory, evidence.lane.is_some() || self.watch.has_judged);
+        seal(&mut self.memory, evidence.lane.is_some());
         // Each accepted frame is shown to the monitor once.
-        self.receivers.accepted.clear();
+        self.receivers.accepted = Accepted::NONE;
         if !permitted {
             command = Command {
                 torque: Torque::ZERO,
@@ -406,14 +402,13 @@ fn passes_self_test<I: Injection>(monitor: Option<&Monitor>, turn: u32, injectio
     monitor.is_none_or(|monitor| {
         let (mut state, guidance) = monitor.self_test_vector(turn);
         let evidence = Evidence {
-            lane: &None,
-            column: &None,
-            vehicle: &None,
-            request: &None,
+            lane: None,
+            column: None,
+            request: None,
             guidance: &guidance,
             elapsed_us: 1000,
         };
-        !permits(Some(monitor), &mut state, &evidence, None, injection)
+        !permits(Some(monitor), &mut state, &evidence, injection)
     })
 }
 
@@ -422,9 +417,8 @@ fn permits<I: Injection>(
     monitor: Option<&Monitor>,
     state: &mut MonitorState,
     evidence: &Evidence<'_>,
-    watch: Option<&mut Watch>,
     injection: &I,
 ) -> bool {
     injection.monitor_passes(evidence.guidance)
-        || monitor.is_some_and(|monitor| monitor.step(state, evidence, watch))
+        || monitor.is_some_and(|monitor| monitor.step(state, evidence))
 }

@@ -241,24 +241,13 @@ fn follow(slot: &mut Slot<Motion>, speeds: [Speed; 2]) -> Option<[Speed; 2]> {
 pub(super) struct Accepted {
     pub(super) lane: Option<[u8; 8]>,
     pub(super) column: Option<[u8; 8]>,
-    pub(super) vehicle: Option<[u8; 8]>,
     pub(super) request: Option<[u8; 8]>,
 }
 
 impl Accepted {
-    /// Nothing accepted since. The bytes stay, which costs fewer instructions.
-    #[inline(always)]
-    pub(super) const fn clear(&mut self) {
-        self.lane = None;
-        self.column = None;
-        self.vehicle = None;
-        self.request = None;
-    }
-
     pub(super) const NONE: Self = Self {
         lane: None,
         column: None,
-        vehicle: None,
         request: None,
     };
 }
@@ -397,7 +386,6 @@ impl Receivers {
                     let speeds = follow(slot, speeds).ok_or(Reject::Step)?;
                     standing.hear(speeds, now.since(slot.at));
                     slot.put(Motion::new(speeds, yaw_rate), now, MOTION_PERIOD);
-                    accepted.vehicle = Some(*frame.bytes());
                     Ok(())
                 });
                 if heard != Some(Ok(())) {

@@ -29,6 +29,7 @@ pub struct Activity {
     /// L[P_d*P_h] and L[abs(P_d*P_h)].
     agreement: i64,
     size: i64,
+    share: Ratio,
 }
 
 impl Activity {
@@ -39,13 +40,16 @@ impl Activity {
         rate: I12F20::ZERO,
         agreement: 0,
         size: 0,
+        share: Ratio::ONE,
     };
 
     /// Takes a sample of the column, which came at an instant, beside the guidance torque that was applied; `law` has the filter of
-    /// the rate.
+    /// the rate, `least` is lambda_min. Not inlined, so that it costs (9) nothing.
+    #[inline(never)]
     pub fn update(
         &mut self,
         law: &Law,
+        least: Ratio,
         at: Instant,
         wheel: Radians,
         [driver, guidance]: [Torque; 2],
@@ -68,12 +72,14 @@ impl Activity {
         let weight = passed.us().saturating_mul(PER_US);
         self.agreement = low_pass(self.agreement, both, weight);
         self.size = low_pass(self.size, both.saturating_abs(), weight);
+        let taken = share_of(Ratio::ONE.minus(least).fixed(), self.against());
+        self.share = Ratio::ONE.minus(Ratio::from_fixed(taken));
     }
 
-    /// The share of (9) that is taken away, where `least` is lambda_min.
+    /// The share of (9) that is left, of which `least` is always.
     #[must_use]
-    pub fn taken(&self, least: Ratio) -> Ratio {
-        Ratio::from_fixed(share_of(Ratio::ONE.minus(least).fixed(), self.against()))
+    pub fn share(&self, least: Ratio) -> Ratio {
+        self.share.max(least).min(Ratio::ONE)
     }
 
     /// `max(0, -c)`.

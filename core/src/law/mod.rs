@@ -13,12 +13,11 @@
 //! Error: at most 0.2 mN.m from a float64 evaluation of the same discrete law over the whole input range
 //! (`core/tests/law_oracle.rs` asserts it). Cost: see `cargo xtask bench`.
 //!
-//! In its place the parameters may choose FDCA ([`fdca`]), or leave a share of it by the driver's [`activity`].
+//! The parameters may choose to leave only a share of it, by the driver's [`activity`].
 //!
 //! Not here: any limit. The law may ask for too much; the envelope has the last word.
 
 pub mod activity;
-pub mod fdca;
 pub mod probe;
 pub mod schedule;
 pub(crate) mod sine;
@@ -57,32 +56,9 @@ pub struct Law {
     pub(crate) e_theta: TorquePerAngle,
     /// K_1*a4'.
     pub(crate) e_theta_rate: TorquePerTurningRate,
-    /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner. Its upper two bits are a
-    /// [`Choice`], as a word of its own would have to be compared in every step.
+    /// tau of the rate filter in 2^-8 us: a whole microsecond would cost 0.2 mN.m at the default corner.
     pub(crate) tau: u32,
 }
-}
-
-/// The law in use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Choice {
-    /// Equation (9).
-    Paper = 0,
-    /// [`fdca`] in its place.
-    Fdca = 1,
-    /// A share of (9) by the driver's [`activity`].
-    DriverActivity = 2,
-}
-
-/// Bits of [`Law::tau`] that are the time constant: the longest has 27.
-const TAU_BITS: u32 = 30;
-
-impl Choice {
-    /// Its bits of [`Law::tau`].
-    #[expect(clippy::as_conversions, reason = "a code is its discriminant")]
-    pub(crate) const fn bits(self) -> u32 {
-        (self as u32) << TAU_BITS
-    }
 }
 
 words! {
@@ -180,19 +156,6 @@ impl LawState {
         late
     }
 
-    /// Errors continued at their rates: at most 128 and half of what a rate may be.
-    #[inline(always)]
-    fn continued(&self, age: Micros) -> [I12F20; 2] {
-        let now = |error: I8F24, rate: I12F20| {
-            let rounded = I12F20::wrapping_from_num(error.saturating_add(HALF));
-            rounded.saturating_add(per_second(rate, age))
-        };
-        [
-            now(self.last.e_y.fixed(), self.e_y_rate),
-            now(self.last.e_theta.fixed(), self.e_theta_rate),
-        ]
-    }
-
     /// Whether the sample is the one taken last.
     pub(crate) fn is_latest(&self, sample: &LaneSample) -> bool {
         self.has_last != 0 && self.last == *sample
@@ -218,16 +181,6 @@ const GAP: Micros = Micros::from_ms(100);
 pub const MAX_RATE: u32 = 1000;
 
 impl Law {
-    const fn tau(&self) -> u32 {
-        self.tau & ((1 << TAU_BITS) - 1)
-    }
-
-    /// Whether this law is in use.
-    #[inline(always)]
-    pub(crate) const fn is(&self, choice: Choice) -> bool {
-        self.tau >> TAU_BITS == choice.bits() >> TAU_BITS
-    }
-
     /// The torque that the law demands now, from the latest sample received and the vehicle's motion since.
     #[must_use]
     pub fn step(&self, state: &mut LawState, now: Instant, sample: LaneSample, ego: &EgoMotion) -> Torque {
@@ -272,7 +225,7 @@ impl Law {
     #[inline(always)]
     fn filter(&self, rate: I12F20, from: I8F24, to: I8F24, dt: Micros) -> I12F20 {
         const MOST: u32 = MAX_RATE << I12F20::FRAC_NBITS;
-        let tau = i64::from(self.tau());
+        let tau = i64::from(self.tau);
         // 2^8 for the format of tau, 2^-4 from the errors' 24 fractional bits to the rates' 20.
         let change = i64::from(to.to_bits())
             .saturating_sub(i64::from(from.to_bits()))
@@ -280,7 +233,7 @@ impl Law {
         // 32 bits times 31.
         let sum = tau.wrapping_mul(i64::from(rate.to_bits())).saturating_add(change);
         // At most 100 ms and 320 ms, in 2^-8 us.
-        let span = self.tau().saturating_add(dt.us().saturating_mul(1 << 8));
+        let span = self.tau.saturating_add(dt.us().saturating_mul(1 << 8));
         // Rounded to nearest.
         let size = sum.unsigned_abs().saturating_add(u64::from(span >> 1));
         let size = I12F20::from_bits(quotient(size, span).min(MOST).cast_signed());
@@ -291,10 +244,15 @@ impl Law {
     /// rates, so that every product has 44: an error's 2^-21 of rounding costs at most 0.02 mN.m at the
     /// largest gain of 32. With that gain a product has at most 2^60, and the sum of four 2^62.
     fn torque(&self, state: &LawState, age: Micros) -> Torque {
-        let [e_y, e_theta] = state.continued(age);
-        let sum = (self.e_y.fixed().wide_mul(e_y))
+        // Errors continued at their rates: at most 128 and half of what a rate may be.
+        let now = |error: I8F24, rate: I12F20| {
+            let rounded = I12F20::wrapping_from_num(error.saturating_add(HALF));
+            rounded.saturating_add(per_second(rate, age))
+        };
+        let (e_y, e_theta) = (state.last.e_y.fixed(), state.last.e_theta.fixed());
+        let sum = (self.e_y.fixed().wide_mul(now(e_y, state.e_y_rate)))
             .wrapping_add(self.e_y_rate.fixed().wide_mul(state.e_y_rate))
-            .wrapping_add(self.e_theta.fixed().wide_mul(e_theta))
+            .wrapping_add(self.e_theta.fixed().wide_mul(now(e_theta, state.e_theta_rate)))
             .wrapping_add(self.e_theta_rate.fixed().wide_mul(state.e_theta_rate));
         Torque::from_wide(rounded(sum))
     }

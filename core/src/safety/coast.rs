@@ -1,7 +1,7 @@
 //! How far the lane is trusted while its camera sees nothing, or another line.
 //!
 //! In Active a lane that is silent, invalid or elsewhere does not end guidance at once. The lane seen last goes on along what
-//! was seen of the road ([`crate::safety::plausibility::Plausibility::gone_on`]), and the share of the law's torque that acts, the
+//! was seen of the road ([`crate::safety::plausibility::Plausibility::extrapolated_lane`]), and the share of the law's torque that acts, the
 //! *trust*, falls:
 //!
 //! | what comes | trust | for at most |
@@ -79,11 +79,6 @@ impl Coast {
         demanded: Torque::ZERO,
         sight: SEES,
     };
-
-    /// Whether pictures are in use.
-    pub(crate) const fn sees(&self) -> bool {
-        self.sight == SEES
-    }
 
     /// Whether there is nothing to make up for.
     #[inline(always)]

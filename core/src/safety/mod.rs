@@ -1,6 +1,6 @@
 //! Bounds, checks and memory that keep a torque safe whatever the law asks for.
 //!
-//! - Inputs: can they be true together ([`plausibility`], [`yaw`], with the motion history in [`past`]), is the driver
+//! - Inputs: can they be true together ([`plausibility`], [`yaw`], with the motion history in [`motion_history`]), is the driver
 //!   torque alive ([`frozen_torque`]), and does the driver hold the wheel ([`hands`])?
 //! - Reaction: the modes and what leads from one to another ([`modes`]), the faults with their classes ([`faults`]), the
 //!   way to zero ([`ramp`]), guidance without a picture ([`coast`]).

@@ -11,15 +11,11 @@
 //! ask for. Across zero all of the new torque has grown. The last rule is coarse (proportional part and rates over 50 ms, 0.3
 //! N.m of tolerance) and may be crossed for 20 ms, in which a falling torque does not count: the envelope may still be bringing
 //! an honest change about. While the host asks for the probe, and for a second after, the band is wider by the probe's
-//! amplitude. Where the parameters choose FDCA, it is computed here a second time, and its band has reasons of its own (`monitor/fdca.rs`). Driver
-//! activity leaves a share of (9), which lies between it and zero: its band is that of (9).
+//! amplitude.
 //!
 //! Each rule can be tried by itself: [`Monitor::self_test_vector`].
 
-mod fdca;
-
 use crate::safety::redundant::words;
-pub use fdca::{Fdca, Watch};
 
 words! {
     /// Limits in mN.m and per unit; immutable.
@@ -34,7 +30,7 @@ words! {
         pub(crate) band_mnm: i32,
         /// Amplitude of the probe.
         pub(crate) probe_mnm: i32,
-        /// Law, mN.m per m, per rad, per m/s, per rad/s, or [`OF_FDCA`].
+        /// Law, mN.m per m, per rad, per m/s, per rad/s.
         pub(crate) gains_mnm: [i32; 4],
     }
 }
@@ -72,7 +68,7 @@ words! {
         /// An older lane sample, for rates, and how much older it is.
         before: Lane,
         older_us: i32,
-        /// What its position asks for, and what its rates ask for beside; of FDCA the least that may be, and how much the most is more.
+        /// What its position asks for, and what its rates ask for beside.
         position_mnm: i32,
         rate_mnm: i32,
     }
@@ -90,13 +86,11 @@ words! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Evidence<'a> {
     /// Bytes of the latest lane preview frame in use, if a new one arrived.
-    pub lane: &'a Option<[u8; 8]>,
+    pub lane: Option<&'a [u8; 8]>,
     /// Bytes of the latest column frame in use, if a new one arrived.
-    pub column: &'a Option<[u8; 8]>,
-    /// Bytes of the latest vehicle frame in use, if a new one arrived.
-    pub vehicle: &'a Option<[u8; 8]>,
+    pub column: Option<&'a [u8; 8]>,
     /// Bytes of the latest command frame in use, if a new one arrived.
-    pub request: &'a Option<[u8; 8]>,
+    pub request: Option<&'a [u8; 8]>,
     /// Bytes of the guidance frame about to leave.
     pub guidance: &'a [u8; 8],
     /// Time since the last step, us.
@@ -165,35 +159,17 @@ impl MonitorState {
     };
 }
 
-/// In the place of the gains of (9), none of which is negative.
-pub(crate) const OF_FDCA: [i32; 4] = [-1, 0, 0, 0];
-
 impl Monitor {
-    #[inline(always)]
-    const fn is_fdca(&self) -> bool {
-        let [per_m, ..] = self.gains_mnm;
-        per_m.is_negative()
-    }
-
     /// Judges what is about to leave. `true` renews the permission for this millisecond; after the first
-    /// `false` it is never renewed. FDCA needs a `watch`.
+    /// `false` it is never renewed.
     #[must_use]
     #[inline(always)]
-    pub fn step(
-        &self,
-        state: &mut MonitorState,
-        evidence: &Evidence<'_>,
-        watch: Option<&mut Watch>,
-    ) -> bool {
+    pub fn step(&self, state: &mut MonitorState, evidence: &Evidence<'_>) -> bool {
         let elapsed_us = i32::try_from(evidence.elapsed_us)
             .unwrap_or(i32::MAX)
             .min(1_000_000);
-        if !self.is_fdca() {
-            if state.observe(evidence, elapsed_us) {
-                self.update_demand(state);
-            }
-        } else if !watch.is_none_or(|watch| watch.observe(state, evidence, elapsed_us)) {
-            state.step.withdrawn = 1;
+        if state.observe(evidence, elapsed_us) {
+            self.update_demand(state);
         }
         let torque = field(evidence.guidance, 12, 16).saturating_mul(1000) / 4096;
         let mode = field(evidence.guidance, 32, 4);
@@ -237,11 +213,6 @@ impl Monitor {
     pub const fn with_another_law(self) -> Self {
         Self {
             band_mnm: self.limit_mnm,
-            gains_mnm: if self.is_fdca() {
-                [0; 4]
-            } else {
-                self.gains_mnm
-            },
             ..self
         }
     }
@@ -294,8 +265,24 @@ impl Monitor {
         }
         // What an old sample has become since: the same, or the errors went on at their rates for as long as a slow camera waits.
         let late_us = state.step.age_us.saturating_sub(PROMPT_LANE_US);
-        // Limits, ramps, the authority and the driver's activity can only make the torque smaller: zero is always in the band.
-        let (low, high) = self.range(state, late_us);
+        let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
+        let both = position.saturating_add(rate);
+        // Limits, ramps and the authority can only make the torque smaller: zero is always in the band.
+        let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
+        if late_us >= 1000 {
+            let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
+            let [per_m, per_rad, ..] = self.gains_mnm;
+            let (e_y_mmps, e_theta_urps) = state.rates();
+            let carried = per_m
+                .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
+                .saturating_div(1000)
+                .saturating_add(
+                    per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
+                );
+            let position = position.saturating_add(carried);
+            let both = position.saturating_add(rate);
+            (low, high) = (low.min(position).min(both), high.max(position).max(both));
+        }
         let probe = if state.step.probe_left_us > 0 {
             self.probe_mnm
         } else {
@@ -313,30 +300,6 @@ impl Monitor {
             state.step.astray_ms = state.step.astray_ms.saturating_add(1);
         }
         state.step.astray_ms <= ASTRAY_MS
-    }
-
-    /// From where to where the law asks for a torque.
-    #[inline(always)]
-    fn range(&self, state: &MonitorState, late_us: i32) -> (i32, i32) {
-        let (position, rate) = (state.lane_state.position_mnm, state.lane_state.rate_mnm);
-        let both = position.saturating_add(rate);
-        let (mut low, mut high) = (position.min(both).min(0), position.max(both).max(0));
-        // FDCA's watch knows how late it is.
-        if late_us >= 1000 && !self.is_fdca() {
-            let late_ms = late_us.min(LONGEST_LATE_US) / 1000;
-            let [per_m, per_rad, ..] = self.gains_mnm;
-            let (e_y_mmps, e_theta_urps) = state.rates();
-            let carried = per_m
-                .saturating_mul(e_y_mmps.saturating_mul(late_ms) / 1000)
-                .saturating_div(1000)
-                .saturating_add(
-                    per_rad.saturating_mul((e_theta_urps / 1000).saturating_mul(late_ms) / 100) / 10_000,
-                );
-            let position = position.saturating_add(carried);
-            let both = position.saturating_add(rate);
-            (low, high) = (low.min(position).min(both), high.max(position).max(both));
-        }
-        (low, high)
     }
 
     /// What the monitor is tried with: a state and a guidance frame, 1 ms later and without other frames, that
@@ -375,7 +338,6 @@ impl MonitorState {
         let unseen_us = self.step.age_us.saturating_sub(self.lane_state.came_us);
         let lane = evidence
             .lane
-            .as_ref()
             .filter(|_| unseen_us <= UNSEEN_US || !says_aside(evidence.guidance));
         if let Some(bytes) = lane {
             let new = Lane {
@@ -400,7 +362,7 @@ impl MonitorState {
             self.step.driver_mnm = field(bytes, 12, 18).saturating_mul(1000) / 4096;
         }
         self.step.probe_left_us = self.step.probe_left_us.saturating_sub(elapsed_us).max(0);
-        if evidence.request.as_ref().is_some_and(|bytes| field(bytes, 21, 1) != 0) {
+        if evidence.request.is_some_and(|bytes| field(bytes, 21, 1) != 0) {
             self.step.probe_left_us = PROBE_END_US;
         }
         lane.is_some()

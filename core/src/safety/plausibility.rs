@@ -4,7 +4,7 @@
 //! `de_y'/dt = v*theta_n - L_n*psi_dot`, with the line's direction at the near point against the vehicle's, `theta_n`, and
 //! the rate of turn, `psi_dot`. With a measured yaw rate both are known: the near point is now where the far point was
 //! `t'_f - t'_n` ago, so that `theta_n` is the far point's direction of then, less what the vehicle has turned since
-//! ([`crate::safety::past`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
+//! ([`crate::safety::motion_history`]). What is then left of an honest preview is its constant errors, of the camera's mounting and the
 //! yaw rate's zero; a slow estimate takes them away, bounded so that a lie cannot hide in it. Without a yaw rate that is
 //! believed ([`crate::safety::yaw`]) the rate of turn comes from wheel angle and speed by the steady-state bicycle model, and from what
 //! the yaw rate was more in the long run. A gust, a bank or a tyre spoils it, so the margins are 2.5 times as wide.
@@ -190,18 +190,6 @@ impl PlausibilityState {
     /// Takes a wheel angle that is not checked yet.
     pub(crate) fn set_wheel_angle(&mut self, wheel: Radians) {
         self.column.wheel = wheel;
-    }
-
-    /// The wheel angle that came last.
-    #[must_use]
-    pub const fn wheel(&self) -> Radians {
-        self.column.wheel
-    }
-
-    /// How fast the vehicle turns per wheel angle at this speed.
-    #[must_use]
-    pub const fn turning_gain(&self) -> TurningRatePerAngle {
-        self.motion.turning_gain
     }
 
     /// The speed in use.

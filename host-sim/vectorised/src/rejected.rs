@@ -278,12 +278,7 @@ fn supported_guidance(guidance: &GuidanceParameters) -> &Params {
                 near_time_s: _,
             },
         law: _,
-        // Without its law none of these acts.
-        fdca_k_y_rad_per_m: _,
-        fdca_k_psi: _,
-        fdca_lohs: _,
-        fdca_sohf: _,
-        fdca_loha_nm_per_rad: _,
+        // Without its law it does not act.
         activity_lambda_min: _,
     } = controller;
     controller

@@ -52,7 +52,9 @@ _HIGH = np.array(list(OBSERVATION.values()), dtype=np.float32)
 _TOLD = ("time_s", "s_m", "lateral_error_m", "unguided_cause")
 _TERMS = ("error", "effort", "conflict")
 # The arm of nobody: the torque on the wheel is the agent's.
-_SLACK = {"a_1": 0.0, "a_2": 0.0, "a_3": 0.0, "K_d": 0.0, "K_hg": 0.0, "K_nms": 0.0}
+_SLACK = dict.fromkeys(
+    ("a_1_rad_per_m", "a_2_rad_per_m_s", "a_3", "k_d_nm_per_rad", "k_hg", "k_nms_nm_per_rad"), 0.0
+)
 
 
 class _Loops:

@@ -22,7 +22,7 @@ impl Direct {
     /// A controller that has seen nothing yet.
     pub fn new(setup: &Setup) -> Self {
         Self {
-            controller: Controller::new(setup),
+            controller: Controller::new(setup.config),
             state: ControllerState::engaged(Instant::from_us(0)),
             status: Status::GUIDES,
         }

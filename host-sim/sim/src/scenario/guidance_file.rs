@@ -91,7 +91,6 @@ pub(super) fn in_words_of_the_file(error: &ParamError) -> RangeError {
     let field = match (formula, error.name.split_once(" * ")) {
         (Some((_, formula)), _) => (*formula).into(),
         (None, Some((one, other))) => format!("guidance: {}*{}", named(one), named(other)),
-        (None, None) if error.name.contains(' ') => format!("guidance: {}", error.name),
         (None, None) => format!("guidance.{}", named(error.name)),
     };
     RangeError {
