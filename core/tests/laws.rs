@@ -35,11 +35,11 @@ const fn tau_s(p: &Params) -> f64 {
 }
 
 #[test]
-fn the_share_of_driver_activity_is_within_1_percent_of_its_equation() {
+fn the_share_of_driver_activity_is_within_0_001_of_its_equation() {
     let mut rng = SmallRng::seed_from_u64(12);
     let law = Setup::PAPER.config.law;
     let (tau, weight) = (tau_s(&Params::PAPER), 0.01 / 0.5);
-    for (scale, most) in [(1.0, 0.01), (0.1, 0.01), (0.01, 0.07)] {
+    for (scale, most) in [(1.0, 0.001), (0.1, 0.001), (0.01, 0.03)] {
         let (mut worst, mut least_seen) = (0.0_f64, 1.0_f64);
         let (mut activity, mut rate, mut sums) = (Activity::NEW, Rate::default(), [0.0_f64; 2]);
         let mut phase = 0.0_f64;

@@ -7,8 +7,11 @@
 //! State that is not kept twice: whatever a flipped bit makes of it, the share is one from lambda_min to 1, and is right again
 //! when the low-pass has forgotten.
 //!
+//! It looks at the column once for each vehicle frame.
+//!
 //! Products of pseudo-powers are in 2^-48 (N.m.rad/s)^2: what an LSB of the bus in each torque makes with 0.25 mrad/s is one.
-//! Error: at most 1 % of the share from a float64 evaluation of the same samples (`core/tests/laws.rs` asserts it).
+//! Error: at most 0.001 of the share from a float64 evaluation of the same samples, 0.03 where the wheel never moves by more than 3
+//! mrad/s (`core/tests/laws.rs` asserts it).
 
 use fixed::types::{I8F24, I12F20};
 
