@@ -64,7 +64,10 @@ fn a_law_that_there_is_not_is_refused() {
         (f64::NAN, Some("law = NaN is outside [0, 1] 1")),
     ] {
         let p = Params { law, ..Params::PAPER };
-        let error = Setup::new(&p).map(|_| ()).map_err(|error| error.to_string()).err();
+        let error = Setup::new(&p)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+            .err();
         assert_eq!(error.as_deref(), says, "{law}");
     }
 }
