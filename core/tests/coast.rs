@@ -372,6 +372,34 @@ fn where_pictures_come_back_is_no_rate() {
     }
 }
 
+/// After a blink the rates of (9) follow the pictures at once, not only when the blink is forgiven: K_1*(a3'*e_theta' +
+/// a4'*v) of a line that turns at v = 0.1 rad/s, and no more of v once it stays.
+#[test]
+fn how_fast_the_line_turns_counts_soon_after_a_blink() {
+    const PER_RAD: f64 = 10.0;
+    const PER_RAD_PER_S: f64 = 0.25;
+    for sign in [1.0, -1.0] {
+        let mut rig = beside(0.0);
+        rig.silent[LANE] = true;
+        rig.run(900);
+        rig.silent[LANE] = false;
+        // Trust is back after 0.45 s, the blink is forgiven after 1.8 s.
+        rig.run(600);
+        for ms in 0..1000 {
+            let turned = 1e-4 * f64::from(ms.min(500)) * sign;
+            let rate = if ms < 500 { 0.1 * sign } else { 0.0 };
+            rig.lane.e_theta = Radians::from_rad(turned);
+            assert_eq!(rig.tick().command.mode, Mode::Active);
+            let expected = PER_RAD * turned + PER_RAD_PER_S * rate;
+            // The low-pass of the rates needs 0.1 s.
+            if (200..500).contains(&ms) || ms > 700 {
+                let error = rig.applied - expected;
+                assert!(error.abs() < 0.01, "{ms} ms: {}, not {expected}", rig.applied);
+            }
+        }
+    }
+}
+
 /// A bend of 2.5 m/s^2 that the vehicle follows, without a picture for almost a second: the near point has come to where the line
 /// was not seen. Of a line that went straight from there it would be 0.4 m aside.
 #[test]

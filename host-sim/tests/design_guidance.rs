@@ -29,6 +29,8 @@ speeds_m_per_s = [13.88888888888889]
 losses = 1
 ";
 
+const ROAD: &str = "[[segment]]\nlength = 100\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
+
 fn design(folder: &Path, arguments: &[&str]) -> Output {
     host_sim(folder, &[&["design-guidance", "design.toml"], arguments].concat())
 }
@@ -37,8 +39,7 @@ fn design(folder: &Path, arguments: &[&str]) -> Output {
 fn a_design_leaves_the_same_bytes_on_any_threads_and_behind_an_interrupt() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let road = "[[segment]]\nlength = 100\n[[segment]]\nlength = 250\ncurvature = 0.003\n";
-    fs::write(folder.join("road.toml"), road).unwrap();
+    fs::write(folder.join("road.toml"), ROAD).unwrap();
     fs::write(folder.join("design.toml"), FILE).unwrap();
     let sets = |place: &str| fs::read_to_string(folder.join(place).join("sets.jsonl")).unwrap();
     for place in ["1", "2", "cut"] {
@@ -74,4 +75,34 @@ fn a_design_leaves_the_same_bytes_on_any_threads_and_behind_an_interrupt() {
     assert!(!folder.join("wrong").exists());
     let run = host_sim(folder, &["run", "1/chosen.toml"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// A peak of a tenth and no more conflict than the paper's: nothing has both, and the front says so instead of a choice that looks right.
+#[test]
+fn bars_that_contradict_each_other_are_said_to_and_a_population_of_one_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("road.toml"), ROAD).unwrap();
+    let file = format!("{FILE}[bars]\npeak = 0.1\nconflict = 1\n");
+    fs::write(folder.join("design.toml"), &file).unwrap();
+    let output = design(folder, &["--out", "out"]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(
+        said.contains("The bars cannot be had together with any set that was tried."),
+        "{said}"
+    );
+    assert!(said.contains("the chosen row misses Mean peak"), "{said}");
+    let one = file.replace("participants = [2, 13]", "participants = [13]");
+    fs::write(folder.join("design.toml"), one).unwrap();
+    let output = design(folder, &["--out", "one"]);
+    assert_eq!(output.status.code(), Some(2));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("design.toml: population.participants"), "{error}");
+    assert!(!folder.join("one").exists());
 }

@@ -1,5 +1,6 @@
 //! The command line's tests, one program: a module a subject. `cargo test -p host-sim documents::` runs one of them.
 
+mod adaptation;
 mod cli;
 mod compare;
 mod course;

@@ -140,13 +140,14 @@ impl<I: Injection> Step<'_, I> {
             Input::New(sample) if !is_older(sample) => {
                 let agrees = lane_step_is_possible(&extrapolated_lane(v, motion_history, sample.at), &sample);
                 match v.coast.picture_arrived(&sample, agrees, demanded) {
-                    PictureVerdict::Expected => v.law.relocate(sample),
+                    // From the extrapolated line to the picture is a jump, and no rate.
+                    PictureVerdict::Returned => v.law.relocate(sample),
                     PictureVerdict::Adopted => {
                         v.law = LawState::NEW;
                         v.plausibility.forget_lane();
                         motion_history.forget_line();
                     }
-                    PictureVerdict::Elsewhere => {}
+                    PictureVerdict::Expected | PictureVerdict::Elsewhere => {}
                 }
                 changed.add(ChangedParts::LAW);
                 changed.add(ChangedParts::LANE);

@@ -143,6 +143,27 @@ mod tests {
     }
 
     #[test]
+    fn passes_zero_where_it_is_small_on_both_sides_of_it() {
+        let mut state = ProbeState::SILENT;
+        assert!(state.is_passing_zero());
+        run(&mut state, 400, true).for_each(drop);
+        // A rim that answers in phase moves the torque by as large a share: a 32nd of a turn before and behind zero, and no more.
+        let most = 0.2 * (core::f64::consts::TAU / 32.0).sin();
+        let mut seen = [0; 2];
+        for _ in 0..4000 {
+            let torque = run(&mut state, 1, true).sum::<f64>();
+            let is_near = (torque.abs() - most).abs() < 1e-3;
+            assert!(
+                is_near || state.is_passing_zero() == (torque.abs() < most),
+                "{torque}"
+            );
+            seen[usize::from(state.is_passing_zero())] += 1;
+        }
+        // An eighth of the time.
+        assert!((480..520).contains(&seen[1]), "{seen:?}");
+    }
+
+    #[test]
     fn no_amplitude_is_no_probe() {
         let none = Probe {
             amplitude: Torque::ZERO,

@@ -64,6 +64,8 @@ words! {
 pub(crate) enum PictureVerdict {
     /// The line, where it must be.
     Expected,
+    /// The same, in the first picture after some without it.
+    Returned,
     /// A line that is taken in its place.
     Adopted,
     /// A line elsewhere.
@@ -128,8 +130,13 @@ impl Coast {
         demanded: Torque,
     ) -> PictureVerdict {
         if agrees && self.lost <= MOST_BLIND {
+            let is_first = self.sight != SEES;
             self.sight = SEES;
-            return PictureVerdict::Expected;
+            return if is_first {
+                PictureVerdict::Returned
+            } else {
+                PictureVerdict::Expected
+            };
         }
         let is_near = sample.e_y.abs() <= NEAR && sample.e_theta.abs() <= ALONG;
         if self.trust == Ratio::ZERO && is_near {

@@ -95,10 +95,14 @@ pub struct CaseResult {
     pub dropped_m: Option<f64>,
     /// Most that a run went further than that, m.
     pub excess_m: Option<f64>,
+    /// Largest distance from the vehicle whose torque is cut at the onset, m; of class C alone.
+    pub pushed_m: Option<f64>,
     /// Runs in which the vehicle left its lane and the fault-free one did not.
     pub left_lane: u64,
     /// Their share, from and to, 95 %.
     pub left_lane_interval: [f64; 2],
+    /// Whether the drivers' limits judge the row.
+    pub is_limited: bool,
     /// Whether more of them leave it than the drivers' limit allows: the interval begins above it.
     pub leaves_too_often: bool,
     /// Runs in which it went more than a lane's width aside with the torque dropped as well, or was there without the fault
@@ -242,8 +246,10 @@ pub(super) fn result(
         deviation_m: most(|o| Some(o.deviation.faulted_m)).unwrap_or_default(),
         dropped_m: most(|o| o.deviation.dropped_m),
         excess_m: most(|o| o.deviation.excess_m()),
+        pushed_m: most(|o| o.deviation.pushed_m),
         left_lane: left_lane as u64,
         left_lane_interval: share(left_lane),
+        is_limited: row.is_limited(),
         leaves_too_often: row.is_limited() && limits.left_lane.is_some_and(|most| share(left_lane)[0] > most),
         off_road: outcomes.iter().filter(|o| o.deviation.is_off_road()).count() as u64,
         failures: failures.collect(),

@@ -1,12 +1,13 @@
 //! Where the vehicle of a run goes, judged by forks of the run: *fault-free* goes on without the fault from the onset, *dropped*
-//! loses the torque in the step in which the ECU leaves. The *deviation* is the distance from the fault-free vehicle across
-//! its direction at the same instant.
+//! loses the torque in the step in which the ECU leaves, *cut* loses it at the onset. The *deviation* is the distance from the
+//! fault-free vehicle across its direction at the same instant.
 
 use haptic_sim::parts::DriverVehicle;
 use haptic_sim::{Action, Simulation};
 
 use super::drivers::{LANE_EDGE_M, OFF_ROAD_M};
 use super::ecu_harness::EcuHarness;
+use super::table::Class;
 
 /// A run ends so long after the onset, ms.
 pub(super) const AFTER_MS: u32 = 5200;
@@ -22,6 +23,8 @@ pub struct Deviation {
     pub faulted_m: f64,
     /// The same had the torque been dropped in the step in which the ECU left; `None` if it stayed.
     pub dropped_m: Option<f64>,
+    /// Largest distance from the vehicle whose torque is cut at the onset: what the torque moves it after that. Of class C alone.
+    pub pushed_m: Option<f64>,
     /// Whether the vehicle left its lane where the fault-free one did not.
     pub leaves_lane: bool,
     /// Whether the vehicle was off the road when the ECU left, and so was the fault-free one: its driver took it there.
@@ -67,14 +70,15 @@ pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Devi
     let mut seen = Deviation::default();
     let mut healthy: Option<Trial<'_>> = None;
     let mut dropped: Option<Trial<'_>> = None;
+    let mut cut: Option<Trial<'_>> = None;
     let mut edges = [false; 2];
     loop {
         if forks && simulation.steps() == onset {
-            healthy = Some(simulation.clone());
-            healthy
-                .as_mut()
-                .into_iter()
-                .for_each(|twin| twin.guidance_mut().end_faults());
+            let twin = healthy.insert(simulation.clone());
+            twin.guidance_mut().end_faults();
+            if simulation.guidance().class() == Class::C {
+                cut.insert(twin.clone()).guidance_mut().drop_torque();
+            }
         }
         let left_at = simulation.guidance().left_at();
         let takes_over = left_at.is_some_and(|at| simulation.steps() >= at + NOTICES_MS);
@@ -91,6 +95,11 @@ pub(super) fn drive(simulation: &mut Trial<'_>, onset: u32, forks: bool) -> Devi
             *edge |= one
                 .lateral_error_m()
                 .is_some_and(|error_m| error_m.abs() > LANE_EDGE_M);
+        }
+        if let Some(cut) = &mut cut {
+            step(cut, takes_over);
+            let apart_m = apart_m(simulation, cut);
+            seen.pushed_m = Some(seen.pushed_m.unwrap_or_default().max(apart_m));
         }
         match &mut dropped {
             Some(without) => {

@@ -18,7 +18,7 @@ use super::invariants::InvariantChecker;
 use super::residual::{Residual, Seen};
 use super::senders::{Senders, SensorReadings};
 use super::start_up::{is_engaged, start_up};
-use super::table::FaultCase;
+use super::table::{Class, FaultCase};
 use super::trial_record::{EcuTrace, Tick, TrialRecord};
 use super::wire::{Arrival, Bus};
 use haptic_sim::guidance::{Actuation, Guidance, Observation};
@@ -127,6 +127,11 @@ impl<'a> EcuHarness<'a> {
     /// The trace, if one was kept.
     pub(super) fn take_trace(&mut self) -> Option<EcuTrace> {
         self.trace.take()
+    }
+
+    /// Class of the case.
+    pub(super) fn class(&self) -> Class {
+        self.row.class
     }
 
     /// Ends every fault of the case.
@@ -275,8 +280,14 @@ impl<'a> EcuHarness<'a> {
         }
         let used = self.residual.used(self.row.seen);
         if self.record.modes.last().is_some_and(|(_, mode)| *mode == ACTIVE) {
-            self.record.used = self.record.used.max(used);
-            let contradicted = self.residual.used(Seen::Contradiction);
+            let still = self.residual.still_used(self.senders.has_probe());
+            let shown = if self.row.seen == Seen::Contradiction {
+                used.max(still)
+            } else {
+                used
+            };
+            self.record.used = self.record.used.max(shown);
+            let contradicted = self.residual.used(Seen::Contradiction).max(still);
             self.record.contradicted = self.record.contradicted.max(contradicted);
         }
         let since = |by| self.residual.seen_since(by, observation.step);

@@ -54,6 +54,11 @@ const ALIGNING_SHARE: f64 = 77.0 / 256.0;
 const ASSIST: f64 = 5.0;
 /// So much of what yaw rate and wheel angle say differently of the aligning torque is wind or bank.
 const PUSHED_NM: f64 = 0.3;
+/// A driver torque that is the same for so long while the wheel turns so far, beside the probe and without it: a count begins anew
+/// when it moves, and after two seconds.
+const STILL_S: f64 = 1.0;
+const STILL_WITHIN_S: f64 = 2.0;
+const STILL_TURN_RAD: [f64; 2] = [0.0087, 0.14];
 /// Inertia of column and wheel.
 const INERTIA_KG_M2: f64 = 0.125;
 
@@ -126,6 +131,8 @@ pub(super) struct Residual {
     moved_m: f64,
     now_s: f64,
     column_at_s: Option<f64>,
+    /// A driver torque, since when it is the same, and the least and largest wheel angle meanwhile.
+    still: (f64, f64, [f64; 2]),
     momentum_nm_s: f64,
     commands_nm: [f64; MOTOR_ECHO],
     /// Least and largest torque that an honest motor may deliver.
@@ -169,6 +176,7 @@ impl Residual {
             moved_m: 0.0,
             now_s: 0.0,
             column_at_s: None,
+            still: (f64::NAN, 0.0, [0.0; 2]),
             momentum_nm_s: 0.0,
             commands_nm: [0.0; MOTOR_ECHO],
             motor_band_nm: [0.0; 2],
@@ -205,6 +213,13 @@ impl Residual {
 
     /// Takes the column's values that arrive, and the guidance torque that was applied.
     pub(super) fn column(&mut self, time_s: f64, driver_nm: f64, wheel_rad: f64, applied_nm: f64) {
+        let (same_nm, since_s, [least, most]) = self.still;
+        let goes_on = driver_nm == same_nm && time_s - since_s < STILL_WITHIN_S;
+        self.still = if goes_on {
+            (same_nm, since_s, [least.min(wheel_rad), most.max(wheel_rad)])
+        } else {
+            (driver_nm, time_s, [wheel_rad; 2])
+        };
         if let Some(before_s) = self.column_at_s {
             let dt = time_s - before_s;
             let v = self.speeds_m_per_s[0];
@@ -318,6 +333,17 @@ impl Residual {
         // The wheel's own momentum, in the direction of the sum, is allowed beside the margin.
         let turning = INERTIA_KG_M2 * self.wheel_rate_rad_per_s * self.momentum_nm_s.signum();
         self.momentum_nm_s.abs() / (COLUMN_MARGIN_NM_S + turning.max(0.0))
+    }
+
+    /// Share of the turn that shows a driver torque to be stuck. It excuses a reaction and asks for none.
+    pub(super) fn still_used(&self, is_probed: bool) -> f64 {
+        let (_, since_s, [least, most]) = self.still;
+        let allowed = STILL_TURN_RAD[usize::from(!is_probed)];
+        if self.now_s - since_s < STILL_S {
+            0.0
+        } else {
+            (most - least) / allowed
+        }
     }
 
     /// Share of the motor's margin that its torque is beyond a band.

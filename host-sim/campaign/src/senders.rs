@@ -46,6 +46,11 @@ pub(super) struct Senders {
 }
 
 impl Senders {
+    /// Whether the host wants the probe.
+    pub(super) fn has_probe(&self) -> bool {
+        self.probe
+    }
+
     pub(super) fn new(probe: bool, aligning_gain_nm_s2_per_m: f64) -> Self {
         Self {
             aligning_gain_nm_s2_per_m,

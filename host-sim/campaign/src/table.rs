@@ -43,6 +43,11 @@ pub enum Class {
     D,
 }
 
+impl Class {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::L, Self::R, Self::A, Self::B, Self::C, Self::D];
+}
+
 impl fmt::Display for Class {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {

@@ -33,6 +33,7 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         Block::Text(format!(
             "Effort and conflict are those of {whose}. Loss x and Others x: how many times as far as its bars allow the search let a set go."
         )),
+        Block::Text(what_holds(results, choice)),
     ];
     Report {
         title: format!("Guidance for its drivers: {}", results.name),
@@ -49,6 +50,33 @@ pub fn report(results: &DesignResults, chosen: usize) -> Report {
         ],
         ..Report::default()
     }
+}
+
+/// Whether the bars can be had together, and what the chosen row lacks where the search has not been.
+fn what_holds(results: &DesignResults, choice: &Choice) -> String {
+    let bars = &results.bars;
+    let is_over = |(ratio, bar): (&f64, &Bar)| *ratio > bar.limit;
+    let holding = results
+        .sets
+        .iter()
+        .filter(|set| !set.ratios.iter().zip(bars).any(is_over));
+    let missed: Vec<String> = choice
+        .held_out
+        .iter()
+        .zip(bars)
+        .filter(|&pair| is_over(pair))
+        .map(|(ratio, bar)| format!("{} {ratio:.3} (at most {})", bar.label, bar.limit))
+        .collect();
+    let search = match holding.count() {
+        0 => "The bars cannot be had together with any set that was tried".to_owned(),
+        sets => format!("{sets} of the sets tried hold every bar on the drives of the search"),
+    };
+    let chosen = if missed.is_empty() {
+        "holds every bar".into()
+    } else {
+        format!("misses {}", missed.join(", "))
+    };
+    format!("{search}. On the held-out drives the chosen row {chosen}.")
 }
 
 /// A scenario file with the gains of a row.

@@ -4,7 +4,7 @@ use crate::document::{Block, Cell, Report, Section, Table};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use haptic_campaign::campaign::{Campaign, CaseResult};
 use haptic_campaign::drivers::{Drivers, Limits};
-use haptic_campaign::table::FaultCase;
+use haptic_campaign::table::{Class, FaultCase};
 use haptic_campaign::{OFF_ROAD_M, TrialOutcome};
 
 /// The document of a campaign, with what the ECU reported in these runs.
@@ -13,8 +13,9 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
         "Worst reaction and largest torque over all seeds of each fault, with the deadline and the bound that they must keep. A fault \
          without a mark on the left has no deadline. The deviation is that from the fault-free run, beside what it is if the torque \
          is dropped in the step in which the ECU leaves. Off road: runs that go more than {OFF_ROAD_M} m aside with the torque \
-         dropped as well, or that are so far aside without the fault too when the ECU leaves; their excess is not judged. A number \
-         with an arrow stands for what is beyond the axis."
+         dropped as well, or that are so far aside without the fault too when the ECU leaves; their excess is not judged. \
+         Pushed: how far a fault of class C goes from a vehicle whose torque is cut at the onset. A number with an arrow stands for \
+         what is beyond the axis."
     );
     let mut blocks = vec![
         Block::figure("faults", figure(campaign), caption),
@@ -29,6 +30,7 @@ pub fn report(campaign: &Campaign, told: Vec<Section>) -> Report {
             "How often, how soon, how far",
             vec![Block::Table(shares(campaign)), Block::Text(SHARES.into())],
         ),
+        Section::new("Class by class", vec![Block::Table(by_class(campaign))]),
     ];
     sections.extend(told);
     Report {
@@ -107,9 +109,12 @@ fn left_too_often(row: &CaseResult) -> String {
 const SHARES: &str = "Noticed: the ECU reported a fault after the onset, or left. Intervals of shares are Wilson's, 95 %; times count from \
                       the onset, over the runs in which something was noticed; deviations are of all runs.";
 
+fn percent(count: u64, runs: u64) -> Cell {
+    Cell::number(100.0 * count as f64 / runs as f64, 1)
+}
+
 /// How often each fault is noticed, how soon, and how far the vehicle goes.
 fn shares(campaign: &Campaign) -> Table {
-    let percent = |count: u64, runs: u64| Cell::number(100.0 * count as f64 / runs as f64, 1);
     let interval = |of: [f64; 2]| {
         let [low, high] = of.map(|share| 100.0 * share);
         Cell::Text(format!("{low:.1} to {high:.1}"))
@@ -148,6 +153,45 @@ fn shares(campaign: &Campaign) -> Table {
     )
 }
 
+/// What the faults of each class do, without rows in which no ECU decides where the vehicle goes.
+fn by_class(campaign: &Campaign) -> Table {
+    let row = |class: Class| {
+        let rows: Vec<&CaseResult> = campaign
+            .rows
+            .iter()
+            .filter(|row| row.class == class && row.is_limited)
+            .collect();
+        let sum = |of: fn(&CaseResult) -> u64| rows.iter().map(|row| of(row)).sum::<u64>();
+        let most =
+            |of: fn(&CaseResult) -> Option<f64>| rows.iter().filter_map(|row| of(row)).reduce(f64::max);
+        vec![
+            Cell::Text(class.to_string()),
+            Cell::number(rows.len() as f64, 0),
+            Cell::number(sum(|row| row.runs) as f64, 0),
+            percent(sum(|row| row.left_lane), sum(|row| row.runs)),
+            Cell::number(most(|row| Some(row.deviation_m)), 2),
+            Cell::number(most(|row| row.excess_m), 2),
+            Cell::number(most(|row| row.pushed_m), 2),
+        ]
+    };
+    Table::new(
+        "Rows that the limits judge",
+        [
+            "Class",
+            "Rows",
+            "Runs",
+            "Left lane (%)",
+            "Worst deviation (m)",
+            "Excess (m)",
+            "Pushed (m)",
+        ],
+        Class::ALL
+            .into_iter()
+            .filter(|&class| campaign.rows.iter().any(|row| row.class == class))
+            .map(row),
+    )
+}
+
 /// A run that failed, and how to run it again.
 fn failure(f: &haptic_campaign::campaign::FailedTrial) -> String {
     format!(
@@ -183,6 +227,7 @@ fn table(campaign: &Campaign) -> Table {
             Cell::number(row.deviation_m, 2),
             metres(row.dropped_m),
             metres(row.excess_m),
+            metres(row.pushed_m),
             count(row.left_lane),
             count(row.off_road),
         ]
@@ -205,6 +250,7 @@ fn table(campaign: &Campaign) -> Table {
             "Deviation (m)",
             "Dropped (m)",
             "Excess (m)",
+            "Pushed (m)",
             "Left lane",
             "Off road",
         ],
