@@ -113,8 +113,6 @@ impl ChangedParts {
 struct PendingChecks {
     lane: bool,
     column: bool,
-    /// Driver activity has not looked since a vehicle frame came.
-    activity_due: bool,
     frozen_torque: FrozenTorqueState,
     activity: Activity,
 }
@@ -124,25 +122,8 @@ impl PendingChecks {
         Self {
             lane: false,
             column: false,
-            activity_due: false,
             frozen_torque: FrozenTorqueState::default(),
             activity: Activity::NEW,
-        }
-    }
-
-    /// Driver activity looks at the column once for each vehicle frame: a step later or more, where no lane sample is checked, so
-    /// that no step with most of the frames does more.
-    #[inline(always)]
-    fn look_at_activity(&mut self, config: &Config, column_at: Instant, applied: Torque, inputs: &Inputs) {
-        if self.activity_due
-            && !self.lane
-            && let Some(column) = inputs.column.value()
-        {
-            self.activity_due = false;
-            let torques = [column.driver_torque, applied];
-            let (law, least) = (&config.law, config.least_share);
-            self.activity
-                .update(law, least, column_at, column.wheel_angle, torques);
         }
     }
 }
@@ -335,10 +316,8 @@ impl Controller {
             return state.lose_memory(now);
         }
         let memory = state.memory.value_mut();
-        let (config, pending) = (self.config.value(), &mut state.pending);
-        pending.look_at_activity(config, memory.input_times.column, applied, inputs);
         let mut step = Step {
-            config,
+            config: self.config.value(),
             now,
             applied,
             inputs,

@@ -198,7 +198,6 @@ impl<I: Injection> Step<'_, I> {
             if least < Ratio::ONE {
                 let left = pending.activity.share(least);
                 v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
-                pending.activity_due = true;
             }
         }
         if fast_enough != Some(true) {
@@ -323,6 +322,25 @@ impl<I: Injection> Step<'_, I> {
                     kept.insert(Fault::YawRate);
                 }
             }
+            if self.config.least_share < Ratio::ONE && !matches!(self.inputs.motion, Input::New(_)) {
+                self.look_at_activity(v, pending);
+            }
+        }
+    }
+
+    /// Driver activity looks at the column in the steps that check a lane sample, unless a vehicle frame came too: those have the
+    /// most to do. Not inlined, so that it costs (9) nothing.
+    #[cold]
+    #[inline(never)]
+    fn look_at_activity(&self, v: &Memory, pending: &mut PendingChecks) {
+        if let Some(column) = self.inputs.column.value() {
+            pending.activity.update(
+                &self.config.law,
+                self.config.least_share,
+                v.input_times.column,
+                column.wheel_angle,
+                [column.driver_torque, self.applied],
+            );
         }
     }
 

@@ -23,6 +23,7 @@ const MOST_SQUARE: i64 = (64 << I8F24::FRAC_NBITS) - 1;
 
 /// What it remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(packed(4))]
 pub struct Activity {
     /// phi when it came last, and when that was.
     wheel: Radians,
