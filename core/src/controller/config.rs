@@ -14,10 +14,11 @@
 use crate::controller::params::{DRIVER_ACTIVITY, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
+use crate::law::activity::LeastShare;
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
-    CurvaturePerAngle, Micros, Ratio, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
+    CurvaturePerAngle, Micros, Seconds, Speed, StabilityFactor, Torque, TorquePerAcceleration,
     TorquePerAngle, TorquePerLength, TorquePerSpeed, TorquePerTurningRate, TorqueRate,
 };
 use crate::safety::envelope::Envelope;
@@ -41,7 +42,7 @@ words! {
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
         /// What driver activity leaves of (9) at least: all of it where the law is (9) itself.
-        pub least_share: Ratio,
+        pub least_share: LeastShare,
     }
 }
 
@@ -129,11 +130,11 @@ impl Config {
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
-            least_share: Ratio::from_si(if p.law == DRIVER_ACTIVITY {
-                p.activity_lambda_min
+            least_share: if p.law == DRIVER_ACTIVITY {
+                LeastShare::from_si(p.activity_lambda_min)
             } else {
-                1.0
-            }),
+                LeastShare::ALL
+            },
         }
     }
 }

@@ -16,10 +16,55 @@
 use fixed::types::{I8F24, I12F20};
 
 use super::{GAP, Law};
-use crate::quantity::{Instant, Radians, Ratio, Torque, product, quotient, saturate, share_of};
+use crate::quantity::{Instant, Radians, Ratio, Torque, product, saturate, share_of};
+use crate::safety::redundant::Words;
 
 /// The square of a wheel's rate that counts: a hand turns no wheel faster than 8 rad/s.
 const MOST_SQUARE: i64 = (64 << I8F24::FRAC_NBITS) - 1;
+
+/// What driver activity leaves of (9) at least, a ratio from 0 to 1 in bits; every bit is set where the law is (9) itself.
+///
+/// A word of the configuration, but compared with its copy only where it is read, with each vehicle frame: a word more in the
+/// comparison of each step would cost (9) nine instructions in the mean. (9) differs from any ratio in seven bits, so that no flipped
+/// bit makes one of the other before the copies are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LeastShare(u32);
+
+impl LeastShare {
+    /// The law is (9).
+    pub const ALL: Self = Self(u32::MAX);
+
+    /// A share from 0 to 1.
+    #[must_use]
+    pub const fn from_si(share: f64) -> Self {
+        Self(Ratio::from_si(share).fixed().to_bits().cast_unsigned())
+    }
+
+    /// Whether driver activity is the law.
+    pub(crate) fn takes_away(self) -> bool {
+        self != Self::ALL
+    }
+
+    /// To compare copies.
+    pub(crate) const fn bits(self) -> u32 {
+        self.0
+    }
+
+    const fn ratio(self) -> Ratio {
+        Ratio::from_fixed(I8F24::from_bits(self.0.cast_signed()))
+    }
+}
+
+impl Words for LeastShare {
+    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
+        Self(change(self.0))
+    }
+
+    /// Not compared here.
+    fn agreement(&self, _: &Self) -> u32 {
+        u32::MAX
+    }
+}
 
 /// What it remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +98,7 @@ impl Activity {
     pub fn update(
         &mut self,
         law: &Law,
-        least: Ratio,
+        least: LeastShare,
         at: Instant,
         wheel: Radians,
         [driver, guidance]: [Torque; 2],
@@ -76,26 +121,26 @@ impl Activity {
         let weight = passed.us().saturating_mul(PER_US);
         self.agreement = low_pass(self.agreement, both, weight);
         self.size = low_pass(self.size, both.saturating_abs(), weight);
-        let taken = share_of(Ratio::ONE.minus(least).fixed(), self.against());
+        let taken = share_of(Ratio::ONE.minus(least.ratio()).fixed(), self.against());
         self.share = Ratio::ONE.minus(Ratio::from_fixed(taken));
     }
 
     /// The share of (9) that is left, of which `least` is always.
     #[must_use]
-    pub fn share(&self, least: Ratio) -> Ratio {
-        self.share.max(least).min(Ratio::ONE)
+    pub fn share(&self, least: LeastShare) -> Ratio {
+        self.share.max(least.ratio()).min(Ratio::ONE)
     }
 
-    /// `max(0, -c)`.
+    /// `max(0, -c)`, in 2^-15.
+    #[expect(clippy::as_conversions, clippy::cast_possible_truncation, reason = "the upper 16 bits")]
     fn against(&self) -> I8F24 {
         let size = self.size.max(0).cast_unsigned();
         let against = self.agreement.min(0).unsigned_abs().min(size);
-        // The upper 32 bits of both from the first that is set; a quotient by zero is zero.
+        // The upper 16 bits of both from the first that is set, so that the processor divides by itself; by zero is zero.
         let up = size.leading_zeros();
-        let upper = |bits: u64| bits.wrapping_shl(up) >> 32;
-        let divisor = u32::try_from(upper(size)).unwrap_or(u32::MAX);
-        let share = quotient(upper(against) << I8F24::FRAC_NBITS, divisor).min(1 << I8F24::FRAC_NBITS);
-        I8F24::from_bits(share.cast_signed())
+        let upper = |bits: u64| u32::from((bits.wrapping_shl(up) >> 48) as u16);
+        let share = (upper(against) << 15).checked_div(upper(size)).unwrap_or(0);
+        I8F24::from_bits((share << (I8F24::FRAC_NBITS - 15)).cast_signed())
     }
 }
 
