@@ -4,8 +4,8 @@
 use haptic_core::controller::config::Setup;
 use haptic_core::controller::params::{DRIVER_ACTIVITY, Params};
 use haptic_core::ecu::Boot;
-use haptic_core::law::activity::Activity;
-use haptic_core::quantity::{Instant, Metres, Radians, Ratio, Torque};
+use haptic_core::law::activity::{Activity, LeastShare};
+use haptic_core::quantity::{Instant, Metres, Radians, Torque};
 use haptic_core::safety::faults::Fault;
 use haptic_core::safety::modes::Mode;
 use rand::rngs::SmallRng;
@@ -64,7 +64,7 @@ fn the_share_of_driver_activity_is_within_0_001_of_its_equation() {
             let expected = 1.0 - (1.0 - least) * against;
             let torques = [driver, guidance].map(Torque::from_nm);
             let now = Instant::from_us(1000 * ms);
-            let least_share = Ratio::from_si(least);
+            let least_share = LeastShare::from_si(least);
             activity.update(&law, least_share, now, wheel, torques);
             let share = activity.share(least_share).si();
             assert!((least - 1e-6..=1.0).contains(&share), "{share}");
@@ -89,9 +89,9 @@ fn who_helps_has_all_and_who_works_against_it_the_least_share() {
             let wheel = Radians::from_rad(1e-4 * f64::from(ms));
             let torques = [driver, 0.5].map(Torque::from_nm);
             let now = Instant::from_us(1000 * ms);
-            activity.update(&law, Ratio::from_si(0.25), now, wheel, torques);
+            activity.update(&law, LeastShare::from_si(0.25), now, wheel, torques);
         }
-        let share = activity.share(Ratio::from_si(0.25)).si();
+        let share = activity.share(LeastShare::from_si(0.25)).si();
         assert!((share - expected).abs() < 1e-5, "{driver}: {share}");
     }
 }
