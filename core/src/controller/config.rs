@@ -14,7 +14,7 @@
 use crate::controller::params::{DRIVER_ACTIVITY, ParamError, Params, in_range};
 use crate::estimator::{BLOCK_S, Estimator, T_NMS_RANGE_S};
 use crate::law::Law;
-use crate::law::activity::LeastShare;
+use crate::law::activity::{LeastShare, TimeAndShare};
 use crate::law::probe::Probe;
 use crate::law::schedule::Schedule;
 use crate::quantity::{
@@ -41,8 +41,6 @@ words! {
         pub probe: Probe,
         /// Shares of the torque at the ends of the schedule, 1 between them at 60 km/h.
         pub schedule: Schedule,
-        /// What driver activity leaves of (9) at least: all of it where the law is (9) itself.
-        pub least_share: LeastShare,
     }
 }
 
@@ -102,6 +100,12 @@ impl Config {
     /// The configuration of parameters that are in range.
     const fn from_params(p: &Params) -> Self {
         let v = &p.vehicle;
+        let between_us = (f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32;
+        let least_share = if p.law == DRIVER_ACTIVITY {
+            Some(LeastShare::from_si(p.activity_lambda_min))
+        } else {
+            None
+        };
         Self {
             law: Law {
                 e_y: TorquePerLength::from_nm_per_m(p.k_1 * p.a_1),
@@ -122,7 +126,7 @@ impl Config {
                 column_damping: TorquePerTurningRate::from_nm_s_per_rad(v.column_damping_nm_s),
                 far_time: Seconds::from_s(v.far_time_s),
                 near_time: Seconds::from_s(v.near_time_s),
-                between: Micros::from_us((f64::max(v.far_time_s - v.near_time_s, 0.0) * 1e6 + 0.5) as u32),
+                between: TimeAndShare::new(Micros::from_us(between_us), least_share),
             },
             least_speed: Speed::from_m_per_s(p.least_speed_m_per_s),
             probe: Probe {
@@ -130,11 +134,6 @@ impl Config {
                 phase_per_us: phase_per_us(p.probe_frequency_hz),
             },
             schedule: Schedule::new(p.low_speed_share, p.high_speed_share),
-            least_share: if p.law == DRIVER_ACTIVITY {
-                LeastShare::from_si(p.activity_lambda_min)
-            } else {
-                LeastShare::ALL
-            },
         }
     }
 }
@@ -271,7 +270,7 @@ mod tests {
             };
             (params.vehicle.far_time_s, params.vehicle.near_time_s) = (far_time_s, near_time_s);
             let config = Config::new(&params).unwrap();
-            assert_eq!(config.plausibility.between, Micros::from_us(between_us));
+            assert_eq!(config.plausibility.between.time(), Micros::from_us(between_us));
             assert_eq!(config.law.tau, tau, "{rate_corner_hz}");
         }
     }

@@ -317,7 +317,7 @@ impl Controller {
         }
         let memory = state.memory.value_mut();
         let mut step = Step {
-            config: &self.config,
+            config: self.config.value(),
             now,
             applied,
             inputs,

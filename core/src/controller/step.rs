@@ -17,7 +17,6 @@ use crate::safety::hands::{END, WARN};
 use crate::safety::modes::{Event, Events, Mode};
 use crate::safety::motion_history::MotionHistory;
 use crate::safety::plausibility::{LaneMotion, lane_step_is_possible};
-use crate::safety::redundant::Redundant;
 use crate::safety::ramp::{Ramp, TorqueHistory, handover_length, pace, smaller_of_same_sign};
 
 /// A planned fade.
@@ -51,7 +50,7 @@ const BRIDGED: FaultSet = FaultSet::NONE
 
 /// One step: what it reads and does not change.
 pub(super) struct Step<'a, I> {
-    pub(super) config: &'a Redundant<Config>,
+    pub(super) config: &'a Config,
     pub(super) now: Instant,
     pub(super) applied: Torque,
     pub(super) inputs: &'a Inputs,
@@ -130,12 +129,12 @@ impl<I: Injection> Step<'_, I> {
             return [FaultSet::NONE; 2];
         };
         let extrapolated_lane = |v: &Memory, motion_history: &MotionHistory, at| {
-            let checks = &self.config.value().plausibility;
+            let checks = &self.config.plausibility;
             checks.extrapolated_lane(&v.plausibility, motion_history, self.now, &last, at)
         };
         let is_older = |sample: LaneSample| sample.at.since(last.at) > HALF_WRAP;
         let ego = self.ego_motion(v, last);
-        let demanded = self.config.value().law.demanded(&v.law, self.now, ego.as_ref());
+        let demanded = self.config.law.demanded(&v.law, self.now, ego.as_ref());
         match self.inputs.lane {
             Input::Lost => v.coast.picture_missing(demanded),
             Input::New(sample) if !is_older(sample) => {
@@ -195,10 +194,7 @@ impl<I: Injection> Step<'_, I> {
 
         if let Input::New(motion) = motion {
             self.update_motion(v, changed, motion, motion_history, &mut kept);
-            let least = self.config.value().least_share;
-            if least.takes_away() {
-                let agrees = self.config.part_agrees(|config| config.least_share.bits());
-                kept.insert_if(!agrees, Fault::Memory);
+            if let Some(least) = self.config.plausibility.between.least_share() {
                 let left = pending.activity.share(least);
                 v.share = Ratio::from_fixed(share_of(left.fixed(), v.share.fixed()));
             }
@@ -262,7 +258,7 @@ impl<I: Injection> Step<'_, I> {
         motion_history: &mut MotionHistory,
         kept: &mut FaultSet,
     ) {
-        let checks = &self.config.value().plausibility;
+        let checks = &self.config.plausibility;
         let passed = self.now.since(v.input_times.motion);
         v.input_times.motion = self.now;
         changed.add(ChangedParts::INPUT_TIMES);
@@ -279,7 +275,7 @@ impl<I: Injection> Step<'_, I> {
         let is_distrusted = measured.is_some() && v.plausibility.motion.yaw.is_distrusted();
         kept.set(is_distrusted, Fault::YawRate);
         checks.motion(&mut v.plausibility, speed, yaw_rate);
-        v.share = self.config.value().schedule.share(v.plausibility.speed());
+        v.share = self.config.schedule.share(v.plausibility.speed());
         motion_history.record_turning_rate(self.now, v.plausibility.turning());
     }
 
@@ -293,7 +289,7 @@ impl<I: Injection> Step<'_, I> {
         pending: &mut PendingChecks,
         kept: &mut FaultSet,
     ) {
-        let checks = &self.config.value().plausibility;
+        let checks = &self.config.plausibility;
         if let Some(c) = to_check(&self.inputs.column, &mut pending.column) {
             changed.add(ChangedParts::COLUMN);
             let is_tested = v.fast.packed.mode == STANDBY || v.fast.probe != ProbeState::SILENT;
@@ -325,7 +321,7 @@ impl<I: Injection> Step<'_, I> {
                     kept.insert(Fault::YawRate);
                 }
             }
-            if self.config.value().least_share.takes_away() && !matches!(self.inputs.motion, Input::New(_)) {
+            if self.config.plausibility.between.least_share().is_some() && !matches!(self.inputs.motion, Input::New(_)) {
                 self.look_at_activity(v, pending);
             }
         }
@@ -336,10 +332,12 @@ impl<I: Injection> Step<'_, I> {
     #[cold]
     #[inline(never)]
     fn look_at_activity(&self, v: &Memory, pending: &mut PendingChecks) {
-        if let Some(column) = self.inputs.column.value() {
+        if let Some(column) = self.inputs.column.value()
+            && let Some(least) = self.config.plausibility.between.least_share()
+        {
             pending.activity.update(
-                &self.config.value().law,
-                self.config.value().least_share,
+                &self.config.law,
+                least,
                 v.input_times.column,
                 column.wheel_angle,
                 [column.driver_torque, self.applied],
@@ -399,7 +397,7 @@ impl<I: Injection> Step<'_, I> {
         }
         let went_on = per_second(v.fast.rate_then.fixed(), age);
         let speed = v.plausibility.speed();
-        let near = product(self.config.value().plausibility.near_time.fixed(), speed.fixed());
+        let near = product(self.config.plausibility.near_time.fixed(), speed.fixed());
         Some(EgoMotion::new(
             v.fast.turned.minus(Radians::from_fixed(went_on)),
             v.plausibility.turning().minus(v.fast.rate_then),
@@ -410,7 +408,7 @@ impl<I: Injection> Step<'_, I> {
 
     /// Whether both speeds reach the slowest that is guided, if they are known.
     fn is_fast_enough(&self) -> Option<bool> {
-        let least = self.config.value().least_speed;
+        let least = self.config.least_speed;
         self.inputs
             .motion
             .value()
@@ -562,10 +560,10 @@ impl<I: Injection> Step<'_, I> {
         };
         let distrusted;
         let envelope = if mode == Mode::Handover && faults.contains(Fault::LaneImplausible) {
-            distrusted = self.config.value().envelope.distrusted();
+            distrusted = self.config.envelope.distrusted();
             &distrusted
         } else {
-            &self.config.value().envelope
+            &self.config.envelope
         };
         let (torque, limit) = envelope.step(&mut v.fast.envelope, self.now, wanted, &situation);
         match limit {
@@ -580,7 +578,7 @@ impl<I: Injection> Step<'_, I> {
     fn probe(&self, v: &mut Memory) -> Option<Torque> {
         // The probe needs a lane that is fully trusted.
         let wanted = self.inputs.request.value().is_some_and(|r| r.probe) && v.coast.is_idle();
-        self.config.value().probe.step(&mut v.fast.probe, self.elapsed, wanted)
+        self.config.probe.step(&mut v.fast.probe, self.elapsed, wanted)
     }
 
     /// The law's torque times authority, gain at this speed and trust in the lane. Without a request the authority is 1: the mode
@@ -589,9 +587,9 @@ impl<I: Injection> Step<'_, I> {
         let demanded = self.lane.value().map_or(Torque::ZERO, |sample| {
             if !v.law.is_latest(&sample) {
                 changed.add(ChangedParts::LAW);
-                self.config.value().law.update(&mut v.law, sample);
+                self.config.law.update(&mut v.law, sample);
             }
-            self.config.value()
+            self.config
                 .law
                 .demanded(&v.law, self.now, self.ego_motion(v, sample).as_ref())
         });

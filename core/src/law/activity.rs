@@ -16,53 +16,65 @@
 use fixed::types::{I8F24, I12F20};
 
 use super::{GAP, Law};
-use crate::quantity::{Instant, Radians, Ratio, Torque, product, saturate, share_of};
-use crate::safety::redundant::Words;
+use crate::quantity::{Instant, Micros, Radians, Ratio, Torque, product, saturate, share_of};
+use crate::safety::redundant::words;
 
 /// The square of a wheel's rate that counts: a hand turns no wheel faster than 8 rad/s.
 const MOST_SQUARE: i64 = (64 << I8F24::FRAC_NBITS) - 1;
 
-/// What driver activity leaves of (9) at least, a ratio from 0 to 1 in bits; every bit is set where the law is (9) itself.
-///
-/// A word of the configuration, but compared with its copy only where it is read, with each vehicle frame: a word more in the
-/// comparison of each step would cost (9) nine instructions in the mean. (9) differs from any ratio in seven bits, so that no flipped
-/// bit makes one of the other before the copies are compared.
+/// What driver activity leaves of (9) at least, in thousandths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LeastShare(u32);
 
 impl LeastShare {
-    /// The law is (9).
-    pub const ALL: Self = Self(u32::MAX);
-
-    /// A share from 0 to 1.
+    /// A share from 0 to 1, within 0.0005 of it.
     #[must_use]
+    #[expect(
+        clippy::as_conversions,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::float_arithmetic,
+        reason = "a parameter is an SI value in f64"
+    )]
     pub const fn from_si(share: f64) -> Self {
-        Self(Ratio::from_si(share).fixed().to_bits().cast_unsigned())
+        Self((share * 1000.0 + 0.5) as u32)
     }
 
-    /// Whether driver activity is the law.
-    pub(crate) fn takes_away(self) -> bool {
-        self != Self::ALL
-    }
-
-    /// To compare copies.
-    pub(crate) const fn bits(self) -> u32 {
-        self.0
-    }
-
-    const fn ratio(self) -> Ratio {
-        Ratio::from_fixed(I8F24::from_bits(self.0.cast_signed()))
+    /// At most 1, from any bits.
+    fn ratio(self) -> Ratio {
+        // 2^24/1000 is 16,777.216, so that 1000 of them are within 2^-16 of 1.
+        let share = self.0.saturating_mul(16_777).cast_signed();
+        Ratio::from_fixed(I8F24::from_bits(share)).min(Ratio::ONE)
     }
 }
 
-impl Words for LeastShare {
-    fn map_words(self, change: &mut impl FnMut(u32) -> u32) -> Self {
-        Self(change(self.0))
+words! {
+    /// A time and a [`LeastShare`] in one word, as each word more costs every step: the time in its lower 22 bits, up to 4.1 s; above
+    /// it a share plus one, or zero where there is none, as the law is (9).
+    pub struct TimeAndShare {
+        bits: u32,
+    }
+}
+
+const TIME_BITS: u32 = 22;
+
+impl TimeAndShare {
+    pub(crate) const fn new(time: Micros, share: Option<LeastShare>) -> Self {
+        let share = match share {
+            Some(LeastShare(share)) => share + 1,
+            None => 0,
+        };
+        Self {
+            bits: share << TIME_BITS | time.us() & ((1 << TIME_BITS) - 1),
+        }
     }
 
-    /// Not compared here.
-    fn agreement(&self, _: &Self) -> u32 {
-        u32::MAX
+    pub(crate) const fn time(self) -> Micros {
+        Micros::from_us(self.bits & ((1 << TIME_BITS) - 1))
+    }
+
+    pub(crate) fn least_share(self) -> Option<LeastShare> {
+        (self.bits >> TIME_BITS).checked_sub(1).map(LeastShare)
     }
 }
 

@@ -32,6 +32,7 @@
 use fixed::types::{I0F32, I8F24, I40F24};
 
 use crate::law::LaneSample;
+use crate::law::activity::TimeAndShare;
 use crate::quantity::{
     AngularImpulse, CurvaturePerAngle, Instant, Metres, Micros, Radians, Ratio, Seconds, Speed,
     StabilityFactor, Torque, TorquePerAcceleration, TorquePerTurningRate, TurningRate, TurningRatePerAngle,
@@ -56,7 +57,7 @@ words! {
         pub(crate) far_time: Seconds,
         /// t'_n, s, and how long before the far point is where the near point is now.
         pub(crate) near_time: Seconds,
-        pub(crate) between: Micros,
+        pub(crate) between: TimeAndShare,
     }
 }
 
@@ -469,7 +470,7 @@ impl Plausibility {
         now: Instant,
         at: Instant,
     ) -> Option<I8F24> {
-        let near = motion_history.line_direction(now, at, self.between)?;
+        let near = motion_history.line_direction(now, at, self.between.time())?;
         let turning = motion_history.heading(now, at).rate;
         let along = saturate(product(state.motion.speed.fixed(), near.fixed()));
         let reach = saturate(product(self.near_time.fixed(), state.motion.speed.fixed()));
@@ -542,7 +543,7 @@ mod tests {
         column_damping: TorquePerTurningRate::from_nm_s_per_rad(0.57),
         far_time: Seconds::from_s(0.7),
         near_time: Seconds::from_s(0.3),
-        between: Micros::from_us(400_000),
+        between: TimeAndShare::new(Micros::from_us(400_000), None),
     };
 
     #[test]

@@ -207,12 +207,6 @@ impl<T: Words> Redundant<T> {
         keep_together();
     }
 
-    /// Whether the copies of a word agree that is no part of [`Words::agreement`].
-    pub(crate) fn part_agrees(&self, part: impl Fn(&T) -> u32) -> bool {
-        let guarded = black_box(self);
-        part(&guarded.value).agreement(&part(&guarded.inverted)) == u32::MAX
-    }
-
     /// Changes a part in both copies. The rest stays as it is, and so does a flipped bit there.
     pub(crate) fn put<P: Copy + Not<Output = P>>(&mut self, part: impl Fn(&mut T) -> &mut P, new: P) {
         *part(&mut self.value) = new;
