@@ -321,7 +321,9 @@ impl<I: Injection> Step<'_, I> {
                     kept.insert(Fault::YawRate);
                 }
             }
-            if self.config.plausibility.between.least_share().is_some() && !matches!(self.inputs.motion, Input::New(_)) {
+            if self.config.plausibility.between.least_share().is_some()
+                && !matches!(self.inputs.motion, Input::New(_))
+            {
                 self.look_at_activity(v, pending);
             }
         }

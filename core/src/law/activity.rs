@@ -7,11 +7,12 @@
 //! State that is not kept twice: whatever a flipped bit makes of it, the share is one from lambda_min to 1, and is right again
 //! when the low-pass has forgotten.
 //!
-//! It looks at the column once for each vehicle frame.
+//! It looks at the column in the steps that check a lane sample, unless a vehicle frame came too; those have the most to do.
 //!
 //! Products of pseudo-powers are in 2^-48 (N.m.rad/s)^2: what an LSB of the bus in each torque makes with 0.25 mrad/s is one.
-//! Error: at most 0.001 of the share from a float64 evaluation of the same samples, 0.03 where the wheel never moves by more than 3
-//! mrad/s (`core/tests/laws.rs` asserts it).
+//! Error: c is a quotient of 16 bits, which makes 3*2^-15 of it; an LSB of the rate's square, 2^-24 (rad/s)^2, makes twice its share of
+//! the mean square of the last second. Together at most 0.001 of the share from a float64 evaluation of the same samples, 0.03 where
+//! the wheel never moves by more than 3 mrad/s (`core/tests/laws.rs` asserts it). lambda_min is kept in thousandths.
 
 use fixed::types::{I8F24, I12F20};
 
@@ -40,10 +41,9 @@ impl LeastShare {
         Self((share * 1000.0 + 0.5) as u32)
     }
 
-    /// At most 1, from any bits.
+    /// At most 1, from any bits: ten of them, shifted by 21, have 31.
     fn ratio(self) -> Ratio {
-        // 2^24/1000 is 16,777.216, so that 1000 of them are within 2^-16 of 1.
-        let share = self.0.saturating_mul(16_777).cast_signed();
+        let share = (self.0.wrapping_shl(21) / 125).cast_signed();
         Ratio::from_fixed(I8F24::from_bits(share)).min(Ratio::ONE)
     }
 }
@@ -144,7 +144,11 @@ impl Activity {
     }
 
     /// `max(0, -c)`, in 2^-15.
-    #[expect(clippy::as_conversions, clippy::cast_possible_truncation, reason = "the upper 16 bits")]
+    #[expect(
+        clippy::as_conversions,
+        clippy::cast_possible_truncation,
+        reason = "the upper 16 bits"
+    )]
     fn against(&self) -> I8F24 {
         let size = self.size.max(0).cast_unsigned();
         let against = self.agreement.min(0).unsigned_abs().min(size);
