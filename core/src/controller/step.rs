@@ -5,6 +5,7 @@ use super::{ChangedParts, Command, Memory, PendingChecks, READY};
 use crate::controller::config::Config;
 use crate::controller::injection::Injection;
 use crate::controller::inputs::{Input, Inputs, Motion, Request};
+use crate::law::activity::Activity;
 use crate::law::probe::ProbeState;
 use crate::law::{EgoMotion, LaneSample, LawState};
 use crate::quantity::{
@@ -32,6 +33,10 @@ const EARLY: Micros = Micros::from_us(500);
 /// How many early steps in a row are tolerated. Each gains nothing, as every limit goes by the time passed; more mean a timer that
 /// runs away, which is a fault.
 const EARLY_STEPS: u8 = 3;
+
+/// Driver activity looks again where it has not for so long, and for so long in any step.
+const LONG_WAIT: Micros = Micros::from_ms(12);
+const LONGEST_WAIT: Micros = Micros::from_ms(50);
 
 /// A lane sample no older than this when it arrives is continued at its own rates; an older one is also corrected by how the
 /// vehicle has turned since.
@@ -321,23 +326,26 @@ impl<I: Injection> Step<'_, I> {
                     kept.insert(Fault::YawRate);
                 }
             }
-            if self.config.plausibility.between.least_share().is_some()
-                && !matches!(self.inputs.motion, Input::New(_))
-            {
-                self.look_at_activity(v, pending);
+            if self.config.plausibility.between.least_share().is_some() {
+                pending.lane |= self.look_at_activity(v, &mut pending.activity);
             }
         }
     }
 
     /// Driver activity looks at the column in the steps that check a lane sample, unless a vehicle frame came too: those have the
-    /// most to do. Not inlined, so that it costs (9) nothing.
+    /// most to do. Where a camera always keeps step with the vehicle frames, the next step repeats the check, and looks. Not inlined,
+    /// so that it costs (9) nothing.
     #[cold]
     #[inline(never)]
-    fn look_at_activity(&self, v: &Memory, pending: &mut PendingChecks) {
+    fn look_at_activity(&self, v: &Memory, activity: &mut Activity) -> bool {
         if let Some(column) = self.inputs.column.value()
             && let Some(least) = self.config.plausibility.between.least_share()
         {
-            pending.activity.update(
+            let waited = v.input_times.column.since(activity.looked_at());
+            if matches!(self.inputs.motion, Input::New(_)) && waited < LONGEST_WAIT {
+                return waited > LONG_WAIT;
+            }
+            activity.update(
                 &self.config.law,
                 least,
                 v.input_times.column,
@@ -345,6 +353,7 @@ impl<I: Injection> Step<'_, I> {
                 [column.driver_torque, self.applied],
             );
         }
+        false
     }
 
     /// A time-out fault for each input without a usable value.

@@ -137,6 +137,10 @@ impl Activity {
         self.share = Ratio::ONE.minus(Ratio::from_fixed(taken));
     }
 
+    pub(crate) const fn looked_at(&self) -> Instant {
+        self.at
+    }
+
     /// The share of (9) that is left, of which `least` is always.
     #[must_use]
     pub fn share(&self, least: LeastShare) -> Ratio {
