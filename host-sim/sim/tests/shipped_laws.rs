@@ -4,8 +4,7 @@
 use haptic_core::controller::params::{DRIVER_ACTIVITY, Params};
 use haptic_core::safety::faults::Fault;
 use haptic_sim::guidance::{OverBus, OwnLaw};
-use haptic_sim::kind::Make;
-use haptic_sim::laws::LAWS;
+use haptic_sim::laws::{Gains, Law, LawView};
 use haptic_sim::models::disturbances::SensorErrors;
 use haptic_sim::models::driver::DriverParameters;
 use haptic_sim::scenario::GuidanceParameters;
@@ -29,15 +28,52 @@ const ACTIVITY: Params = Params {
     ..Params::PAPER
 };
 
+/// The law in f64 at the instants of the ECU's: it looks 120 times a second, a step after a lane sample and not with a vehicle frame,
+/// and the share acts from the next vehicle frame on, 10 ms apart.
+#[derive(Clone)]
+struct Sampled {
+    paper: Gains,
+    least: f64,
+    looked: u32,
+    /// A lane sample waits for its check.
+    lane_is_new: bool,
+    sums: [f64; 2],
+    share: f64,
+}
+
+impl Law for Sampled {
+    fn ask(&mut self, view: &LawView) -> f64 {
+        let has_motion = view.step.is_multiple_of(10);
+        if has_motion && self.sums[1] > 0.0 {
+            let against = (-self.sums[0] / self.sums[1]).max(0.0);
+            self.share = 1.0 - (1.0 - self.least) * against;
+        }
+        if self.lane_is_new && !has_motion {
+            let weight = f64::from(view.step - self.looked) * 1e-3 / 0.5;
+            let rate = view.wheel_rate_rad_per_s;
+            let product = view.driver_torque_nm * view.guidance_torque_nm * rate * rate;
+            self.sums[0] += weight * (product - self.sums[0]);
+            self.sums[1] += weight * (product.abs() - self.sums[1]);
+            self.looked = view.step;
+        }
+        self.lane_is_new = (view.step * 120) / 1000 != (view.step.saturating_sub(1) * 120) / 1000;
+        self.share * self.paper.ask(view)
+    }
+}
+
 /// The same drive twice: the ECU with its own law, and the same ECU with the law in f64 in its place. The largest differences of torque
 /// and lateral error.
 fn apart(params: Params, kmh: f64) -> [f64; 2] {
     let shipping = scenario(params, kmh, SensorErrors::default(), 3);
     let paper = scenario(Params::PAPER, kmh, SensorErrors::default(), 3);
-    let kind = LAWS.iter().find(|kind| kind.name == "driver_activity").unwrap();
-    let Make::Part(make) = kind.make else { panic!() };
-    let values = [params.k_1, params.activity_lambda_min, 0.5];
-    let law = make(&paper, &values).unwrap();
+    let law = Sampled {
+        paper: Gains::PAPER,
+        least: params.activity_lambda_min,
+        looked: 0,
+        lane_is_new: false,
+        sums: [0.0; 2],
+        share: 1.0,
+    };
     let own = Simulation::with(&paper, OwnLaw::new(&paper, law)).run();
     let ecu = Simulation::with(&shipping, OverBus::new(shipping.setup())).run();
     assert_eq!(own.trace.samples.len(), ecu.trace.samples.len());
@@ -48,7 +84,6 @@ fn apart(params: Params, kmh: f64) -> [f64; 2] {
     [most(|s| s.guidance_torque_nm), most(|s| s.lateral_error_m)]
 }
 
-/// The law in f64 looks at each column sample, the ECU's at every fifth or so, 10 ms later.
 #[test]
 fn the_law_on_the_ecu_is_that_in_f64() {
     for kmh in [60.0, 90.0] {
