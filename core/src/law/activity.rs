@@ -61,7 +61,7 @@ const TIME_BITS: u32 = 22;
 impl TimeAndShare {
     pub(crate) const fn new(time: Micros, share: Option<LeastShare>) -> Self {
         let share = match share {
-            Some(LeastShare(share)) => share + 1,
+            Some(LeastShare(share)) => share.saturating_add(1),
             None => 0,
         };
         Self {
@@ -80,7 +80,8 @@ impl TimeAndShare {
 
 /// What it remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(packed(4))]
+// Aligned as everything else of the ECU: with 8 bytes its fields would lie elsewhere, and each step would cost more.
+#[repr(C, packed(4))]
 pub struct Activity {
     /// phi when it came last, and when that was.
     wheel: Radians,
@@ -148,11 +149,7 @@ impl Activity {
     }
 
     /// `max(0, -c)`, in 2^-15.
-    #[expect(
-        clippy::as_conversions,
-        clippy::cast_possible_truncation,
-        reason = "the upper 16 bits"
-    )]
+    #[expect(clippy::as_conversions, reason = "the upper 16 bits")]
     fn against(&self) -> I8F24 {
         let size = self.size.max(0).cast_unsigned();
         let against = self.agreement.min(0).unsigned_abs().min(size);
